@@ -1,0 +1,68 @@
+//! A simulated signal beside its measurement.
+
+use mops_core::{Analysis, Case, Channel};
+
+use super::trace;
+
+/// A measured channel, and how far the simulation is from it.
+pub struct Comparison<'a> {
+    /// What was measured.
+    pub channel: &'a Channel,
+    /// Simulated minus measured, at each sample.
+    pub differences: Vec<f64>,
+}
+
+impl Comparison<'_> {
+    /// Number of samples.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn count(&self) -> f64 {
+        self.differences.len() as f64
+    }
+
+    /// Sum of the squares of the differences.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.differences.iter().map(|d| d * d).sum()
+    }
+}
+
+/// The simulated signal at the times of its measurement.
+pub fn compare<'a>(case: &'a Case, analysis: &Analysis, signal: &str) -> Result<Comparison<'a>, String> {
+    let experiment = case.experiment.as_ref();
+    let channel = experiment
+        .and_then(|experiment| experiment.channel(signal))
+        .ok_or_else(|| format!("`{}` does not measure `{signal}`", case.name))?;
+    let simulated = trace(analysis, signal)?;
+    let (Some(first), Some(last)) = (channel.times.first(), channel.times.last()) else {
+        return Err(format!("the measurement of `{signal}` has no samples"));
+    };
+    // Beyond its ends a trace has no values; times that agree up to rounding are the same.
+    let rounding = 1e-9 * (simulated.end() - simulated.start());
+    if *first < simulated.start() - rounding || *last > simulated.end() + rounding {
+        return Err(format!(
+            "`{signal}` is measured from {first} s to {last} s but simulated from {} s to {} s",
+            simulated.start(),
+            simulated.end()
+        ));
+    }
+    let differences = simulated.sample(&channel.times).iter().zip(&channel.values).map(|(y, m)| y - m).collect();
+    Ok(Comparison { channel, differences })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::common::testing::{measured, simulated, undefined_in};
+    use crate::rmse::Rmse;
+
+    #[test]
+    fn a_measurement_that_was_not_simulated_is_not_compared() {
+        let rmse = Rmse { signal: "y".into() };
+        let simulation = simulated(1.0, |t| t);
+        let long = measured(&[0.0, 1.0, 2.0], &[0.0; 3], None);
+        assert_eq!(
+            undefined_in(&long, &rmse, &simulation),
+            "`y` is measured from 0 s to 2 s but simulated from 0 s to 1 s"
+        );
+        let other = mops_core::Case { name: "swing".into(), ..mops_core::Case::default() };
+        assert_eq!(undefined_in(&other, &rmse, &simulation), "`swing` does not measure `y`");
+    }
+}

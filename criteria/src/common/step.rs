@@ -1,0 +1,156 @@
+//! The step that a response answers: where it comes from, where it should go, and when.
+
+use std::borrow::Cow;
+
+use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable};
+
+use super::{optional, part, signal, step_time, trace};
+
+/// The options that say which step is looked at.
+pub struct StepOptions<'a> {
+    pub signal: &'a str,
+    pub target: Option<&'a Quantity>,
+    pub from: Option<&'a Quantity>,
+    pub step_time: Option<&'a Quantity>,
+}
+
+/// The same, checked.
+pub struct Step {
+    pub signal: String,
+    pub unit: Unit,
+    target: Option<f64>,
+    from: Option<f64>,
+    time: f64,
+}
+
+/// The response from the step on.
+pub struct Answer<'a> {
+    /// The signal from the time of the step on.
+    pub trace: Cow<'a, Trace>,
+    /// Value before the step.
+    pub from: f64,
+    /// Value it should settle at.
+    pub target: f64,
+    /// Time of the step, s.
+    pub time: f64,
+}
+
+impl StepOptions<'_> {
+    /// Checks the names and units.
+    pub fn bind(&self, signals: &[Variable]) -> Result<Step, Mistake> {
+        let unit = signal(signals, self.signal)?.unit.clone();
+        let target = optional("target", self.target, &unit)?;
+        let from = optional("from", self.from, &unit)?;
+        let time = step_time(self.step_time)?;
+        if let (Some(target), Some(from)) = (target, from)
+            && target == from
+        {
+            return Err(Mistake::new("target", format!("a step from {from} {unit} to the same value is none")));
+        }
+        Ok(Step { signal: self.signal.to_owned(), unit, target, from, time })
+    }
+}
+
+impl Step {
+    /// The response to the step.
+    pub fn answer<'a>(&self, analysis: &'a Analysis) -> Result<Answer<'a>, String> {
+        let whole = trace(analysis, &self.signal)?;
+        let (time, end) = (self.time, whole.end());
+        if time >= end {
+            return Err(format!("the step at {time} s lies after the end of the simulation at {end} s"));
+        }
+        Ok(Answer {
+            trace: if time <= whole.start() {
+                Cow::Borrowed(whole)
+            } else {
+                Cow::Owned(part(whole, &[time, end], |_, y| y))
+            },
+            from: self.from.unwrap_or_else(|| whole.first()),
+            target: self.target.unwrap_or_else(|| whole.last()),
+            time,
+        })
+    }
+}
+
+impl Answer<'_> {
+    /// Height of the step, `target - from`, not zero.
+    pub fn height(&self) -> Result<f64, String> {
+        let height = self.target - self.from;
+        // A height of nothing but rounding would be divided by all the same.
+        if height.abs() > 1e-12 * self.target.abs().max(self.from.abs()) {
+            Ok(height)
+        } else {
+            Err(format!("the step from {} to {} has no height to compare with", self.from, self.target))
+        }
+    }
+
+    /// Whether the response should rise; a step of no height counts as one up.
+    fn rises(&self) -> bool {
+        self.target >= self.from
+    }
+
+    /// A difference counted in the direction of the step.
+    pub fn upwards(&self, difference: f64) -> f64 {
+        if self.rises() { difference } else { -difference }
+    }
+
+    /// The value farthest in the direction of the step.
+    pub fn farthest_ahead(&self) -> f64 {
+        if self.rises() { self.trace.maximum().0 } else { self.trace.minimum().0 }
+    }
+
+    /// The value farthest against the direction of the step.
+    pub fn farthest_behind(&self) -> f64 {
+        if self.rises() { self.trace.minimum().0 } else { self.trace.maximum().0 }
+    }
+
+    /// Time from the step to the first moment at which the response has come `fraction` of the way.
+    pub fn first_reaching(&self, fraction: f64) -> Result<Option<f64>, String> {
+        let level = self.from + fraction * self.height()?;
+        Ok(self.trace.first_reaching(level, self.rises()).map(|t| t - self.time))
+    }
+
+    /// Time from the step to the end of the simulation, s.
+    pub fn length(&self) -> f64 {
+        self.trace.end() - self.time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::common::testing::{mistake, quantity, simulated, undefined};
+    use crate::overshoot::Overshoot;
+
+    fn overshoot() -> Overshoot {
+        Overshoot { signal: "y".into(), ..Overshoot::default() }
+    }
+
+    #[test]
+    fn mistakes_name_the_option_and_the_way_out() {
+        let mut unknown = overshoot();
+        unknown.signal = "phii".into();
+        assert_eq!(mistake(&unknown), "signal: the model has no signal `phii`; did you mean `phi`?");
+        let seconds = Overshoot { target: Some(quantity("3 s")), ..overshoot() };
+        assert_eq!(mistake(&seconds), "target: a quantity in `s` stands where one in `m` is expected");
+        let infinite = Overshoot { target: Some(f64::INFINITY.into()), ..overshoot() };
+        assert_eq!(mistake(&infinite), "target: `target` must be finite, not inf");
+        let none = Overshoot { target: Some(2.0.into()), from: Some(2.0.into()), ..overshoot() };
+        assert_eq!(mistake(&none), "target: a step from 2 m to the same value is none");
+        let early = Overshoot { step_time: Some((-1.0).into()), ..overshoot() };
+        assert_eq!(mistake(&early), "step-time: a step at -1 s lies before the simulation begins");
+    }
+
+    #[test]
+    fn a_response_without_a_step_has_no_value() {
+        let still = simulated(2.0, |_| 3.0);
+        assert_eq!(undefined(&overshoot(), &still), "the step from 3 to 3 has no height to compare with");
+        let late = Overshoot { step_time: Some(5.0.into()), ..overshoot() };
+        assert_eq!(undefined(&late, &still), "the step at 5 s lies after the end of the simulation at 2 s");
+    }
+
+    #[test]
+    fn a_response_that_is_not_finite_has_no_value() {
+        let pole = simulated(2.0, |t| if t > 1.0 { f64::NAN } else { t });
+        assert_eq!(undefined(&overshoot(), &pole), "`y` is not finite throughout");
+    }
+}

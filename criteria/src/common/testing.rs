@@ -1,0 +1,89 @@
+//! Closed forms as simulations, for the tests of all criteria.
+
+use mops_core::{
+    Analysis, Case, Channel, Criterion, CriterionSpec, Experiment, Quantity, Response, Role, Trace, Value, Variable,
+};
+
+/// Signals of the model of all tests.
+pub fn signals() -> Vec<Variable> {
+    [("y", "m"), ("u", "V"), ("phi", "rad")].map(|(name, unit)| Variable::new(name, unit, "")).to_vec()
+}
+
+/// A function over [0, `end`] as a trace of `segments` equal segments.
+pub fn sampled(end: f64, segments: u32, f: impl Fn(f64) -> f64) -> Trace {
+    let mut trace = Trace::starting_at(0.0, segments as usize);
+    let knot = |i: u32| end * f64::from(i) / f64::from(segments);
+    for i in 0..segments {
+        let (from, to) = (knot(i), knot(i + 1));
+        trace.push(to, Trace::NODES.map(|s| f(from + s * (to - from))));
+    }
+    trace
+}
+
+/// An analysis in which every signal has this trace.
+pub fn analysis(trace: &Trace) -> Analysis {
+    let traces = signals().into_iter().map(|signal| (signal.name, trace.clone())).collect();
+    Analysis::Time(Response { traces, ..Response::default() })
+}
+
+/// A function over [0, `end`] as an analysis, in segments of about 0.01 s.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+pub fn simulated(end: f64, f: impl Fn(f64) -> f64) -> Analysis {
+    analysis(&sampled(end, (end / 0.01).ceil() as u32, f))
+}
+
+/// Step response of `1/(s^2 + 2 damping s + 1)`, underdamped.
+pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
+    let frequency = (1.0 - damping * damping).sqrt();
+    move |t| {
+        let (sin, cos) = (frequency * t).sin_cos();
+        1.0 - (-damping * t).exp() * (cos + damping / frequency * sin)
+    }
+}
+
+/// A case in which `y` was measured.
+pub fn measured(times: &[f64], values: &[f64], noise: Option<f64>) -> Case {
+    let channel = Channel { signal: "y".into(), times: times.to_vec(), values: values.to_vec(), noise };
+    Case { experiment: Some(Experiment { channels: vec![channel], role: Role::Calibration }), ..Case::default() }
+}
+
+/// A quantity as a user writes it.
+pub fn quantity(text: &str) -> Quantity {
+    Quantity::parse(text).expect("a quantity")
+}
+
+/// The criterion, bound to the model of all tests.
+pub fn bound(spec: &dyn CriterionSpec) -> Box<dyn Criterion> {
+    spec.bind(&signals()).expect("the options are right")
+}
+
+/// The value of a criterion.
+pub fn value(spec: &dyn CriterionSpec, analysis: &Analysis) -> Value {
+    value_in(&Case::default(), spec, analysis)
+}
+
+/// The value of a criterion in a case.
+pub fn value_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) -> Value {
+    bound(spec).value(case, analysis).expect("it is defined")
+}
+
+/// Why a criterion has no value.
+pub fn undefined(spec: &dyn CriterionSpec, analysis: &Analysis) -> String {
+    undefined_in(&Case::default(), spec, analysis)
+}
+
+/// Why a criterion has no value in a case.
+pub fn undefined_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) -> String {
+    bound(spec).value(case, analysis).expect_err("it is not defined")
+}
+
+/// The mistake in the options of a criterion.
+pub fn mistake(spec: &dyn CriterionSpec) -> String {
+    spec.bind(&signals()).err().expect("the options are wrong").to_string()
+}
+
+/// Two numbers agree within `tolerance`.
+#[track_caller]
+pub fn assert_near(number: f64, expected: f64, tolerance: f64) {
+    assert!((number - expected).abs() <= tolerance, "{number} is not {expected} within {tolerance}");
+}

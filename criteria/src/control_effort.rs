@@ -1,0 +1,104 @@
+//! Control effort.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{optional, signal, trace};
+
+/// `integral (u - offset)^2 dt` over the whole simulation, in signal^2 s; with `of = "absolute"`
+/// `integral |u - offset| dt`, in signal s.
+///
+/// The square is the energy of a signal, the absolute value its fuel. `offset` is the value at which the actuator
+/// rests, 0 where absent. Range: from 0 up. The integral is that of the curve, exact up to rounding.
+///
+/// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (norms of signals).
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ControlEffort {
+    /// Signal that is measured, usually a control signal.
+    pub signal: String,
+    /// What is integrated: the `square`, which holds where absent, or the `absolute` value.
+    #[serde(default)]
+    pub of: Effort,
+    /// Value at which the actuator rests, in the unit of the signal; 0 where absent.
+    pub offset: Option<Quantity>,
+}
+
+/// What is integrated.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// The square: energy.
+    #[default]
+    Square,
+    /// The absolute value: fuel.
+    Absolute,
+}
+
+impl CriterionOptions for ControlEffort {
+    const KIND: &'static str = "control-effort";
+}
+
+impl CriterionSpec for ControlEffort {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let signal = signal(signals, &self.signal)?.clone();
+        let offset = optional("offset", self.offset.as_ref(), &signal.unit)?.unwrap_or(0.0);
+        Ok(Box::new(Bound { signal, of: self.of, offset }))
+    }
+}
+
+struct Bound {
+    signal: Variable,
+    of: Effort,
+    offset: f64,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        match self.of {
+            Effort::Square => self.signal.unit.power(2, 1),
+            Effort::Absolute => self.signal.unit.power(1, 1),
+        }
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.name.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let trace = trace(analysis, &self.signal.name)?;
+        let effort = match self.of {
+            Effort::Square => trace.integral(|_, u| (u - self.offset) * (u - self.offset)),
+            Effort::Absolute => trace.integral_of_deviation(self.offset, |_, deviation| deviation),
+        };
+        Ok(effort.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::common::testing::{assert_near, bound, quantity, simulated, value};
+
+    #[test]
+    fn a_sinusoid_about_its_resting_value_has_the_effort_of_a_sinusoid() {
+        let period = simulated(TAU, |t| 2.0 + 3.0 * t.sin());
+        let square =
+            ControlEffort { signal: "u".into(), offset: Some(quantity("2000 mV")), ..ControlEffort::default() };
+        assert_near(value(&square, &period).number, 4.5 * TAU, 1e-10);
+        let absolute = ControlEffort { of: Effort::Absolute, ..square.clone() };
+        assert_near(value(&absolute, &period).number, 12.0, 1e-10);
+        assert_eq!((bound(&square).unit(), bound(&absolute).unit()), (Unit::known("V2 s"), Unit::known("V s")));
+    }
+
+    #[test]
+    fn without_an_offset_the_signal_itself_is_integrated() {
+        let decay = simulated(30.0, |t| -2.0 * (-t).exp());
+        let effort = |of| value(&ControlEffort { signal: "u".into(), of, offset: None }, &decay).number;
+        assert_near(effort(Effort::Square), 2.0, 1e-12);
+        assert_near(effort(Effort::Absolute), 2.0, 1e-12);
+    }
+}

@@ -1,0 +1,100 @@
+//! Delay time of a step response.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Step, StepOptions, number, second};
+
+/// First time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5 where absent.
+///
+/// Range: from 0 to the length of the simulation. A response that never gets there has that length as its delay time,
+/// noted `level not reached`.
+///
+/// Source: K. Ogata, Modern Control Engineering (5th ed., 2010), section 5-3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DelayTime {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Value before the step; the signal's first value where absent.
+    pub from: Option<Quantity>,
+    /// Time of the step, from which the delay counts; 0 s where absent.
+    pub step_time: Option<Quantity>,
+    /// Fraction of the step, above 0 and at most 1: 0.5 where absent; "50 %" is the same.
+    pub level: Option<Quantity>,
+}
+
+impl CriterionOptions for DelayTime {
+    const KIND: &'static str = "delay-time";
+}
+
+impl CriterionSpec for DelayTime {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: self.from.as_ref(),
+            step_time: self.step_time.as_ref(),
+        };
+        let step = options.bind(signals)?;
+        let level = number("level", self.level.as_ref().unwrap_or(&0.5.into()), &Unit::one())?;
+        if !(0.0 < level && level <= 1.0) {
+            return Err(Mistake::new("level", format!("a level lies above 0 and up to 1 of the step, not at {level}")));
+        }
+        Ok(Box::new(Bound { step, level }))
+    }
+}
+
+struct Bound {
+    step: Step,
+    level: f64,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        second()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.step.signal.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let answer = self.step.answer(analysis)?;
+        let reached = answer.first_reaching(self.level)?;
+        Ok(reached.map_or_else(|| Value::noted(answer.length(), "level not reached"), Value::from))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, mistake, simulated, value};
+
+    fn delay() -> DelayTime {
+        DelayTime { signal: "y".into(), target: Some(1.0.into()), ..DelayTime::default() }
+    }
+
+    #[test]
+    fn a_first_order_lag_is_half_way_after_its_half_life() {
+        let lag = simulated(20.0, |t| 1.0 - (-t / 3.0).exp());
+        assert_near(value(&delay(), &lag).number, 3.0 * 2f64.ln(), 1e-10);
+        let level = DelayTime { level: Some(0.632.into()), ..delay() };
+        assert_near(value(&level, &lag).number, -3.0 * 0.368f64.ln(), 1e-10);
+    }
+
+    #[test]
+    fn a_response_that_does_not_get_there_is_noted() {
+        let low = simulated(7.0, |t| 0.4 * (1.0 - (-t).exp()));
+        assert_eq!(value(&delay(), &low), Value::noted(7.0, "level not reached"));
+    }
+
+    #[test]
+    fn a_level_outside_the_step_is_a_mistake() {
+        let beyond = DelayTime { level: Some(1.5.into()), ..delay() };
+        assert_eq!(mistake(&beyond), "level: a level lies above 0 and up to 1 of the step, not at 1.5");
+    }
+}

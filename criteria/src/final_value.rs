@@ -1,0 +1,67 @@
+//! Value of a signal at the end.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{signal, trace};
+
+/// `y(t_end)`, in the unit of the signal.
+///
+/// Range: any number. It reads what a model computes along its simulation, such as a cost or an energy that it
+/// integrates. A value that may be zero or negative is demanded by the pair `good` and `bad` rather than by `demand`.
+///
+/// Source: the Mayer form of a cost; A. E. Bryson, Y.-C. Ho, Applied Optimal Control (1975), chapter 2.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FinalValue {
+    /// Signal that is read.
+    pub signal: String,
+}
+
+impl CriterionOptions for FinalValue {
+    const KIND: &'static str = "final-value";
+}
+
+impl CriterionSpec for FinalValue {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
+    }
+}
+
+struct Bound {
+    signal: Variable,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        self.signal.unit.clone()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.name.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        Ok(trace(analysis, &self.signal.name)?.last().into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, mistake, simulated, value};
+
+    #[test]
+    fn the_value_at_the_end_is_that_of_the_curve() {
+        let last = FinalValue { signal: "u".into() };
+        assert_near(value(&last, &simulated(4.0, f64::cos)).number, 4f64.cos(), 1e-14);
+        assert_eq!((bound(&last).unit(), bound(&last).signals()), (Unit::known("V"), vec!["u".to_owned()]));
+    }
+
+    #[test]
+    fn a_signal_that_is_not_there_is_a_mistake() {
+        let unknown = FinalValue { signal: "speed".into() };
+        assert_eq!(mistake(&unknown), "signal: the model has no signal `speed`; known: y, u, phi");
+    }
+}

@@ -1,0 +1,135 @@
+//! Fit to a measurement: the integral of the squared residual.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{compare, signal};
+
+/// `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
+///
+/// By the trapezoid rule on the times t_i of the samples: `J = sum_i r_i^2` with the residuals
+/// `r_i = sqrt(weight w_i) (y_simulated - y_measured)(t_i)` that least-squares solvers use, and
+/// `w_i = (t_(i+1) - t_(i-1))/2`, half an interval at both ends. The simulation is read from its curve at these times.
+/// Samples that are missing are left out, so that a gap is one long interval.
+///
+/// Several signals are fitted together by one such criterion each; `weight` balances them. It is evaluated in the
+/// experiments that measure the signal.
+///
+/// Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
+///
+/// Source: Greybox Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section
+/// 4.5.1: there J is the sum over the arm's angle, with weight 2.5, and the pendulum's, with weight 1.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Fit {
+    /// Signal that is compared with its measurement.
+    pub signal: String,
+    /// Factor on the squared residual, positive.
+    #[serde(default = "one")]
+    pub weight: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Default for Fit {
+    fn default() -> Self {
+        Self { signal: String::new(), weight: one() }
+    }
+}
+
+impl CriterionOptions for Fit {
+    const KIND: &'static str = "fit";
+}
+
+impl CriterionSpec for Fit {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let signal = signal(signals, &self.signal)?.clone();
+        if !(self.weight.is_finite() && self.weight > 0.0) {
+            return Err(Mistake::new("weight", format!("a weight must be positive, not {}", self.weight)));
+        }
+        Ok(Box::new(Bound { signal, weight: self.weight }))
+    }
+
+    fn needs_measurement(&self) -> Option<&str> {
+        Some(&self.signal)
+    }
+}
+
+struct Bound {
+    signal: Variable,
+    weight: f64,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        self.signal.unit.power(2, 1)
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.name.clone()]
+    }
+
+    fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let comparison = compare(case, analysis, &self.signal.name)?;
+        let times = &comparison.channel.times;
+        let last = times.len() - 1;
+        if last == 0 {
+            return Err(format!(
+                "the measurement of `{}` is a single sample: no time to integrate over",
+                self.signal.name
+            ));
+        }
+        let interval = |i: usize| 0.5 * (times[(i + 1).min(last)] - times[i.saturating_sub(1)]);
+        let differences = comparison.differences.iter().enumerate();
+        Ok(Value::sum_of_squares(differences.map(|(i, d)| (self.weight * interval(i)).sqrt() * d).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, measured, mistake, simulated, undefined_in, value_in};
+
+    #[test]
+    fn the_fit_is_the_trapezoid_sum_and_that_of_its_residuals() {
+        // Simulated minus measured: 1, -2, 3, 0.5 at 0, 1, 3, 4 s: weights 0.5, 1.5, 1.5, 0.5.
+        let case = measured(&[0.0, 1.0, 3.0, 4.0], &[-1.0, 3.0, 0.0, 3.5], None);
+        let fit = Fit { signal: "y".into(), weight: 2.5 };
+        let value = value_in(
+            &case,
+            &fit,
+            &simulated(4.0, |t| {
+                if t < 2.0 {
+                    t
+                } else if t < 3.5 {
+                    3.0
+                } else {
+                    t
+                }
+            }),
+        );
+        assert_near(value.number, 2.5 * (0.5 + 1.5 * 4.0 + 1.5 * 9.0 + 0.5 * 0.25), 1e-12);
+        assert_eq!(value.number, value.residuals.iter().map(|r| r * r).sum::<f64>());
+        assert_near(value.residuals[1], -2.0 * f64::sqrt(2.5 * 1.5), 1e-12);
+        assert_eq!((bound(&fit).unit(), fit.needs_measurement()), (Unit::known("m2 s"), Some("y")));
+    }
+
+    #[test]
+    fn a_constant_offset_integrates_to_its_square_times_the_measured_time() {
+        let times: Vec<f64> = (0..=300).map(|i| 0.01 * f64::from(i)).collect();
+        let values: Vec<f64> = times.iter().map(|t| t.sin() + 0.2).collect();
+        let fit = Fit { signal: "y".into(), ..Fit::default() };
+        assert_near(value_in(&measured(&times, &values, None), &fit, &simulated(3.0, f64::sin)).number, 0.12, 1e-12);
+    }
+
+    #[test]
+    fn a_single_sample_and_a_weight_of_zero_are_refused() {
+        let fit = Fit { signal: "y".into(), weight: 1.0 };
+        let alone = undefined_in(&measured(&[1.0], &[1.0], None), &fit, &simulated(2.0, |t| t));
+        assert_eq!(alone, "the measurement of `y` is a single sample: no time to integrate over");
+        assert_eq!(mistake(&Fit { weight: 0.0, ..fit }), "weight: a weight must be positive, not 0");
+    }
+}

@@ -1,0 +1,88 @@
+//! Fit to a measurement, in percent.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{compare, signal};
+
+/// `100 (1 - |y_measured - y_simulated| / |y_measured - mean(y_measured)|)`, in percent, `|.|` the Euclidean norm over
+/// the samples.
+///
+/// Range: any number up to 100; 100 % is a perfect fit, 0 % no better than the measurement's mean. It is evaluated in
+/// the experiments that measure the signal; a measurement that is constant has no fit. Larger is better: monitor it, or
+/// demand it by a pair such as `good = 100`, `bad = 80`.
+///
+/// Source: L. Ljung, System Identification (2nd ed., 1999), chapter 16; the formula is that of `compare` in his System
+/// Identification Toolbox.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FitPercent {
+    /// Signal that is compared with its measurement.
+    pub signal: String,
+}
+
+impl CriterionOptions for FitPercent {
+    const KIND: &'static str = "fit-percent";
+}
+
+impl CriterionSpec for FitPercent {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.name.clone() }))
+    }
+
+    fn needs_measurement(&self) -> Option<&str> {
+        Some(&self.signal)
+    }
+}
+
+struct Bound {
+    signal: String,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        Unit::known("%")
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.clone()]
+    }
+
+    fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let comparison = compare(case, analysis, &self.signal)?;
+        let measured = &comparison.channel.values;
+        if measured.iter().all(|m| *m == measured[0]) {
+            return Err(format!("the measurement of `{}` is constant: there is nothing to explain", self.signal));
+        }
+        let mean = measured.iter().sum::<f64>() / comparison.count();
+        let variation: f64 = measured.iter().map(|m| (m - mean) * (m - mean)).sum();
+        Ok((100.0 * (1.0 - (comparison.sum_of_squares() / variation).sqrt())).into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, measured, simulated, undefined_in, value_in};
+
+    fn fit() -> FitPercent {
+        FitPercent { signal: "y".into() }
+    }
+
+    #[test]
+    fn a_perfect_fit_is_a_hundred_percent_and_the_mean_is_zero() {
+        let case = measured(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 3.0], None);
+        assert_near(value_in(&case, &fit(), &simulated(3.0, |t| t)).number, 100.0, 1e-10);
+        assert_near(value_in(&case, &fit(), &simulated(3.0, |_| 1.5)).number, 0.0, 1e-10);
+        // Differences of 0.5 against a variation of 5: 100 (1 - 1/sqrt(5)).
+        let offset = value_in(&case, &fit(), &simulated(3.0, |t| t + 0.5)).number;
+        assert_near(offset, 100.0 * (1.0 - 0.2f64.sqrt()), 1e-10);
+    }
+
+    #[test]
+    fn a_constant_measurement_has_no_fit() {
+        let why = undefined_in(&measured(&[0.0, 1.0], &[0.1, 0.1], None), &fit(), &simulated(1.0, |t| t));
+        assert_eq!(why, "the measurement of `y` is constant: there is nothing to explain");
+    }
+}

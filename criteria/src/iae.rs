@@ -1,0 +1,71 @@
+//! Integral of the absolute error.
+
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{ErrorIntegral, StepOptions};
+
+/// `integral |y - target| dt` from the step to the end, in signal s.
+///
+/// It weighs all errors alike, large or small, early or late.
+///
+/// Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to rounding.
+///
+/// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
+/// Transactions of the AIEE 72 (1953), part II, 273-288.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Iae {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should have; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Time of the step, from which the integral is taken; 0 s where absent.
+    pub step_time: Option<Quantity>,
+}
+
+impl CriterionOptions for Iae {
+    const KIND: &'static str = "iae";
+}
+
+impl CriterionSpec for Iae {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: None,
+            step_time: self.step_time.as_ref(),
+        };
+        ErrorIntegral::bind(signals, &options, [1, 1], |_, e| e)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, simulated, value};
+
+    fn iae() -> Iae {
+        Iae { signal: "y".into(), target: Some(1.0.into()), ..Iae::default() }
+    }
+
+    #[test]
+    fn a_first_order_lag_has_its_time_constant() {
+        let (lag, length) = (simulated(12.0, |t| 1.0 - (-t / 3.0).exp()), 12.0f64);
+        assert_near(value(&iae(), &lag).number, 3.0 * (1.0 - (-length / 3.0).exp()), 1e-12);
+        assert_eq!(bound(&iae()).unit(), mops_core::Unit::known("m s"));
+    }
+
+    #[test]
+    fn an_oscillation_counts_on_both_sides() {
+        let swing = simulated(40.0, |t| 1.0 + (-t).exp() * t.sin());
+        assert_near(value(&iae(), &swing).number, 0.5 / std::f64::consts::FRAC_PI_2.tanh(), 1e-12);
+    }
+
+    #[test]
+    fn without_a_target_the_last_value_is_it() {
+        let lag = simulated(60.0, |t| 5.0 - 2.0 * (-t).exp());
+        assert_near(value(&Iae { target: None, ..iae() }, &lag).number, 2.0, 1e-12);
+    }
+}

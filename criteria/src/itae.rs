@@ -1,0 +1,65 @@
+//! Integral of time and absolute error.
+
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{ErrorIntegral, StepOptions};
+
+/// `integral t |y - target| dt` from the step to the end, `t` counted from the step, in signal s^2.
+///
+/// It forgives the error that no response can avoid at its beginning and weighs what lasts: well damped responses.
+///
+/// Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to rounding.
+///
+/// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
+/// Transactions of the AIEE 72 (1953), part II, 273-288.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Itae {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should have; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Time of the step, from which `t` counts and the integral is taken; 0 s where absent.
+    pub step_time: Option<Quantity>,
+}
+
+impl CriterionOptions for Itae {
+    const KIND: &'static str = "itae";
+}
+
+impl CriterionSpec for Itae {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: None,
+            step_time: self.step_time.as_ref(),
+        };
+        ErrorIntegral::bind(signals, &options, [1, 2], |t, e| t * e)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, simulated, value};
+
+    fn itae() -> Itae {
+        Itae { signal: "y".into(), target: Some(1.0.into()), ..Itae::default() }
+    }
+
+    #[test]
+    fn a_first_order_lag_has_its_time_constant_squared() {
+        let (lag, ratio) = (simulated(12.0, |t| 1.0 - (-t / 3.0).exp()), 4f64);
+        assert_near(value(&itae(), &lag).number, 9.0 * (1.0 - (-ratio).exp() * (1.0 + ratio)), 1e-12);
+        assert_eq!(bound(&itae()).unit(), mops_core::Unit::known("m s2"));
+    }
+
+    #[test]
+    fn the_time_counts_from_the_step() {
+        let late = simulated(42.0, |t| if t < 2.0 { 0.0 } else { 1.0 - (2.0 - t).exp() });
+        assert_near(value(&Itae { step_time: Some(2.0.into()), ..itae() }, &late).number, 1.0, 1e-11);
+    }
+}

@@ -1,0 +1,65 @@
+//! Integral of time and squared error.
+
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{ErrorIntegral, StepOptions};
+
+/// `integral t (y - target)^2 dt` from the step to the end, `t` counted from the step, in signal^2 s^2.
+///
+/// Between ISE and ITAE: it forgives the beginning, and small errors.
+///
+/// Range: from 0 up. The integral is that of the curve, exact up to rounding.
+///
+/// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
+/// Transactions of the AIEE 72 (1953), part II, 273-288.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Itse {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should have; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Time of the step, from which `t` counts and the integral is taken; 0 s where absent.
+    pub step_time: Option<Quantity>,
+}
+
+impl CriterionOptions for Itse {
+    const KIND: &'static str = "itse";
+}
+
+impl CriterionSpec for Itse {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: None,
+            step_time: self.step_time.as_ref(),
+        };
+        ErrorIntegral::bind(signals, &options, [2, 2], |t, e| t * e * e)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, simulated, value};
+
+    fn itse() -> Itse {
+        Itse { signal: "y".into(), target: Some(1.0.into()), ..Itse::default() }
+    }
+
+    #[test]
+    fn a_first_order_lag_has_a_quarter_of_its_time_constant_squared() {
+        let (lag, ratio) = (simulated(12.0, |t| 1.0 - (-t / 3.0).exp()), 8f64);
+        assert_near(value(&itse(), &lag).number, 2.25 * (1.0 - (-ratio).exp() * (1.0 + ratio)), 1e-12);
+        assert_eq!(bound(&itse()).unit(), mops_core::Unit::known("m2 s2"));
+    }
+
+    #[test]
+    fn the_time_counts_from_the_step() {
+        let late = simulated(42.0, |t| if t < 2.0 { 0.0 } else { 1.0 - (2.0 - t).exp() });
+        assert_near(value(&Itse { step_time: Some(2.0.into()), ..itse() }, &late).number, 0.25, 1e-12);
+    }
+}

@@ -1,0 +1,241 @@
+//! Distance of a step response from that of a reference model.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Step, StepOptions, part, positive, second};
+
+/// `sqrt(mean_t (y - y_ref)^2)` from the step to the end, in the unit of the signal, with
+/// `y_ref = from + (target - from) h(t)`.
+///
+/// `h` is the unit step response of a reference model, `t` counted from the step: with `time-constant` T that of
+/// `1/(T s + 1)`; with `frequency` w and `damping` z that of `w^2/(s^2 + 2 z w s + w^2)`, z at least 0.05. It is
+/// evaluated in closed form and integrated along the curve.
+///
+/// Range: from 0 up; 0 where the response is that of the reference model.
+///
+/// Source: K. J. Astrom, B. Wittenmark, Adaptive Control (2nd ed., 1995), chapter 5 (model-reference systems); step
+/// responses: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 7.3.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ModelTracking {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the reference model settles at.
+    pub target: Quantity,
+    /// Value before the step; the signal's first value where absent.
+    pub from: Option<Quantity>,
+    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    pub step_time: Option<Quantity>,
+    /// Time constant of a reference model of first order.
+    pub time_constant: Option<Quantity>,
+    /// Undamped angular frequency of a reference model of second order, in rad/s; goes with `damping`.
+    pub frequency: Option<Quantity>,
+    /// Damping ratio of a reference model of second order, at least 0.05; goes with `frequency`.
+    pub damping: Option<Quantity>,
+}
+
+/// A step to 1 without a reference model, to be completed.
+impl Default for ModelTracking {
+    fn default() -> Self {
+        Self {
+            signal: String::new(),
+            target: 1.0.into(),
+            from: None,
+            step_time: None,
+            time_constant: None,
+            frequency: None,
+            damping: None,
+        }
+    }
+}
+
+impl CriterionOptions for ModelTracking {
+    const KIND: &'static str = "model-tracking";
+}
+
+impl CriterionSpec for ModelTracking {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: Some(&self.target),
+            from: self.from.as_ref(),
+            step_time: self.step_time.as_ref(),
+        };
+        let step = options.bind(signals)?;
+        let time_constant = positive("time-constant", self.time_constant.as_ref(), &second())?;
+        let frequency = positive("frequency", self.frequency.as_ref(), &Unit::known("rad/s"))?;
+        let damping = positive("damping", self.damping.as_ref(), &Unit::one())?;
+        let reference = match (time_constant, frequency, damping) {
+            (Some(time_constant), None, None) => Reference::First { time_constant },
+            (None, Some(_), Some(damping)) if damping < LEAST_DAMPING => {
+                return Err(Mistake::new("damping", format!("a damping of {damping} is below {LEAST_DAMPING}"))
+                    .with_help("a reference model should not ring for many periods"));
+            }
+            (None, Some(frequency), Some(damping)) => Reference::Second { frequency, damping },
+            _ => {
+                return Err(Mistake::here("the reference model is not given, or twice").with_help(
+                    "give either `time-constant` (first order) or `frequency` and `damping` (second order)",
+                ));
+            }
+        };
+        Ok(Box::new(Bound { step, reference }))
+    }
+}
+
+/// Below it the reference rings for over a hundred periods, and the quadrature has to follow them all.
+const LEAST_DAMPING: f64 = 0.05;
+
+/// A reference model of gain 1.
+enum Reference {
+    First { time_constant: f64 },
+    Second { frequency: f64, damping: f64 },
+}
+
+impl Reference {
+    /// The unit step response.
+    fn response(&self, t: f64) -> f64 {
+        match *self {
+            Self::First { time_constant } => -(-t / time_constant).exp_m1(),
+            Self::Second { frequency, damping } if damping < 1.0 => {
+                let damped = frequency * (1.0 - damping * damping).sqrt();
+                let (sin, cos) = (damped * t).sin_cos();
+                1.0 - (-damping * frequency * t).exp() * (cos + damping * frequency / damped * sin)
+            }
+            Self::Second { frequency, damping } => {
+                // exp(-z w t) (cosh(b t) + z w sinh(b t)/b) with b = w sqrt(z^2 - 1), in a form that neither overflows
+                // nor cancels where b is 0.
+                let b = frequency * (damping * damping - 1.0).sqrt();
+                let slow = frequency / (damping + (damping * damping - 1.0).sqrt());
+                let sinh_over_b = if b > 0.0 { -(-2.0 * b * t).exp_m1() / (2.0 * b) } else { t };
+                let cosh = 0.5 * (1.0 + (-2.0 * b * t).exp());
+                1.0 - (-slow * t).exp() * (cosh + damping * frequency * sinh_over_b)
+            }
+        }
+    }
+
+    /// Magnitudes of the fastest and of the slowest mode (of the real part, where it oscillates), 1/s.
+    fn rates(&self) -> [f64; 2] {
+        match *self {
+            Self::First { time_constant } => [1.0 / time_constant; 2],
+            Self::Second { frequency, damping } if damping < 1.0 => [frequency, damping * frequency],
+            Self::Second { frequency, damping } => {
+                let ratio = damping + (damping * damping - 1.0).sqrt();
+                [frequency * ratio, frequency / ratio]
+            }
+        }
+    }
+
+    /// Times from the step to `length` between which the response is smooth enough for the quadrature of a trace.
+    ///
+    /// Steps of half a radian or half a time constant leave an error below 1e-12 of it. Without oscillation they may
+    /// grow with the time, because what has not decayed by then is slow. After 40 slow time constants nothing moves.
+    fn knots(&self, length: f64) -> Vec<f64> {
+        let [fast, slow] = self.rates();
+        let growth = if matches!(self, Self::Second { damping, .. } if *damping < 1.0) { 0.0 } else { 0.2 };
+        let mut knots = vec![0.0];
+        let mut t = 0.0f64;
+        while t < length && t < 40.0 / slow {
+            t += (growth * t).max(0.5 / fast);
+            if t < length {
+                knots.push(t);
+            }
+        }
+        knots.push(length);
+        knots
+    }
+}
+
+struct Bound {
+    step: Step,
+    reference: Reference,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        self.step.unit.clone()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.step.signal.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let answer = self.step.answer(analysis)?;
+        let (height, length) = (answer.height()?, answer.length());
+        let knots: Vec<f64> = self.reference.knots(length).into_iter().map(|t| answer.time + t).collect();
+        let square = part(&answer.trace, &knots, |_, y| y).integral(|t, y| {
+            let reference = answer.from + height * self.reference.response(t - answer.time);
+            (y - reference) * (y - reference)
+        });
+        Ok((square / length).sqrt().into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{analysis, assert_near, mistake, quantity, sampled, second_order, simulated, value};
+
+    fn first(time_constant: f64) -> ModelTracking {
+        ModelTracking { signal: "y".into(), time_constant: Some(time_constant.into()), ..ModelTracking::default() }
+    }
+
+    fn second_order_reference(frequency: &str, damping: f64) -> ModelTracking {
+        ModelTracking {
+            signal: "y".into(),
+            from: Some(0.0.into()),
+            frequency: Some(quantity(frequency)),
+            damping: Some(damping.into()),
+            ..ModelTracking::default()
+        }
+    }
+
+    #[test]
+    fn a_response_equal_to_its_reference_is_at_no_distance() {
+        assert_near(value(&first(2.0), &simulated(10.0, |t| 1.0 - (-t / 2.0).exp())).number, 0.0, 1e-12);
+        let oscillation = second_order_reference("1 rad/s", 0.3);
+        assert_near(value(&oscillation, &simulated(30.0, second_order(0.3))).number, 0.0, 1e-12);
+        // Critical damping, and poles at 1 and 4 rad/s: frequency 2, damping 1.25; downwards, 3 s late.
+        let critical = simulated(20.0, |t| 1.0 - (1.0 + 2.0 * t) * (-2.0 * t).exp());
+        assert_near(value(&second_order_reference("2 rad/s", 1.0), &critical).number, 0.0, 1e-12);
+        let two_poles = |t: f64| 1.0 - (4.0 * (-t).exp() - (-4.0 * t).exp()) / 3.0;
+        let down = simulated(20.0, |t| if t < 3.0 { 7.0 } else { 7.0 - 2.0 * two_poles(t - 3.0) });
+        let overdamped = ModelTracking {
+            target: 5.0.into(),
+            from: None,
+            step_time: Some(3.0.into()),
+            ..second_order_reference("2 rad/s", 1.25)
+        };
+        assert_near(value(&overdamped, &down).number, 0.0, 1e-12);
+    }
+
+    #[test]
+    fn a_reference_much_faster_than_the_steps_of_the_simulation_is_integrated_exactly() {
+        // y = 1 throughout, in one step: the difference is exp(-t/T), its mean square T/2/length.
+        let one = analysis(&sampled(60.0, 1, |_| 1.0));
+        let fast = ModelTracking { from: Some(0.0.into()), ..first(0.01) };
+        assert_near(value(&fast, &one).number, f64::sqrt(0.005 / 60.0), 1e-13);
+        // Poles a = 100 and b = 0.01 rad/s: the difference is (a exp(-b t) - b exp(-a t))/(a - b).
+        let [a, b, length] = [100.0f64, 0.01, 3000.0];
+        let still = analysis(&sampled(length, 1, |_| 1.0));
+        let apart = second_order_reference("1 rad/s", 0.5 * (a + b));
+        let integral = (a * a / (2.0 * b) - 2.0 * a * b / (a + b) + b * b / (2.0 * a)) / (a - b).powi(2);
+        assert_near(value(&apart, &still).number, (integral / length).sqrt(), 1e-11);
+        // (1 - y_ref)^2 of damping z integrates to (1 + 4 z^2)/(4 z w).
+        let ringing = second_order_reference("20 rad/s", 0.1);
+        assert_near(value(&ringing, &one).number, f64::sqrt(1.04 / (0.4 * 20.0) / 60.0), 1e-11);
+    }
+
+    #[test]
+    fn a_reference_is_of_one_order_and_well_damped() {
+        assert!(
+            mistake(&ModelTracking { signal: "y".into(), ..ModelTracking::default() }).contains("not given, or twice")
+        );
+        let both = ModelTracking { time_constant: Some(1.0.into()), ..second_order_reference("1 rad/s", 0.7) };
+        assert!(mistake(&both).contains("give either `time-constant`"));
+        assert!(mistake(&second_order_reference("1 rad/s", 0.01)).starts_with("damping: a damping of 0.01 is below"));
+        assert_eq!(mistake(&first(-1.0)), "time-constant: `time-constant` must be positive, not -1 s");
+    }
+}

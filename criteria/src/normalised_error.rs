@@ -1,0 +1,96 @@
+//! Fit to a measurement, in units of its noise.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{compare, positive, signal};
+
+/// `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 where nothing but the noise is left.
+///
+/// `noise` is the standard deviation of the measurement's noise: the option, or else what the channel of the experiment
+/// says. The sum has the residuals `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that
+/// least-squares solvers use.
+///
+/// It is evaluated in the experiments that measure the signal. Range: from 0 up; well below 1 the noise is overrated or
+/// the model fits the noise, well above 1 the model lacks something.
+///
+/// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
+/// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters).
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct NormalisedError {
+    /// Signal that is compared with its measurement.
+    pub signal: String,
+    /// Standard deviation of the noise, in the unit of the signal; the channel's where absent.
+    pub noise: Option<Quantity>,
+}
+
+impl CriterionOptions for NormalisedError {
+    const KIND: &'static str = "normalised-error";
+}
+
+impl CriterionSpec for NormalisedError {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let signal = signal(signals, &self.signal)?;
+        let noise = positive("noise", self.noise.as_ref(), &signal.unit)?;
+        Ok(Box::new(Bound { signal: signal.name.clone(), noise }))
+    }
+
+    fn needs_measurement(&self) -> Option<&str> {
+        Some(&self.signal)
+    }
+}
+
+struct Bound {
+    signal: String,
+    noise: Option<f64>,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        Unit::one()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.clone()]
+    }
+
+    fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let comparison = compare(case, analysis, &self.signal)?;
+        let noise = self.noise.or(comparison.channel.noise).ok_or_else(|| {
+            format!(
+                "the noise of `{}` is not known: give `noise` here or with the channel of the experiment",
+                self.signal
+            )
+        })?;
+        let scale = 1.0 / (noise * comparison.count().sqrt());
+        Ok(Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, measured, quantity, simulated, undefined_in, value_in};
+
+    fn error(noise: Option<&str>) -> NormalisedError {
+        NormalisedError { signal: "y".into(), noise: noise.map(quantity) }
+    }
+
+    #[test]
+    fn differences_as_large_as_the_noise_give_one() {
+        let case = measured(&[0.0, 1.0, 2.0, 3.0], &[0.1, 0.9, 2.1, 2.9], Some(0.1));
+        let value = value_in(&case, &error(None), &simulated(3.0, |t| t));
+        assert_near(value.number, 1.0, 1e-12);
+        assert_near(value.residuals[1], 0.5, 1e-12);
+        let option = value_in(&case, &error(Some("20 cm")), &simulated(3.0, |t| t));
+        assert_near(option.number, 0.25, 1e-12);
+    }
+
+    #[test]
+    fn without_a_noise_there_is_no_value() {
+        let why = undefined_in(&measured(&[0.0, 1.0], &[0.0, 1.0], None), &error(None), &simulated(1.0, |t| t));
+        assert_eq!(why, "the noise of `y` is not known: give `noise` here or with the channel of the experiment");
+    }
+}

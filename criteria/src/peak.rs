@@ -1,0 +1,97 @@
+//! Largest or smallest value of a signal.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{signal, trace};
+
+/// `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
+///
+/// Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A minimum, and
+/// any value that may be zero or negative, is demanded by the pair `good` and `bad` rather than by `demand`.
+///
+/// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (the peak norm of a signal).
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Peak {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Which peak: `maximum` where absent, `minimum`, or `absolute` for the largest distance from zero.
+    #[serde(default)]
+    pub of: Extremum,
+}
+
+/// Which extremum of a signal.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extremum {
+    /// The largest value.
+    #[default]
+    Maximum,
+    /// The smallest value.
+    Minimum,
+    /// The largest distance from zero.
+    Absolute,
+}
+
+impl CriterionOptions for Peak {
+    const KIND: &'static str = "peak";
+}
+
+impl CriterionSpec for Peak {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone(), of: self.of }))
+    }
+}
+
+struct Bound {
+    signal: Variable,
+    of: Extremum,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        self.signal.unit.clone()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.name.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let trace = trace(analysis, &self.signal.name)?;
+        let peak = match self.of {
+            Extremum::Maximum => trace.maximum().0,
+            Extremum::Minimum => trace.minimum().0,
+            Extremum::Absolute => trace.maximum().0.max(-trace.minimum().0),
+        };
+        Ok(peak.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+    use crate::common::testing::{analysis, assert_near, sampled, simulated, value};
+
+    #[test]
+    fn the_peaks_of_a_decaying_oscillation_are_those_of_the_curve() {
+        // exp(-t) sin(t) peaks at pi/4, then at pi/4 + pi.
+        let swing = simulated(10.0, |t| (-t).exp() * t.sin());
+        let peak = |of| value(&Peak { signal: "y".into(), of }, &swing).number;
+        let highest = (-0.5 * FRAC_PI_2).exp() * 0.5f64.sqrt();
+        assert_near(peak(Extremum::Maximum), highest, 1e-13);
+        assert_near(peak(Extremum::Minimum), -highest * (-2.0 * FRAC_PI_2).exp(), 1e-13);
+        assert_near(peak(Extremum::Absolute), highest, 1e-13);
+    }
+
+    #[test]
+    fn a_peak_between_the_knots_is_found() {
+        // One segment, its knots at 0 and 2: the peak at 0.9 is on no node.
+        let arch = analysis(&sampled(2.0, 1, |t| 4.0 - (t - 0.9) * (t - 0.9)));
+        assert_near(value(&Peak { signal: "y".into(), of: Extremum::Maximum }, &arch).number, 4.0, 1e-14);
+    }
+}

@@ -1,0 +1,130 @@
+//! Rise time of a step response.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Step, StepOptions, number, second};
+
+/// `t_high - t_low`, in s, where `t_f` is the first time at which `(y - from)/(target - from) >= f`.
+///
+/// `low` and `high` are 0.1 and 0.9 where absent: the rise time from 10 % to 90 % of the step.
+///
+/// Range: from 0 to the length of the simulation. A response that never gets to `high` has the time that is left from
+/// `t_low` (or from the step, if it does not get there either) to the end, noted `not risen at the end`.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct RiseTime {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Value before the step; the signal's first value where absent.
+    pub from: Option<Quantity>,
+    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    pub step_time: Option<Quantity>,
+    /// Fraction of the step at which the time begins: 0.1 where absent; "10 %" is the same.
+    pub low: Option<Quantity>,
+    /// Fraction of the step at which it ends, at most 1: 0.9 where absent.
+    pub high: Option<Quantity>,
+}
+
+impl CriterionOptions for RiseTime {
+    const KIND: &'static str = "rise-time";
+}
+
+impl CriterionSpec for RiseTime {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: self.from.as_ref(),
+            step_time: self.step_time.as_ref(),
+        };
+        let step = options.bind(signals)?;
+        let low = number("low", self.low.as_ref().unwrap_or(&0.1.into()), &Unit::one())?;
+        let high = number("high", self.high.as_ref().unwrap_or(&0.9.into()), &Unit::one())?;
+        if !(0.0 <= low && low < high && high <= 1.0) {
+            let key = if self.high.is_some() { "high" } else { "low" };
+            return Err(Mistake::new(key, format!("no rise leads from {low} to {high} of the step"))
+                .with_help("0 <= low < high <= 1 must hold, such as low = 0.1 and high = 0.9"));
+        }
+        Ok(Box::new(Bound { step, low, high }))
+    }
+}
+
+struct Bound {
+    step: Step,
+    low: f64,
+    high: f64,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        second()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.step.signal.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let answer = self.step.answer(analysis)?;
+        let begin = answer.first_reaching(self.low)?.unwrap_or(0.0);
+        Ok(match answer.first_reaching(self.high)? {
+            Some(end) => (end - begin).into(),
+            None => Value::noted(answer.length() - begin, "not risen at the end"),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, mistake, second_order, simulated, value};
+
+    fn rise() -> RiseTime {
+        RiseTime { signal: "y".into(), target: Some(1.0.into()), ..RiseTime::default() }
+    }
+
+    #[test]
+    fn a_first_order_lag_rises_in_its_time_constant_times_the_logarithm_of_nine() {
+        let lag = simulated(20.0, |t| 1.0 - (-t / 2.0).exp());
+        assert_near(value(&rise(), &lag).number, 2.0 * 9f64.ln(), 1e-10);
+    }
+
+    #[test]
+    fn an_oscillation_first_reaches_its_target_by_the_closed_form() {
+        let whole = RiseTime { low: Some(0.0.into()), high: Some(1.0.into()), ..rise() };
+        for damping in [0.1f64, 0.5, 0.8] {
+            let exact = (std::f64::consts::PI - damping.acos()) / (1.0 - damping * damping).sqrt();
+            assert_near(value(&whole, &simulated(20.0, second_order(damping))).number, exact, 1e-10);
+        }
+    }
+
+    #[test]
+    fn a_step_downwards_and_later_rises_just_as_fast() {
+        let down = simulated(20.0, |t| if t < 3.0 { 1.0 } else { (3.0 - t).exp() });
+        let options = RiseTime { target: Some(0.0.into()), step_time: Some(3.0.into()), ..rise() };
+        assert_near(value(&options, &down).number, 9f64.ln(), 1e-10);
+    }
+
+    #[test]
+    fn a_response_that_stays_low_has_the_time_that_is_left() {
+        let note = "not risen at the end";
+        let half = simulated(10.0, |t| 0.5 * (1.0 - (-t).exp()));
+        let left = value(&rise(), &half);
+        assert_near(left.number, 10.0 + 0.8f64.ln(), 1e-10);
+        assert_eq!(left.note, Some(note));
+        assert_eq!(value(&rise(), &simulated(10.0, |t| 0.001 * t)), Value::noted(10.0, note));
+    }
+
+    #[test]
+    fn fractions_out_of_order_are_a_mistake() {
+        let reversed = RiseTime { low: Some(0.9.into()), high: Some(0.1.into()), ..rise() };
+        assert!(mistake(&reversed).starts_with("high: no rise leads from 0.9 to 0.1 of the step"));
+        assert!(mistake(&RiseTime { low: Some((-0.1).into()), ..rise() }).starts_with("low: "));
+    }
+}

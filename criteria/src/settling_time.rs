@@ -1,0 +1,190 @@
+//! Settling time of a step response.
+
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Trace, Unit, Value, Variable,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Step, StepOptions, positive, second};
+
+/// `sup { t : |y - target| > band }`, counted from the step, in s: from then on the signal stays within the band.
+///
+/// The band is `band` in the unit of the signal, or `relative-band` as a fraction of `|target - from|`; 2 % of the step
+/// where neither is given. Touching the edge of the band does not leave it. The time is where the curve crosses the
+/// edge, not where a sample lies outside; it jumps where an extremum comes to touch the edge.
+///
+/// Range: from 0 to the length of the simulation. A signal that is outside at the end has that length as its settling
+/// time, noted `not settled at the end`. Without a `target` the signal settles at its own last value, whatever that is:
+/// give one wherever it is known.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct SettlingTime {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Value before the step; the signal's first value where absent. Only `relative-band` reads it.
+    pub from: Option<Quantity>,
+    /// Time of the step, from which the settling time counts; 0 s where absent.
+    pub step_time: Option<Quantity>,
+    /// Largest distance from the target that counts as settled, in the unit of the signal.
+    pub band: Option<Quantity>,
+    /// The same as a fraction of the step, instead of `band`: 0.02 or "2 %", which also holds where neither is given.
+    pub relative_band: Option<Quantity>,
+}
+
+impl CriterionOptions for SettlingTime {
+    const KIND: &'static str = "settling-time";
+}
+
+impl CriterionSpec for SettlingTime {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: self.from.as_ref(),
+            step_time: self.step_time.as_ref(),
+        };
+        let step = options.bind(signals)?;
+        let absolute = positive("band", self.band.as_ref(), &step.unit)?;
+        let relative = positive("relative-band", self.relative_band.as_ref(), &Unit::one())?;
+        let band = match (absolute, relative) {
+            (Some(_), Some(_)) => {
+                return Err(Mistake::new("relative-band", "`band` and `relative-band` exclude each other")
+                    .with_help("remove one of them"));
+            }
+            (Some(band), None) => Band::Absolute(band),
+            (None, relative) => Band::Relative(relative.unwrap_or(0.02)),
+        };
+        Ok(Box::new(Bound { step, band }))
+    }
+}
+
+struct Bound {
+    step: Step,
+    band: Band,
+}
+
+enum Band {
+    /// In the unit of the signal.
+    Absolute(f64),
+    /// As a fraction of the step.
+    Relative(f64),
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        second()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.step.signal.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let answer = self.step.answer(analysis)?;
+        let band = match self.band {
+            Band::Absolute(band) => band,
+            Band::Relative(fraction) => fraction * answer.height()?.abs(),
+        };
+        let left = last_outside(&answer.trace, answer.target - band, answer.target + band).unwrap_or(answer.time);
+        if left < answer.trace.end() {
+            Ok((left - answer.time).into())
+        } else {
+            Ok(Value::noted(answer.length(), "not settled at the end"))
+        }
+    }
+}
+
+/// The last time at which the trace is below `low` or above `high`; `None` if it never is.
+fn last_outside(trace: &Trace, low: f64, high: f64) -> Option<f64> {
+    let is_outside = |y: f64| y < low || y > high;
+    let pieces = trace.pieces();
+    let last = pieces.iter().rev().find(|piece| piece.value.into_iter().any(is_outside))?;
+    if is_outside(last.value[1]) {
+        return Some(last.time[1]);
+    }
+    // The piece is monotone: it comes in across the edge it was beyond.
+    let edge = if last.value[0] > high { high } else { low };
+    Some(trace.crossing(last, edge).unwrap_or(last.time[0]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{analysis, assert_near, mistake, quantity, second_order, simulated, value};
+
+    fn settling(band: f64) -> SettlingTime {
+        SettlingTime {
+            signal: "y".into(),
+            target: Some(1.0.into()),
+            band: Some(band.into()),
+            ..SettlingTime::default()
+        }
+    }
+
+    #[test]
+    fn a_first_order_lag_settles_after_the_logarithm_of_the_band() {
+        let lag = simulated(40.0, |t| 1.0 - (-t / 3.0).exp());
+        assert_near(value(&settling(0.01), &lag).number, 3.0 * 100f64.ln(), 1e-9);
+        let by_default = SettlingTime { band: None, ..settling(1.0) };
+        assert_near(value(&by_default, &lag).number, 3.0 * 50f64.ln(), 1e-9);
+        let percent = SettlingTime { relative_band: Some(quantity("5 %")), ..by_default };
+        assert_near(value(&percent, &lag).number, 3.0 * 20f64.ln(), 1e-9);
+    }
+
+    #[test]
+    fn an_oscillation_settles_at_its_last_crossing() {
+        let response = second_order(0.2);
+        // The last crossing of 1 +- 0.05 by bisection on the closed form; |y - 1| < 0.05 from 15 s on, as exp(-3) <
+        // 0.05.
+        let outside = (0..150_000).rev().find(|&i| (response(f64::from(i) * 1e-4) - 1.0).abs() > 0.05).unwrap();
+        let (mut inside, mut outside) = (f64::from(outside + 1) * 1e-4, f64::from(outside) * 1e-4);
+        for _ in 0..60 {
+            let middle = 0.5 * (inside + outside);
+            if (response(middle) - 1.0).abs() > 0.05 { outside = middle } else { inside = middle }
+        }
+        assert_near(value(&settling(0.05), &simulated(30.0, response)).number, inside, 1e-10);
+    }
+
+    #[test]
+    fn an_extremum_that_touches_the_band_does_not_leave_it() {
+        // From 0 to 1 within 1 s, then an arch of height 1/4 (exact in binary) from 1 s to 3 s.
+        let arch = |height: f64| {
+            let mut trace = Trace::starting_at(0.0, 3);
+            trace.push_polynomial(1.0, [0.0, 1.0, 0.0, 0.0, 0.0]);
+            trace.push_polynomial(3.0, [1.0, 4.0 * height, -4.0 * height, 0.0, 0.0]);
+            trace.push_polynomial(4.0, [1.0, 0.0, 0.0, 0.0, 0.0]);
+            analysis(&trace)
+        };
+        assert_eq!(value(&settling(0.25), &arch(0.25)).number, 0.75);
+        assert_near(value(&settling(0.25), &arch(0.25 + 1e-12)).number, 2.0, 1e-5);
+        assert_near(value(&settling(0.25), &arch(0.5)).number, 2.0 + 0.5f64.sqrt(), 1e-14);
+    }
+
+    #[test]
+    fn a_response_outside_the_band_at_the_end_is_noted_and_lasts_as_long_as_the_simulation() {
+        let lag = simulated(4.0, |t| 1.0 - (-t).exp());
+        assert_eq!(value(&settling(0.01), &lag), Value::noted(4.0, "not settled at the end"));
+        let later = SettlingTime { step_time: Some(1.0.into()), ..settling(0.01) };
+        assert_eq!(value(&later, &lag).number, 3.0);
+        assert_eq!(value(&settling(2.0), &lag), Value::from(0.0));
+    }
+
+    #[test]
+    fn the_time_counts_from_the_step() {
+        let late = simulated(30.0, |t| if t < 2.0 { 0.0 } else { 1.0 - (2.0 - t).exp() });
+        let settling = SettlingTime { step_time: Some(2.0.into()), ..settling(0.1) };
+        assert_near(value(&settling, &late).number, 10f64.ln(), 1e-10);
+    }
+
+    #[test]
+    fn two_bands_or_a_band_of_no_width_are_mistakes() {
+        let two = SettlingTime { relative_band: Some(0.02.into()), ..settling(0.01) };
+        assert_eq!(mistake(&two), "relative-band: `band` and `relative-band` exclude each other; remove one of them");
+        assert_eq!(mistake(&settling(0.0)), "band: `band` must be positive, not 0 m");
+    }
+}

@@ -1,0 +1,170 @@
+//! Distance of a response from an envelope.
+
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Trace, Unit, Value, Variable,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{number, part, second, signal, step_time, trace};
+
+/// `max_t max(y - upper(t), lower(t) - y)`, in the unit of the signal: how far the response leaves its envelope.
+///
+/// Negative inside: then it is the margin, with the other sign. Each bound is given by points `[time, value]` with
+/// straight lines between them; it begins at its first point and stays at the value of its last one. Two points of the
+/// same time are a step. At least one bound is needed. Example: `upper = [[0, 1.2], [5, 1.2], [5, 1.02]]`,
+/// `lower = [[3, 0.9], [10, 0.98]]`.
+///
+/// Range: any number. A demand is positive; to ask that the response stays inside, use the pair `good = -0.1`,
+/// `bad = 0`: the scaled value is 1 where the response touches its envelope, 0 with a margin of 0.1.
+///
+/// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct StepEnvelope {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Points `[time, value]` of the upper bound, by increasing time; there is none where absent.
+    #[serde(default)]
+    pub upper: Vec<[Quantity; 2]>,
+    /// Points `[time, value]` of the lower bound, by increasing time; there is none where absent.
+    #[serde(default)]
+    pub lower: Vec<[Quantity; 2]>,
+    /// Time of the step, from which the times of the points count; 0 s where absent.
+    pub step_time: Option<Quantity>,
+}
+
+impl CriterionOptions for StepEnvelope {
+    const KIND: &'static str = "step-envelope";
+}
+
+impl CriterionSpec for StepEnvelope {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let signal = signal(signals, &self.signal)?.clone();
+        if self.upper.is_empty() && self.lower.is_empty() {
+            return Err(Mistake::here("an envelope has at least one bound")
+                .with_help("add `upper = [[time, value], ...]` or `lower = [[time, value], ...]`"));
+        }
+        let step_time = step_time(self.step_time.as_ref())?;
+        let upper = stretches("upper", &self.upper, &signal.unit, step_time)?;
+        let lower = stretches("lower", &self.lower, &signal.unit, step_time)?;
+        Ok(Box::new(Bound { signal, upper, lower }))
+    }
+}
+
+/// A straight part of a bound: times and values at both ends.
+struct Stretch {
+    time: [f64; 2],
+    value: [f64; 2],
+}
+
+fn stretches(key: &str, points: &[[Quantity; 2]], unit: &Unit, step_time: f64) -> Result<Vec<Stretch>, Mistake> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    for [time, value] in points {
+        let (time, value) = (step_time + number(key, time, &second())?, number(key, value, unit)?);
+        if let Some(last) = stretches.last_mut() {
+            if time < last.time[0] {
+                let before = last.time[0] - step_time;
+                return Err(Mistake::new(key, format!("the point at {} s stands after {before} s", time - step_time))
+                    .with_help("give the points by increasing time"));
+            }
+            last.time[1] = time;
+            last.value[1] = value;
+        }
+        stretches.push(Stretch { time: [time, f64::INFINITY], value: [value, value] });
+    }
+    Ok(stretches)
+}
+
+impl Stretch {
+    /// The bound at a time within the stretch.
+    fn at(&self, t: f64) -> f64 {
+        let ([t0, t1], [v0, v1]) = (self.time, self.value);
+        if v0 == v1 { v0 } else { v0 + (v1 - v0) * (t - t0) / (t1 - t0) }
+    }
+
+    /// `max_t sign (y - bound)`; `None` where the stretch lies outside the simulation.
+    fn violation(&self, trace: &Trace, sign: f64) -> Option<f64> {
+        let (from, to) = (self.time[0].max(trace.start()), self.time[1].min(trace.end()));
+        (from < to).then(|| part(trace, &[from, to], |t, y| sign * (y - self.at(t))).maximum().0)
+    }
+}
+
+struct Bound {
+    signal: Variable,
+    upper: Vec<Stretch>,
+    lower: Vec<Stretch>,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        self.signal.unit.clone()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.name.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let trace = trace(analysis, &self.signal.name)?;
+        let above = self.upper.iter().filter_map(|stretch| stretch.violation(trace, 1.0));
+        let below = self.lower.iter().filter_map(|stretch| stretch.violation(trace, -1.0));
+        let worst = above.chain(below).reduce(f64::max);
+        worst
+            .map(Value::from)
+            .ok_or_else(|| format!("the envelope begins after the end of the simulation at {} s", trace.end()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, mistake, quantity, second_order, simulated, undefined, value};
+
+    fn points(points: &[[f64; 2]]) -> Vec<[Quantity; 2]> {
+        points.iter().map(|point| point.map(Quantity::from)).collect()
+    }
+
+    fn envelope(upper: &[[f64; 2]], lower: &[[f64; 2]]) -> StepEnvelope {
+        StepEnvelope { signal: "y".into(), upper: points(upper), lower: points(lower), step_time: None }
+    }
+
+    #[test]
+    fn the_worst_distance_from_either_bound_counts() {
+        let response = simulated(20.0, second_order(0.5));
+        let overshoot = (-std::f64::consts::PI * 0.5 / 0.75f64.sqrt()).exp();
+        assert_near(value(&envelope(&[[0.0, 1.1]], &[]), &response).number, overshoot - 0.1, 1e-12);
+        assert_near(value(&envelope(&[[0.0, 1.5]], &[[0.0, -0.2]]), &response).number, -0.2, 1e-12);
+        let late = value(&envelope(&[[0.0, 1.5]], &[[1.0, 1.0], [1.5, 1.0]]), &response).number;
+        assert_near(late, 1.0 - second_order(0.5)(1.0), 1e-12);
+    }
+
+    #[test]
+    fn the_distance_from_a_slanted_bound_is_largest_between_its_points() {
+        // y = t (4 - t) above the line t/2 from (0, 0) to (4, 2): farthest at t = 7/4.
+        let arch = simulated(4.0, |t| t * (4.0 - t));
+        assert_near(value(&envelope(&[[0.0, 0.0], [4.0, 2.0]], &[]), &arch).number, 3.0625, 1e-12);
+    }
+
+    #[test]
+    fn a_bound_steps_where_two_points_share_a_time_and_stays_after_the_last() {
+        let ramp = simulated(4.0, |t| t);
+        assert_near(value(&envelope(&[[0.0, 9.0], [2.0, 9.0], [2.0, 5.0]], &[]), &ramp).number, -1.0, 1e-12);
+        let late =
+            StepEnvelope { step_time: Some(quantity("1 s")), ..envelope(&[], &[[0.0, 3.0], [2.0, 3.0], [2.0, 3.5]]) };
+        assert_near(value(&late, &ramp).number, 2.0, 1e-12);
+    }
+
+    #[test]
+    fn an_envelope_needs_a_bound_in_order_within_the_simulation() {
+        assert!(mistake(&envelope(&[], &[])).contains("an envelope has at least one bound"));
+        let reversed = mistake(&envelope(&[], &[[2.0, 0.0], [1.0, 0.0]]));
+        assert_eq!(reversed, "lower: the point at 1 s stands after 2 s; give the points by increasing time");
+        let metres = StepEnvelope { upper: vec![[quantity("1 m"), quantity("1 m")]], ..envelope(&[], &[]) };
+        assert_eq!(mistake(&metres), "upper: a quantity in `m` stands where one in `s` is expected");
+        assert_eq!(
+            undefined(&envelope(&[[9.0, 1.0]], &[]), &simulated(4.0, |t| t)),
+            "the envelope begins after the end of the simulation at 4 s"
+        );
+    }
+}

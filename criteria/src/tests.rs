@@ -1,0 +1,143 @@
+//! What holds for every criterion: it is documented, and a study file can name it.
+
+use std::collections::HashSet;
+use std::io;
+
+use mops_core::file::{Files, describe, read};
+use mops_core::{
+    Analysis, Catalogue, Failure, Interface, Job, Mistake, Model, ModelKind, ModelOptions, Problem, Response, Solver,
+    SolverKind, SolverOptions, Trace, Variable,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::kinds;
+
+/// Every kind, with options as they stand in a study file.
+const EXAMPLES: [(&str, &str); 20] = [
+    ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
+    ("undershoot", "{ signal = 'y', target = '100 cm' }"),
+    ("peak", "{ signal = 'y', of = 'absolute' }"),
+    ("settling-time", "{ signal = 'y', target = 1, relative-band = '2 %' }"),
+    ("rise-time", "{ signal = 'y', target = 1, low = 0.1, high = '90 %' }"),
+    ("delay-time", "{ signal = 'y', target = 1, level = 0.5 }"),
+    ("steady-state-error", "{ signal = 'y', target = 1, window = '1 s' }"),
+    ("final-value", "{ signal = 'y' }"),
+    ("ise", "{ signal = 'y', target = 1, step-time = 0 }"),
+    ("iae", "{ signal = 'y', target = 1 }"),
+    ("itae", "{ signal = 'y', target = 1 }"),
+    ("itse", "{ signal = 'y', target = 1 }"),
+    ("control-effort", "{ signal = 'y', of = 'absolute', offset = '1 m' }"),
+    ("maximum-rate", "{ signal = 'y' }"),
+    ("step-envelope", "{ signal = 'y', upper = [[0, 1.1], ['2000 ms', '1.02 m']], lower = [[3, 0.9]] }"),
+    ("model-tracking", "{ signal = 'y', target = 1, frequency = '1 Hz', damping = 0.7 }"),
+    ("fit", "{ signal = 'y', weight = 2.5 }"),
+    ("normalised-error", "{ signal = 'y', noise = '1 mm' }"),
+    ("rmse", "{ signal = 'y' }"),
+    ("fit-percent", "{ signal = 'y' }"),
+];
+
+#[test]
+fn every_kind_has_one_name_and_the_examples_cover_them_all() {
+    let names: Vec<&str> = kinds().iter().map(|kind| kind.name).collect();
+    assert_eq!(names, EXAMPLES.map(|(name, _)| name));
+    assert_eq!(names.iter().collect::<HashSet<_>>().len(), names.len());
+}
+
+#[test]
+fn every_page_of_the_manual_opens_with_a_formula_and_names_its_source() {
+    for kind in kinds() {
+        let page = describe(kind.name, &(kind.schema)());
+        let about = page.lines().nth(2).unwrap_or_default();
+        assert!(about.contains('`'), "{page}");
+        assert!(page.contains("Source: ") && page.contains("Range:"), "{page}");
+        let schema = (kind.schema)();
+        let options = schema.as_value()["properties"].as_object().expect("a criterion has options").clone();
+        assert!(options.values().all(|option| option["description"].is_string()), "{page}");
+    }
+}
+
+#[test]
+fn every_kind_is_read_from_a_study_file_and_has_a_value() {
+    let criteria: String = EXAMPLES
+        .iter()
+        .map(|(name, options)| format!("{name} = {{ {name} = {options}, usage = 'monitor' }}\n"))
+        .collect();
+    let problem = Problem::new(read_study(&criteria).expect("it is a study").into());
+    let evaluation = problem.evaluate(&problem.start());
+    assert!(evaluation.failures.is_empty(), "{:?}", evaluation.failures);
+    let measured = ["fit", "normalised-error", "rmse", "fit-percent"].len();
+    assert_eq!(evaluation.readings.iter().flatten().count(), 2 * (EXAMPLES.len() - measured) + measured);
+}
+
+#[test]
+fn a_mistake_in_an_option_is_led_back_to_its_place() {
+    let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, demand = 1 }")
+        .err()
+        .expect("the unit is wrong");
+    assert!(wrong.to_string().contains(":12:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
+}
+
+fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {
+    let catalogue = Catalogue { criteria: kinds(), ..Catalogue::default() }
+        .with_model(ModelKind::of::<Lag>())
+        .with_solver(SolverKind::of::<NoSolver>());
+    let text = format!(
+        "[study]\nname = 'test'\n[models]\nlag = {{ lag = {{}} }}\n[tuners]\nT = {{ start = 1, min = 0.5, max = 2 }}\n\
+         [cases]\nstep = {{ horizon = 6 }}\n[experiments]\nlog = {{ file = 'log.csv', channels = {{ y = 'y' }} }}\n\
+         [criteria]\n{criteria}"
+    );
+    read(&catalogue, "study.toml", &text, &[], &Data).map(|file| file.study)
+}
+
+/// The measurement of all tests.
+struct Data;
+
+impl Files for Data {
+    fn read(&self, _: &str) -> io::Result<Vec<u8>> {
+        Ok(b"time [s],y [m]\n0,0\n2,0.8\n4,1.0\n".to_vec())
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+/// `y = 1 - exp(-t/T)`.
+#[derive(Deserialize, JsonSchema)]
+struct Lag {}
+
+struct LagModel(Interface);
+
+impl ModelOptions for Lag {
+    const KIND: &'static str = "lag";
+
+    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+        let signals = vec![Variable::new("y", "m", "output")];
+        let parameters = vec![mops_core::Parameter::new("T", "s", "time constant")];
+        Ok(Box::new(LagModel(Interface { signals, parameters, ..Interface::default() })))
+    }
+}
+
+impl Model for LagModel {
+    fn interface(&self) -> &Interface {
+        &self.0
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        let trace: Trace = crate::common::testing::sampled(job.horizon, 500, |t| 1.0 - (-t / job.parameters[0]).exp());
+        Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
+    }
+}
+
+/// A study file needs a solver in its catalogue; these tests run none.
+#[derive(Deserialize, JsonSchema)]
+struct NoSolver {}
+
+impl SolverOptions for NoSolver {
+    const KIND: &'static str = "none";
+
+    fn build(&self) -> Box<dyn Solver> {
+        unreachable!("no study is run")
+    }
+}

@@ -1,0 +1,99 @@
+//! Undershoot of a step response: how far it first goes the wrong way.
+
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Step, StepOptions};
+
+/// `max(0, max_t (from - y)/(target - from))`, dimensionless: 0.2 is 20 % of the step, to the wrong side.
+///
+/// A plant with a zero in the right half plane has one: its inverse response. With `absolute = true` the excursion
+/// itself, in the unit of the signal: `max(0, from - min_t y)` for a step upwards, `max(0, max_t y - from)` for one
+/// downwards.
+///
+/// Range: from 0 up. The whole response counts, so that one that swings back beyond `from` later has an undershoot too.
+///
+/// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Undershoot {
+    /// Signal that is measured.
+    pub signal: String,
+    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    pub target: Option<Quantity>,
+    /// Value before the step; the signal's first value where absent.
+    pub from: Option<Quantity>,
+    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    pub step_time: Option<Quantity>,
+    /// `true` gives the excursion in the unit of the signal instead of a fraction of the step.
+    #[serde(default)]
+    pub absolute: bool,
+}
+
+impl CriterionOptions for Undershoot {
+    const KIND: &'static str = "undershoot";
+}
+
+impl CriterionSpec for Undershoot {
+    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        let options = StepOptions {
+            signal: &self.signal,
+            target: self.target.as_ref(),
+            from: self.from.as_ref(),
+            step_time: self.step_time.as_ref(),
+        };
+        Ok(Box::new(Bound { step: options.bind(signals)?, absolute: self.absolute }))
+    }
+}
+
+struct Bound {
+    step: Step,
+    absolute: bool,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        if self.absolute { self.step.unit.clone() } else { Unit::one() }
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.step.signal.clone()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let answer = self.step.answer(analysis)?;
+        let behind = answer.from - answer.farthest_behind();
+        let undershoot = if self.absolute { answer.upwards(behind) } else { behind / answer.height()? };
+        Ok(undershoot.max(0.0).into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, second_order, simulated, value};
+
+    /// Step response of `(1 - s)/(s + 1)^2`: smallest at t = 1/2.
+    fn inverse(t: f64) -> f64 {
+        1.0 - (1.0 + 2.0 * t) * (-t).exp()
+    }
+
+    fn undershoot(target: f64) -> Undershoot {
+        Undershoot { signal: "y".into(), target: Some(target.into()), ..Undershoot::default() }
+    }
+
+    #[test]
+    fn an_inverse_response_undershoots_by_its_closed_form() {
+        let exact = 2.0 * (-0.5f64).exp() - 1.0;
+        assert_near(value(&undershoot(1.0), &simulated(10.0, inverse)).number, exact, 1e-12);
+        assert_near(value(&undershoot(-3.0), &simulated(10.0, |t| -3.0 * inverse(t))).number, exact, 1e-12);
+        let absolute = Undershoot { absolute: true, ..undershoot(-3.0) };
+        assert_near(value(&absolute, &simulated(10.0, |t| -3.0 * inverse(t))).number, 3.0 * exact, 1e-12);
+    }
+
+    #[test]
+    fn a_response_that_starts_the_right_way_has_none() {
+        assert_near(value(&undershoot(1.0), &simulated(10.0, second_order(0.2))).number, 0.0, 1e-15);
+    }
+}

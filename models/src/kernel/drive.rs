@@ -1,0 +1,72 @@
+//! An input as a simulation meets it: smooth within a step, with its jumps at breaks.
+
+use mops_core::{Hold, Input};
+
+/// An input with its present value and slope.
+///
+/// A step of the integrator ends where the input jumps and evaluates it there from the left; only
+/// [`Drive::pass_break`] moves on to the value from the right.
+#[derive(Debug, Clone)]
+pub struct Drive<'a> {
+    input: Option<&'a Input>,
+    since: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl<'a> Drive<'a> {
+    /// A drive at time 0; nothing drives where `input` is absent.
+    pub fn new(input: Option<&'a Input>) -> Self {
+        let mut drive = Self { input, since: 0.0, value: 0.0, slope: 0.0 };
+        drive.pass_break(0.0);
+        drive
+    }
+
+    /// The value at `t`.
+    #[inline]
+    pub fn at(&self, t: f64) -> f64 {
+        match self.input {
+            Some(sine @ Input::Sine { .. }) => sine.at(t),
+            _ => self.value + self.slope * (t - self.since),
+        }
+    }
+
+    /// The next time after `t` at which the value or its slope jumps.
+    pub fn next_break(&self, t: f64) -> f64 {
+        self.input.map_or(f64::INFINITY, |input| input.next_break(t))
+    }
+
+    /// Takes the value and slope that hold from `t` on.
+    pub fn pass_break(&mut self, t: f64) {
+        let Some(input) = self.input else { return };
+        self.since = t;
+        self.value = input.at(t);
+        self.slope = 0.0;
+        if let Input::Sampled { hold: Hold::First, .. } = input {
+            let next = input.next_break(t);
+            if next.is_finite() {
+                self.slope = (input.at(next) - self.value) / (next - t);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_waits_for_its_break() {
+        let input = Input::Step { time: 1.0, before: 2.0, after: 3.0 };
+        let mut drive = Drive::new(Some(&input));
+        assert_eq!((drive.at(1.0), drive.next_break(0.0)), (2.0, 1.0));
+        drive.pass_break(1.0);
+        assert_eq!((drive.at(1.0), drive.next_break(1.0)), (3.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn first_order_hold_is_a_straight_line() {
+        let input = Input::Sampled { times: vec![0.0, 2.0], values: vec![1.0, 5.0], hold: Hold::First };
+        assert_eq!(Drive::new(Some(&input)).at(0.5), 2.0);
+    }
+}

@@ -1,0 +1,98 @@
+//! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
+
+pub mod dormand_prince;
+pub mod drive;
+pub mod friction;
+mod record;
+
+use mops_core::{Failure, Scalar, Work};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+pub use dormand_prince::{Step, integrate};
+pub use record::record;
+
+/// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
+///
+/// The equations are written once over [`Scalar`], so that they run with values and with tangents. States are
+/// `[S; N]` where a model's size is known, `Vec<S>` where it is not; neither allocates in the step loop.
+pub trait Dynamics<S: Scalar> {
+    /// The state vector.
+    type State: AsRef<[S]> + AsMut<[S]> + Clone;
+
+    /// Writes `x'` at time `t` in the present mode. Within a step the mode and its inputs are smooth.
+    fn derivative(&self, t: f64, x: &Self::State, dx: &mut Self::State);
+
+    /// Number of guards in the present mode.
+    fn guards(&self) -> usize {
+        0
+    }
+
+    /// The value of a guard: the mode holds while it is not negative.
+    fn guard(&self, _index: usize, _t: f64, _x: &Self::State) -> f64 {
+        1.0
+    }
+
+    /// A guard became negative: changes the mode, and the state where it jumps. Returns what happened.
+    fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &'static str {
+        ""
+    }
+
+    /// The next time after `t` at which an input jumps or a sample is taken; infinity if never.
+    fn next_break(&self, _t: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    /// A break was reached (also called once at the start): inputs take their new values.
+    fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
+}
+
+/// Accuracy and limits of a simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Tolerance {
+    /// Error per step relative to the state.
+    pub relative: f64,
+    /// Error per step where the state is small.
+    pub absolute: f64,
+    /// Largest number of steps; a simulation that needs more is a failure.
+    pub max_steps: usize,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { relative: 1e-8, absolute: 1e-10, max_steps: 100_000 }
+    }
+}
+
+impl Tolerance {
+    /// Checks that the numbers make sense.
+    ///
+    /// # Errors
+    /// A tolerance outside (0, 1), or no steps at all.
+    pub fn check(&self) -> Result<(), mops_core::Mistake> {
+        let wrong = |key: &str, fact: String| mops_core::Mistake::new(key, fact).within("tolerance");
+        for (key, value) in [("relative", self.relative), ("absolute", self.absolute)] {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(wrong(key, format!("a tolerance lies between 0 and 1, not at {value}")));
+            }
+        }
+        if self.max_steps == 0 { Err(wrong("max-steps", "a simulation needs steps".into())) } else { Ok(()) }
+    }
+}
+
+/// What the integrator tells of a simulation: steps, then events.
+pub trait Sink<S: Scalar, D: Dynamics<S>> {
+    /// A step was accepted; `dynamics` is in the mode that held during it.
+    fn step(&mut self, step: &Step<D::State>, dynamics: &D);
+    /// The mode changed.
+    fn event(&mut self, _t: f64, _what: &'static str) {}
+}
+
+/// Nobody listens.
+impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for () {
+    fn step(&mut self, _: &Step<D::State>, _: &D) {}
+}
+
+/// What a simulation gives: the last state, and the work.
+pub type Simulated<X> = Result<(X, Work), Failure>;

@@ -1,0 +1,177 @@
+//! The catalogue: every kind of model, criterion and solver that a study file can name, and the studies that are shipped.
+
+use std::sync::Arc;
+
+use schemars::{JsonSchema, Schema};
+use serde::de::DeserializeOwned;
+use toml::de::ValueDeserializer;
+
+use crate::criterion::CriterionSpec;
+use crate::file::schema_of;
+use crate::model::Model;
+use crate::solver::Solver;
+use crate::study::Mistake;
+
+/// Options of a kind of model, as they stand in a study file; their documentation is the kind's page in the manual.
+pub trait ModelOptions: DeserializeOwned + JsonSchema {
+    /// Name of the kind in study files.
+    const KIND: &'static str;
+
+    /// Checks the options and makes the model.
+    ///
+    /// # Errors
+    /// Options that contradict each other; the mistake names the key.
+    fn build(self) -> Result<Box<dyn Model>, Mistake>;
+}
+
+/// Options of a kind of criterion, as they stand in a study file; their documentation is the kind's page in the manual.
+pub trait CriterionOptions: CriterionSpec + DeserializeOwned + JsonSchema + 'static {
+    /// Name of the kind in study files.
+    const KIND: &'static str;
+}
+
+/// Options of a kind of solver, as they stand in a study file; their documentation is the kind's page in the manual.
+pub trait SolverOptions: DeserializeOwned + JsonSchema + Send + Sync + 'static {
+    /// Name of the kind in study files.
+    const KIND: &'static str;
+
+    /// Makes a solver with these options.
+    fn build(&self) -> Box<dyn Solver>;
+}
+
+type Reader<T> = fn(ValueDeserializer<'_>) -> Result<T, toml::de::Error>;
+
+/// A kind of model.
+#[derive(Clone, Copy)]
+pub struct ModelKind {
+    /// Name in study files.
+    pub name: &'static str,
+    /// Schema of its options, with their documentation.
+    pub schema: fn() -> Schema,
+    pub(crate) read: Reader<Result<Box<dyn Model>, Mistake>>,
+}
+
+impl ModelKind {
+    /// The kind with options `O`.
+    pub fn of<O: ModelOptions>() -> Self {
+        Self { name: O::KIND, schema: schema_of::<O>, read: |value| O::deserialize(value).map(O::build) }
+    }
+}
+
+/// A kind of criterion.
+#[derive(Clone, Copy)]
+pub struct CriterionKind {
+    /// Name in study files.
+    pub name: &'static str,
+    /// Schema of its options, with their documentation.
+    pub schema: fn() -> Schema,
+    pub(crate) read: Reader<Box<dyn CriterionSpec>>,
+}
+
+impl CriterionKind {
+    /// The kind with options `O`.
+    pub fn of<O: CriterionOptions>() -> Self {
+        Self {
+            name: O::KIND,
+            schema: schema_of::<O>,
+            read: |value| O::deserialize(value).map(|options| Box::new(options) as Box<dyn CriterionSpec>),
+        }
+    }
+}
+
+/// A kind of solver.
+#[derive(Clone, Copy)]
+pub struct SolverKind {
+    /// Name in study files.
+    pub name: &'static str,
+    /// Schema of its options, with their documentation.
+    pub schema: fn() -> Schema,
+    pub(crate) read: Reader<SolverChoice>,
+}
+
+impl SolverKind {
+    /// The kind with options `O`.
+    pub fn of<O: SolverOptions>() -> Self {
+        Self {
+            name: O::KIND,
+            schema: schema_of::<O>,
+            read: |value| {
+                let options = O::deserialize(value)?;
+                Ok(SolverChoice { kind: O::KIND, make: Arc::new(move || options.build()) })
+            },
+        }
+    }
+
+    /// A solver of this kind with default options.
+    pub fn default_choice(&self) -> SolverChoice {
+        let empty = ValueDeserializer::parse("{}").expect("an empty table is TOML");
+        (self.read)(empty).expect("every option of a solver has a default")
+    }
+}
+
+/// A kind of solver with its options: makes as many solvers as are needed.
+#[derive(Clone)]
+pub struct SolverChoice {
+    /// Name of the kind.
+    pub kind: &'static str,
+    make: Arc<dyn Fn() -> Box<dyn Solver> + Send + Sync>,
+}
+
+impl SolverChoice {
+    /// A new solver.
+    pub fn make(&self) -> Box<dyn Solver> {
+        (self.make)()
+    }
+}
+
+/// A study that comes with the program: its files, by their names in its folder.
+#[derive(Debug, Clone, Copy)]
+pub struct Shipped {
+    /// Name.
+    pub name: &'static str,
+    /// `study.toml`, `README.md` and data.
+    pub files: &'static [(&'static str, &'static [u8])],
+}
+
+impl Shipped {
+    /// One of its files.
+    pub fn file(&self, name: &str) -> Option<&'static [u8]> {
+        self.files.iter().find(|(path, _)| *path == name).map(|(_, bytes)| *bytes)
+    }
+}
+
+/// Everything a study file can name.
+#[derive(Clone, Default)]
+pub struct Catalogue {
+    /// Models.
+    pub models: Vec<ModelKind>,
+    /// Criteria.
+    pub criteria: Vec<CriterionKind>,
+    /// Solvers; the first is taken where a study names none.
+    pub solvers: Vec<SolverKind>,
+    /// Shipped studies.
+    pub studies: Vec<Shipped>,
+}
+
+impl Catalogue {
+    /// Adds a kind of model.
+    #[must_use]
+    pub fn with_model(mut self, kind: ModelKind) -> Self {
+        self.models.push(kind);
+        self
+    }
+
+    /// Adds a kind of criterion.
+    #[must_use]
+    pub fn with_criterion(mut self, kind: CriterionKind) -> Self {
+        self.criteria.push(kind);
+        self
+    }
+
+    /// Adds a kind of solver.
+    #[must_use]
+    pub fn with_solver(mut self, kind: SolverKind) -> Self {
+        self.solvers.push(kind);
+        self
+    }
+}

@@ -1,0 +1,215 @@
+//! From a run to its outcome: validation data, standard errors, tables.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::catalogue::SolverChoice;
+use crate::experiment::{Channel, Role};
+use crate::model::Analysis;
+use crate::outcome::{
+    self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Outcome, ParameterReport, Pareto,
+    StartReport,
+};
+use crate::problem::{Evaluation, Problem};
+use crate::run::{Budget, Run};
+use crate::solver::{Oracle, Stop};
+use crate::study::{Study, Task};
+
+/// How a run ended, as far as the run itself does not know.
+#[derive(Debug, Clone, Copy)]
+pub struct Ending {
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Whether one criterion can be improved at no cost.
+    pub pareto: Pareto,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+}
+
+/// Concludes a run: estimates the free start values of experiments that move no parameter, and fills in the outcome.
+/// Returns it with the evaluation it reports.
+///
+/// # Panics
+/// If the run evaluated no point.
+pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcome, Evaluation) {
+    let problem = run.problem();
+    let study = Arc::clone(problem.study());
+    let mut best = run.best().expect("a run evaluates its start").clone();
+    let start = problem.evaluate_at(&study.start());
+    let mut simulations = run.archive().len() * problem.simulations();
+    let mut warnings = study.warnings.clone();
+
+    for case in 0..study.cases.len() {
+        if study.cases[case].role() == Role::Calibration {
+            continue;
+        }
+        let part = Problem::of_case(Arc::clone(&study), case, &best.tuners);
+        if part.active().is_empty() {
+            continue;
+        }
+        let mut run = Run::new(&part, Budget { evaluations: 2000 }, &());
+        run.solve(solver.make().as_mut(), &part.start());
+        if let Some(found) = run.best() {
+            best.tuners.clone_from(&found.tuners);
+        }
+        simulations += run.archive().len() * part.simulations();
+    }
+    let best = problem.evaluate_at(&best.tuners);
+    warnings.extend(bound_warnings(&study, problem, &best));
+
+    let calibration =
+        (study.task == Task::Calibration || study.cases.iter().any(|c| c.experiment.is_some())).then(|| {
+            CalibrationReport { parameters: standard_errors(problem, &best), experiments: experiments(problem, &best) }
+        });
+    let failures = run
+        .failures()
+        .iter()
+        .map(|(job, kind, count)| FailureReport {
+            model: study.models[study.jobs[*job].model].0.clone(),
+            case: study.cases[study.jobs[*job].case].name.clone(),
+            failure: (*kind).to_owned(),
+            count: *count,
+        })
+        .collect();
+    let outcome = Outcome {
+        format: 1,
+        mops: env!("CARGO_PKG_VERSION"),
+        study: study.name.clone(),
+        task: study.task,
+        seed: study.seed,
+        solver: solver.kind.to_owned(),
+        stop: ending.stop,
+        evaluations: run.archive().len(),
+        simulations,
+        seconds: ending.seconds,
+        feasible: best.merit.is_feasible(),
+        worst_scaled: outcome::worst_scaled(&study, &best),
+        objective: best.merit.objective,
+        violation: best.merit.violation,
+        pareto: ending.pareto,
+        tuners: outcome::tuners(&study, &best),
+        criteria: outcome::criterion_reports(&study, &best),
+        start: StartReport {
+            feasible: start.merit.is_feasible(),
+            worst_scaled: outcome::worst_scaled(&study, &start),
+            criteria: outcome::criterion_reports(&study, &start),
+        },
+        front: vec![outcome::front_point(&study, &best)],
+        calibration,
+        failures,
+        warnings,
+    };
+    (outcome, best)
+}
+
+fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<String> {
+    let at_bound = |&i: &usize| {
+        let tuner = &study.tuners[i];
+        let side = tuner.at_bound(best.tuners[i])?;
+        Some(format!(
+            "`{}` sits at its {side} bound {} {}: the optimum depends on that bound",
+            tuner.name, best.tuners[i], tuner.unit
+        ))
+    };
+    problem.active().iter().filter_map(at_bound).collect()
+}
+
+/// Standard errors of the active tuners: the roots of the diagonal of `s^2 (J' J)^-1`, with `s^2` the mean square of the
+/// residuals per degree of freedom. To first order, and for white residuals. Source: L. Ljung, System Identification,
+/// 2nd edition (1999), section 9.4. NaN along directions that the data do not determine.
+fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport> {
+    let study = Arc::clone(problem.study());
+    let active = problem.active().to_vec();
+    // A run of its own: the errors are computed even when the budget is spent.
+    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
+    let slopes = probe.linearise(&problem.point_of(&best.tuners), 1.0).ok().flatten();
+    let n = active.len();
+    let errors = slopes.filter(|l| !l.at.residuals.is_empty() && n > 0).map(|l| {
+        let m = l.at.residuals.len();
+        let columns: Vec<DVector<f64>> = l.residuals.into_iter().map(DVector::from_vec).collect();
+        let j = DMatrix::from_columns(&columns);
+        #[allow(clippy::cast_precision_loss)]
+        let variance = l.at.merit.objective / m.saturating_sub(n).max(1) as f64;
+        // Scaled to unit columns first, so that rank is judged free of units.
+        let norms: Vec<f64> = j.column_iter().map(|c| c.norm()).collect();
+        let scaled = DMatrix::from_fn(m, n, |i, k| if norms[k] > 0.0 { j[(i, k)] / norms[k] } else { 0.0 });
+        let svd = scaled.svd(false, true);
+        let v = svd.v_t.expect("asked for").transpose();
+        let largest = svd.singular_values.max();
+        (0..n)
+            .map(|k| {
+                let sum: f64 = (0..n)
+                    .map(|i| {
+                        let s = svd.singular_values[i];
+                        // A direction without effect makes every tuner that takes part in it undetermined.
+                        if s > 1e-9 * largest {
+                            (v[(k, i)] / s).powi(2)
+                        } else if v[(k, i)].abs() > 1e-6 {
+                            f64::NAN
+                        } else {
+                            0.0
+                        }
+                    })
+                    .sum();
+                (variance * sum).sqrt() / norms[k]
+            })
+            .collect::<Vec<f64>>()
+    });
+    let report = |(k, &i): (usize, &usize)| {
+        let tuner = &study.tuners[i];
+        let value = best.tuners[i];
+        // The slope of the tuner along its coordinate of the unit box turns the error into the tuner's unit.
+        let u = tuner.position_of(value);
+        let (a, b) = ((u - 1e-4).max(0.0), (u + 1e-4).min(1.0));
+        let slope = (tuner.value_at(b) - tuner.value_at(a)) / (b - a);
+        let error = errors.as_ref().map_or(f64::NAN, |e| e[k] * slope);
+        let half = 1.96 * error;
+        ParameterReport {
+            name: tuner.name.clone(),
+            value,
+            std_error: error,
+            interval95: [value - half, value + half],
+            unit: tuner.unit.to_string(),
+        }
+    };
+    active.iter().enumerate().map(report).collect()
+}
+
+fn experiments(problem: &Problem, best: &Evaluation) -> Vec<ExperimentReport> {
+    let study = problem.study();
+    let mut reports = Vec::new();
+    for (index, case) in study.cases.iter().enumerate() {
+        let Some(experiment) = &case.experiment else { continue };
+        let mut channels = Vec::new();
+        for (job, _) in study.jobs.iter().enumerate().filter(|(_, plan)| plan.case == index) {
+            let analysis = problem.analyse_all(job, &best.tuners, None).ok();
+            let signals = &study.models[study.jobs[job].model].1.interface().signals;
+            for channel in &experiment.channels {
+                if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
+                    channels.push(channel_report(channel, &signal.unit.to_string(), analysis.as_ref()));
+                }
+            }
+        }
+        reports.push(ExperimentReport { name: case.name.clone(), role: experiment.role, channels });
+    }
+    reports
+}
+
+fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) -> ChannelReport {
+    let simulated = analysis.map(|a| a.trace(&channel.signal).sample(&channel.times));
+    let n = channel.values.len();
+    #[allow(clippy::cast_precision_loss)]
+    let mean = channel.values.iter().sum::<f64>() / n as f64;
+    let spread: f64 = channel.values.iter().map(|v| (v - mean).powi(2)).sum();
+    let squares = simulated.map_or(f64::NAN, |s| s.iter().zip(&channel.values).map(|(a, b)| (a - b).powi(2)).sum());
+    #[allow(clippy::cast_precision_loss)]
+    let rmse = (squares / n as f64).sqrt();
+    ChannelReport {
+        name: channel.signal.clone(),
+        rmse,
+        noise: channel.noise,
+        fit_percent: 100.0 * (1.0 - (squares / spread).sqrt()),
+        unit: unit.to_owned(),
+    }
+}

@@ -1,0 +1,300 @@
+//! Reads CSV: a header with names and units, and rows of numbers.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use csv::{ByteRecord, ReaderBuilder};
+
+use super::Variable;
+use crate::diagnostic::{Diagnostic, Source};
+
+/// Where the cells stand in the text.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Layout {
+    separator: u8,
+    /// First byte of each row.
+    rows: Vec<usize>,
+    /// For each variable, which cell of a row it is.
+    cells: Vec<usize>,
+}
+
+impl Layout {
+    /// Bytes of the cell of `variable` in `row`.
+    pub fn span(&self, text: &str, variable: usize, row: usize) -> Option<Range<usize>> {
+        self.cell(text, *self.cells.get(variable)?, row)
+    }
+
+    fn cell(&self, text: &str, cell: usize, row: usize) -> Option<Range<usize>> {
+        cells(text, *self.rows.get(row)?, self.separator).nth(cell)
+    }
+}
+
+/// Reads every column that holds a number or only gaps: the variables, what was skipped, and where the cells are.
+///
+/// # Errors
+/// When there is no header, row or column of numbers, when a name comes twice, when a row has not as many cells as the
+/// header, when a column has numbers and text, or an infinite number.
+pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, Layout), Diagnostic> {
+    let header = Header::read(source)?;
+    let mut layout = Layout { separator: header.separator, ..Layout::default() };
+    let columns = read_rows(source, &header, &mut layout)?;
+    let mistakes = columns.iter().enumerate().filter_map(|(cell, column)| Some((column.mistake()?, cell)));
+    if let Some((row, cell)) = mistakes.min() {
+        let span = layout.cell(&source.text, cell, row).expect("the row was read");
+        return Err(not_a_number(source, span, &header.names[cell].0));
+    }
+    let (mut variables, mut skipped) = (Vec::new(), Vec::new());
+    for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
+        if let Some(row) = column.bad {
+            let span = layout.cell(&source.text, cell, row).expect("the row was read");
+            skipped.push(format!("{name}: text (`{}`)", shortened(&source.text[span])));
+        } else {
+            layout.cells.push(cell);
+            let (name, unit, rows) = (name.clone(), unit.clone(), column.values.len());
+            variables.push(Variable { name, unit, rows, columns: 1, values: column.values });
+        }
+    }
+    if variables.is_empty() {
+        return Err(Diagnostic::new("no column of the file holds numbers")
+            .with_help("separate the cells by commas, semicolons or tabs")
+            .at(source, header.span));
+    }
+    Ok((variables, skipped, layout))
+}
+
+struct Header {
+    separator: u8,
+    /// Name and unit of each column.
+    names: Vec<(String, Option<String>)>,
+    span: Range<usize>,
+    /// Where the rows begin.
+    body: usize,
+}
+
+impl Header {
+    fn read(source: &Arc<Source>) -> Result<Self, Diagnostic> {
+        let text = &source.text;
+        let start = first_line(text).ok_or_else(|| {
+            Diagnostic::new("the data file is empty")
+                .with_help("write a header such as `t[s],u[N*m]` and rows of numbers below it")
+                .at(source, 0..0)
+        })?;
+        let separator = separator(text, start);
+        let spans: Vec<_> = cells(text, start, separator).collect();
+        let span = start..spans.last().expect("every line has a cell").end;
+        let numbers = |cell: &Range<usize>| number(text[cell.clone()].as_bytes(), separator);
+        let numbers: Option<Vec<f64>> = spans.iter().map(numbers).collect();
+        if numbers.is_some_and(|numbers| numbers.iter().any(|number| !number.is_nan())) {
+            let names = (1..=spans.len()).map(|k| (k.to_string(), None)).collect();
+            return Ok(Self { separator, names, span, body: start });
+        }
+        let name = |(cell, k): (&Range<usize>, usize)| name_and_unit(&text[cell.clone()], k);
+        let names: Vec<_> = spans.iter().zip(1..).map(name).collect();
+        refuse_duplicates(source, &names, &spans)?;
+        Ok(Self { separator, names, body: span.end, span })
+    }
+}
+
+/// Where the first line starts that is neither blank nor a `#` comment.
+fn first_line(text: &str) -> Option<usize> {
+    let mut start = 0;
+    for line in text.split_inclusive(['\n', '\r']) {
+        if !line.trim().is_empty() && !line.starts_with('#') {
+            return Some(start);
+        }
+        start += line.len();
+    }
+    None
+}
+
+/// The semicolon if the line has one, else the tab, else the comma.
+fn separator(text: &str, start: usize) -> u8 {
+    let separates = |separator: u8| cells(text, start, separator).nth(1).is_some();
+    [b';', b'\t'].into_iter().find(|separator| separates(*separator)).unwrap_or(b',')
+}
+
+/// `u [N*m]` is the name `u` with the unit `N*m`; a column without a name is called by its number.
+fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
+    let cell = cell.trim();
+    let unquoted = cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"'));
+    let cell = unquoted.map_or(cell.to_owned(), |cell| cell.replace("\"\"", "\""));
+    let bracket = cell.trim().strip_suffix(']').and_then(|cell| cell.rsplit_once('['));
+    let (name, unit) = bracket.unwrap_or((&cell, ""));
+    let (name, unit) = (name.trim(), unit.trim());
+    let name = if name.is_empty() { k.to_string() } else { name.to_owned() };
+    (name, (!unit.is_empty()).then(|| unit.to_owned()))
+}
+
+fn refuse_duplicates(
+    source: &Arc<Source>,
+    names: &[(String, Option<String>)],
+    spans: &[Range<usize>],
+) -> Result<(), Diagnostic> {
+    let mut seen = HashMap::new();
+    for (k, (name, _)) in names.iter().enumerate() {
+        if let Some(first) = seen.insert(name, k) {
+            return Err(Diagnostic::new(format!("two columns are called `{name}`: {} and {}", first + 1, k + 1))
+                .with_label("the second one")
+                .with_help("rename one of them in the header")
+                .at(source, spans[k].clone()));
+        }
+    }
+    Ok(())
+}
+
+/// A column while it is read.
+#[derive(Clone, Default)]
+struct Reading {
+    values: Vec<f64>,
+    /// First row with what is not a finite number.
+    bad: Option<usize>,
+    has_numbers: bool,
+}
+
+impl Reading {
+    fn push(&mut self, number: Option<f64>) {
+        let row = self.values.len();
+        self.values.push(number.unwrap_or(f64::NAN));
+        self.has_numbers |= number.is_some_and(|number| !number.is_nan());
+        if number.is_none_or(f64::is_infinite) {
+            self.bad.get_or_insert(row);
+        }
+    }
+
+    /// The bad row of a column of numbers; a column of nothing but text is no mistake.
+    fn mistake(&self) -> Option<usize> {
+        self.bad.filter(|_| self.has_numbers)
+    }
+}
+
+fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Result<Vec<Reading>, Diagnostic> {
+    let text = &source.text;
+    let mut columns = vec![Reading::default(); header.names.len()];
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(header.separator)
+        .from_reader(&text.as_bytes()[header.body..]);
+    let mut record = ByteRecord::new();
+    while reader.read_byte_record(&mut record).expect("reading from memory does not fail") {
+        let start = record.position().expect("a record that was read has a position").byte() as usize + header.body;
+        // N.B.: the position may lie before the line feeds that the reader skipped.
+        let start = start + text[start..].len() - text[start..].trim_start_matches(['\n', '\r']).len();
+        if record.len() == 1 && columns.len() > 1 && record[0].trim_ascii().is_empty() {
+            continue;
+        }
+        if record.len() != columns.len() {
+            return Err(uneven(source, start, record.len(), header));
+        }
+        if columns.len() == 1 {
+            // The reader skips blank lines, but in the only column they are empty cells.
+            let last = layout.rows.last().copied().unwrap_or(header.body);
+            for blank in blank_lines(text, last..start) {
+                layout.rows.push(blank);
+                columns[0].push(Some(f64::NAN));
+            }
+        }
+        layout.rows.push(start);
+        for (column, cell) in columns.iter_mut().zip(&record) {
+            column.push(number(cell, header.separator));
+        }
+    }
+    if layout.rows.is_empty() {
+        return Err(Diagnostic::new("the header has no rows below it")
+            .with_help("add a row of numbers for each sample")
+            .at(source, header.span.clone()));
+    }
+    Ok(columns)
+}
+
+/// Where the blank lines start between a row and the next one.
+fn blank_lines(text: &str, between: Range<usize>) -> impl Iterator<Item = usize> {
+    let ends = text[between.clone()].match_indices('\n').map(move |(end, _)| between.start + end + 1);
+    let mut ends = ends.peekable();
+    std::iter::from_fn(move || ends.next().filter(|_| ends.peek().is_some()))
+}
+
+/// The number in a cell, NaN for a gap, none for text.
+fn number(cell: &[u8], separator: u8) -> Option<f64> {
+    let cell = str::from_utf8(cell.trim_ascii()).ok()?;
+    match cell {
+        "" | "NA" => Some(f64::NAN),
+        _ if separator == b';' && cell.contains(',') => cell.replace(',', ".").parse().ok(),
+        _ => cell.parse().ok(),
+    }
+}
+
+/// The cells of the row that starts at `start`, with their quotes.
+fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<usize>> {
+    let bytes = text.as_bytes();
+    let mut next = Some(start);
+    std::iter::from_fn(move || {
+        let begin = next?;
+        let mut quotes = Quotes::Before;
+        let mut end = begin;
+        while let Some(&byte) = bytes.get(end) {
+            if quotes != Quotes::Inside && (byte == separator || byte == b'\n' || byte == b'\r') {
+                break;
+            }
+            quotes = quotes.after(byte);
+            end += 1;
+        }
+        next = (bytes.get(end) == Some(&separator)).then_some(end + 1);
+        Some(begin..end)
+    })
+}
+
+/// Where in a cell we are: a quote opens the cell at its first byte only, and is doubled to stand inside.
+#[derive(Clone, Copy, PartialEq)]
+enum Quotes {
+    Before,
+    Inside,
+    JustClosed,
+    Outside,
+}
+
+impl Quotes {
+    fn after(self, byte: u8) -> Self {
+        match (self, byte) {
+            (Self::Before | Self::JustClosed, b'"') => Self::Inside,
+            (Self::Inside, b'"') => Self::JustClosed,
+            (Self::Inside, _) => Self::Inside,
+            _ => Self::Outside,
+        }
+    }
+}
+
+fn not_a_number(source: &Arc<Source>, span: Range<usize>, name: &str) -> Diagnostic {
+    let cell = &source.text[span.clone()];
+    let finite = if cell.trim().parse().is_ok_and(f64::is_infinite) { "finite" } else { "a number" };
+    Diagnostic::new(format!("`{}` in column `{name}` is not {finite}", shortened(cell)))
+        .with_label(format!("not {finite}"))
+        .with_help("write a number such as 1.5e-3; a gap is an empty cell, NaN or NA")
+        .at(source, span)
+}
+
+fn uneven(source: &Arc<Source>, start: usize, count: usize, header: &Header) -> Diagnostic {
+    let span = start..cells(&source.text, start, header.separator).last().map_or(start, |cell| cell.end);
+    let columns = header.names.len();
+    let help = match header.separator {
+        b',' if count > columns => "give every row as many cells; numbers with a decimal comma need `;` between cells",
+        _ => "give every row as many cells, an empty one for a gap",
+    };
+    Diagnostic::new(format!("the row has {}, the first line has {columns}", plural(count)))
+        .with_label(plural(count))
+        .with_help(help)
+        .at(source, span)
+}
+
+fn plural(count: usize) -> String {
+    if count == 1 { "1 cell".to_owned() } else { format!("{count} cells") }
+}
+
+fn shortened(cell: &str) -> String {
+    let cell = cell.trim();
+    match cell.char_indices().nth(30) {
+        Some((end, _)) => format!("{}...", &cell[..end]),
+        None => cell.to_owned(),
+    }
+}

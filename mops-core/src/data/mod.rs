@@ -1,0 +1,228 @@
+//! Measured data: reads a file into named columns of numbers.
+
+mod csv;
+mod mat4;
+mod mat5;
+mod matlab;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashSet;
+use std::fmt;
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::diagnostic::{Diagnostic, Source, suggestion};
+
+/// What kind of file it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Text with a comma, a semicolon or a tab between cells.
+    Csv,
+    /// MATLAB level 4, `save -v4`.
+    Mat4,
+    /// MATLAB level 5, `save -v6` or `save -v7`.
+    Mat5,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Csv => "CSV",
+            Self::Mat4 => "MATLAB level 4",
+            Self::Mat5 => "MATLAB level 5",
+        })
+    }
+}
+
+/// A numeric variable: a CSV column, or a MATLAB matrix.
+///
+/// A sample is a row: a MATLAB matrix that is wider than high (1 x n, 2 x n) is turned when it is read. Integers beyond
+/// 2^53 are rounded to the nearest `f64`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variable {
+    /// Name in the file, without the unit; `Y{2}` is the second element of the cell array `Y`.
+    pub name: String,
+    /// Unit as the header of a CSV file writes it in brackets.
+    pub unit: Option<String>,
+    /// Number of samples.
+    pub rows: usize,
+    /// Number of signals; 1 for CSV.
+    pub columns: usize,
+    /// The numbers column by column, `rows * columns` of them; NaN is a gap.
+    pub values: Vec<f64>,
+}
+
+/// A data file, read whole.
+#[derive(Debug, Clone)]
+pub struct DataFile {
+    /// Its path and, for CSV, its text without the byte order mark.
+    pub source: Arc<Source>,
+    /// What kind of file it is, found out from its content.
+    pub format: Format,
+    /// What is numeric, in the order of the file.
+    pub variables: Vec<Variable>,
+    /// What is not, as `name: reason`.
+    pub skipped: Vec<String>,
+    layout: csv::Layout,
+}
+
+/// One column of numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column<'a> {
+    /// The name it was asked for by.
+    pub name: String,
+    /// Unit as the file gives it.
+    pub unit: Option<&'a str>,
+    /// One value per sample, finite or NaN; NaN is a gap.
+    pub values: &'a [f64],
+}
+
+impl DataFile {
+    /// Reads the file at `path`; its format is told by its content, not by its extension.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is of another format, is damaged, or holds no numbers; for CSV also when a cell in
+    /// a column of numbers is neither a finite number nor a gap, when rows differ in length, or when names repeat.
+    pub fn read(path: &Path) -> Result<Self, Diagnostic> {
+        let name = path.display().to_string();
+        match fs::read(path) {
+            Ok(bytes) => Self::parse(&name, bytes),
+            Err(error) => {
+                let source = Arc::new(Source { name, text: String::new() });
+                let fact = format!("the data file cannot be read: {error}");
+                Err(Diagnostic::new(fact).with_help("check its path and its permissions").at(&source, 0..0))
+            }
+        }
+    }
+
+    /// Reads the content of a file; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Self::read`], but for the file itself.
+    pub fn parse(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
+        let name = name.to_owned();
+        let (format, read): (_, fn(&[u8]) -> _) = if mat5::recognises(&bytes) {
+            (Format::Mat5, mat5::read)
+        } else if mat4::recognises(&bytes) {
+            (Format::Mat4, mat4::read)
+        } else {
+            let source = text_source(name, bytes)?;
+            let (variables, skipped, layout) = csv::read(&source)?;
+            return Ok(Self { source, format: Format::Csv, variables, skipped, layout });
+        };
+        let source = Arc::new(Source { name, text: String::new() });
+        let (mut variables, skipped) = read(&bytes).map_err(|error| error.at(&source, 0..0))?.finish();
+        keep_last_of_each_name(&mut variables);
+        if variables.is_empty() {
+            let found = skipped.iter().take(5).map(String::as_str).collect::<Vec<_>>().join(", ");
+            let found = if found.is_empty() { "nothing".to_owned() } else { found };
+            return Err(Diagnostic::new(format!("the {format} file holds no matrix of numbers (found: {found})"))
+                .with_help("save real, full matrices as variables of their own")
+                .at(&source, 0..0));
+        }
+        Ok(Self { source, format, variables, skipped, layout: csv::Layout::default() })
+    }
+
+    /// The column called `name`: a vector by its name, column k (from 1) of a matrix as `Data:3`, an element of a cell
+    /// array as `Y{2}` and its column as `Y{2}:1`.
+    ///
+    /// # Errors
+    /// When there is no such column, or when it holds an infinite value. The message names the file and has no place,
+    /// so that whoever wrote the name can point at it.
+    pub fn column(&self, name: &str) -> Result<Column<'_>, Diagnostic> {
+        let (variable, k) = self.find(name).ok_or_else(|| self.unknown(name))?;
+        let Variable { unit, rows, values, .. } = &self.variables[variable];
+        let values = &values[k * rows..(k + 1) * rows];
+        if let Some(row) = values.iter().position(|value| value.is_infinite()) {
+            let fact = format!("column `{name}` of {} is infinite in row {}", self.source.name, row + 1);
+            return Err(Diagnostic::new(fact).with_help("make it NaN, which is a gap"));
+        }
+        Ok(Column { name: name.to_owned(), unit: unit.as_deref(), values })
+    }
+
+    /// Every name that [`Self::column`] accepts, in the order of the file.
+    pub fn column_names(&self) -> Vec<String> {
+        let names = |Variable { name, columns, .. }: &Variable| match columns {
+            1 => vec![name.clone()],
+            _ => (1..=*columns).map(|k| format!("{name}:{k}")).collect(),
+        };
+        self.variables.iter().flat_map(names).collect()
+    }
+
+    /// Bytes of a cell in the text of a CSV file, `row` from 0 as in [`Column::values`]; `0..0` for MATLAB files and
+    /// for what is not there.
+    pub fn span_of(&self, column: &str, row: usize) -> Range<usize> {
+        self.find(column).and_then(|(variable, _)| self.layout.span(&self.source.text, variable, row)).unwrap_or(0..0)
+    }
+
+    /// Index of the variable and of the column in it.
+    fn find(&self, name: &str) -> Option<(usize, usize)> {
+        let index_of = |name: &str| self.variables.iter().position(|variable| variable.name == name);
+        if let Some(variable) = index_of(name).filter(|&i| self.variables[i].columns == 1) {
+            return Some((variable, 0));
+        }
+        let (name, k) = name.rsplit_once(':')?;
+        let variable = index_of(name).filter(|&i| self.variables[i].columns > 1)?;
+        let k = k.parse::<usize>().ok()?.checked_sub(1)?;
+        (k < self.variables[variable].columns).then_some((variable, k))
+    }
+
+    fn unknown(&self, name: &str) -> Diagnostic {
+        let file = &self.source.name;
+        if let Some(Variable { rows, columns, .. }) = self.variables.iter().find(|variable| variable.name == name) {
+            return Diagnostic::new(format!("`{name}` of {file} is a matrix with {columns} columns of {rows} samples"))
+                .with_help(format!("write `{name}:1` to `{name}:{columns}`"));
+        }
+        let reason = self.skipped.iter().find_map(|entry| entry.strip_prefix(name)?.strip_prefix(": "));
+        if let Some(reason) = reason {
+            return Diagnostic::new(format!("`{name}` of {file} is not a column of numbers: {reason}"));
+        }
+        let names = self.column_names();
+        Diagnostic::new(format!("no column `{name}` in {file}"))
+            .with_help(suggestion(name, names.iter().map(String::as_str)))
+    }
+}
+
+/// MATLAB, too, lets the last of several variables with one name win.
+fn keep_last_of_each_name(variables: &mut Vec<Variable>) {
+    variables.reverse();
+    let mut seen = HashSet::new();
+    variables.retain(|variable| seen.insert(variable.name.clone()));
+    variables.reverse();
+}
+
+/// The file as text without its byte order mark, or why it is none.
+fn text_source(name: String, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
+    let source = |mut text: String| {
+        let mark = '\u{feff}';
+        if text.starts_with(mark) {
+            text.drain(..mark.len_utf8());
+        }
+        Arc::new(Source { name, text })
+    };
+    if matlab::is_level_7_3(&bytes) {
+        return Err(Diagnostic::new("the file is MATLAB level 7.3 (HDF5), which is not read")
+            .with_help("save it in MATLAB with `save -v7`")
+            .at(&source(String::new()), 0..0));
+    }
+    let utf16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
+    if !utf16 && bytes.contains(&0) {
+        return Err(Diagnostic::new("the file is neither CSV nor MATLAB level 4 or 5")
+            .with_help("save it as CSV, or in MATLAB with `save -v7`")
+            .at(&source(String::new()), 0..0));
+    }
+    let error = match String::from_utf8(bytes) {
+        Ok(text) => return Ok(source(text)),
+        Err(error) => error,
+    };
+    let unreadable = String::from_utf8_lossy(&error.as_bytes()[error.utf8_error().valid_up_to()..]);
+    let lossy = source(String::from_utf8_lossy(error.as_bytes()).into_owned());
+    let start = lossy.text.len() - unreadable.len();
+    Err(Diagnostic::new("the file is not UTF-8")
+        .with_label("from here on")
+        .with_help(if utf16 { "it looks like UTF-16: save it as UTF-8" } else { "save it as UTF-8" })
+        .at(&lossy, start..start + char::REPLACEMENT_CHARACTER.len_utf8()))
+}

@@ -1,0 +1,595 @@
+//! Reads what small independent writers wrote, and what they did not.
+
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use proptest::prelude::*;
+use proptest::sample::Index;
+use proptest::test_runner::RngSeed;
+
+use super::*;
+
+fn read(bytes: impl Into<Vec<u8>>) -> DataFile {
+    DataFile::parse("data", bytes.into()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The error as the user sees it, and the marked text.
+fn error(bytes: impl Into<Vec<u8>>) -> (String, String) {
+    let error = DataFile::parse("data", bytes.into()).expect_err("the file is wrong");
+    let (source, span) = error.place.clone().expect("an error in a file has a place");
+    (error.to_string(), source.text[span].to_owned())
+}
+
+fn values<'a>(file: &'a DataFile, column: &str) -> &'a [f64] {
+    file.column(column).unwrap_or_else(|error| panic!("{error}")).values
+}
+
+/// Bit by bit, since NaN is no number.
+fn assert_same(found: &[f64], expected: &[f64]) {
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(found), bits(expected), "{found:?} is not {expected:?}");
+}
+
+mod csv {
+    use super::*;
+
+    #[test]
+    fn header_gives_names_and_units() {
+        let file = read("t[s], u [N*m],\"th, m[rad]\",plain\n0,1,2,3\n0.5,-1e-3,+2,.5\n");
+        assert_eq!(file.format.to_string(), "CSV");
+        assert_eq!(file.column_names(), ["t", "u", "th, m", "plain"]);
+        let units: Vec<_> = file.column_names().iter().map(|name| file.column(name).unwrap().unit).collect();
+        assert_eq!(units, [Some("s"), Some("N*m"), Some("rad"), None]);
+        assert_same(values(&file, "u"), &[1.0, -1e-3]);
+        assert_same(values(&file, "plain"), &[3.0, 0.5]);
+    }
+
+    #[test]
+    fn separator_is_found_in_the_header() {
+        for text in ["a,b\n1.5,2\n", "a;b\n1.5;2\n", "a;b\n1,5;2\n", "a\tb\n1.5\t2\n", "a[N,m];b\n1,5;2\n"] {
+            let file = read(text);
+            assert_same(values(&file, "a"), &[1.5]);
+            assert_same(values(&file, "b"), &[2.0]);
+        }
+    }
+
+    #[test]
+    fn byte_order_mark_comments_blank_lines_and_crlf_are_tolerated() {
+        let file = read("\u{feff}# rig 2\r\n\r\n# t is time\r\nt,y\r\n0,1\r\n\r\n1,2\r\n\r\n");
+        assert_same(values(&file, "y"), &[1.0, 2.0]);
+        assert_eq!(&file.source.text[file.span_of("y", 1)], "2");
+    }
+
+    #[test]
+    fn columns_without_a_header_or_a_name_are_called_by_their_number() {
+        let file = read("0,1.5,\n1,2.5,3\n");
+        assert_eq!(file.column_names(), ["1", "2", "3"]);
+        assert_same(values(&file, "2"), &[1.5, 2.5]);
+        assert_eq!(read(",y,[m]\n0,1,2\n").column_names(), ["1", "y", "3"]);
+    }
+
+    #[test]
+    fn gaps_are_nan() {
+        let gap = f64::NAN;
+        let file = read("t,y\n0,\n1,NaN\n2,nan\n3,NA\n4, \n5,7\n");
+        assert_same(values(&file, "y"), &[gap, gap, gap, gap, gap, 7.0]);
+        assert_same(values(&read("y\n1\n\n\n4\r\n\r\n6\n\n"), "y"), &[1.0, gap, gap, 4.0, gap, 6.0]);
+        assert_same(values(&read("1\n\n3\n"), "1"), &[1.0, gap, 3.0]);
+    }
+
+    #[test]
+    fn column_of_text_is_skipped_with_a_reason() {
+        let file = read("t,how\n0,fast\n1,NA\n");
+        assert_eq!(file.skipped, ["how: text (`fast`)"]);
+        assert_eq!(file.column_names(), ["t"]);
+        let asked = file.column("how").unwrap_err().to_string();
+        assert_eq!(asked, "`how` of data is not a column of numbers: text (`fast`)");
+    }
+
+    #[test]
+    fn span_of_a_cell_is_its_bytes_in_the_text() {
+        let file = read("t,\"a,b\",why,y\n0,\"1\",\"x,\"\"y\",2\n\n3, 4 ,\"two\nlines\",5\n");
+        let cells: Vec<_> = [("t", 0), ("a,b", 0), ("y", 0), ("t", 1), ("a,b", 1), ("y", 1)]
+            .map(|(name, row)| &file.source.text[file.span_of(name, row)])
+            .to_vec();
+        assert_eq!(cells, ["0", "\"1\"", "2", "3", " 4 ", "5"]);
+        assert_eq!((file.span_of("y", 2), file.span_of("why", 0)), (0..0, 0..0));
+    }
+
+    #[test]
+    fn unknown_column_gets_the_nearest_name_or_all() {
+        let file = read("time,omega\n0,1\n");
+        let error = |name| file.column(name).unwrap_err().to_string();
+        assert_eq!(error("omgea"), "no column `omgea` in data; did you mean `omega`?");
+        assert_eq!(error("q"), "no column `q` in data; known: time, omega");
+    }
+
+    #[test]
+    fn every_mistake_is_told_with_its_place_and_the_way_out() {
+        let gap = "write a number such as 1.5e-3; a gap is an empty cell, NaN or NA";
+        let cells = "give every row as many cells, an empty one for a gap";
+        let comma = "give every row as many cells; numbers with a decimal comma need `;` between cells";
+        let cases = [
+            ("", "data: the data file is empty; write a header such as `t[s],u[N*m]` and rows of numbers below it", ""),
+            ("t,y\n", "data:1:1: the header has no rows below it; add a row of numbers for each sample", "t,y"),
+            ("t,y\n0,1\n1,x2\n", &format!("data:3:3: `x2` in column `y` is not a number; {gap}"), "x2"),
+            ("t,y\n0,inf\n1,2\n", &format!("data:2:3: `inf` in column `y` is not finite; {gap}"), "inf"),
+            ("t,y\n0,1e999\n", &format!("data:2:3: `1e999` in column `y` is not finite; {gap}"), "1e999"),
+            ("t;y\n0;1.234,5\n1;2", &format!("data:2:3: `1.234,5` in column `y` is not a number; {gap}"), "1.234,5"),
+            ("t,y\n0,1\n1\n", &format!("data:3:1: the row has 1 cell, the first line has 2; {cells}"), "1"),
+            ("t,y\n0,1,5\n", &format!("data:2:1: the row has 3 cells, the first line has 2; {comma}"), "0,1,5"),
+            (
+                "t[s],t[ms]\n0,1\n",
+                "data:1:6: two columns are called `t`: 1 and 2; rename one of them in the header",
+                "t[ms]",
+            ),
+            (
+                "t y\n0 1\n",
+                "data:1:1: no column of the file holds numbers; separate the cells by commas, semicolons or tabs",
+                "t y",
+            ),
+        ];
+        for (text, message, marked) in cases {
+            assert_eq!(error(text), (message.to_owned(), marked.to_owned()));
+        }
+    }
+
+    #[test]
+    fn other_encodings_are_told_with_their_place() {
+        let (message, marked) = error(b"\xef\xbb\xbft,\xef\xbf\xbd,w[\xb0]\n0,1,2\n");
+        assert_eq!(
+            (message.as_str(), marked.as_str()),
+            ("data:1:7: the file is not UTF-8; save it as UTF-8", "\u{fffd}")
+        );
+        let (message, _) = error(b"\xff\xfet\0,\0y\0\n\0");
+        assert_eq!(message, "data:1:1: the file is not UTF-8; it looks like UTF-16: save it as UTF-8");
+    }
+}
+
+mod files {
+    use super::*;
+
+    #[test]
+    fn file_is_read_whatever_its_extension_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        fs::write(&path, level4(false, "time", 0, 2, 1, &le(&[0.0, 1.0]))).unwrap();
+        let file = DataFile::read(&path).unwrap();
+        assert_eq!((file.format, file.source.name.as_str()), (Format::Mat4, path.to_str().unwrap()));
+    }
+
+    #[test]
+    fn missing_file_is_told_by_its_path() {
+        let error = DataFile::read(Path::new("no/such/file.csv")).unwrap_err().to_string();
+        assert!(error.starts_with("no/such/file.csv: the data file cannot be read: "), "{error}");
+    }
+
+    #[test]
+    fn level_7_3_is_refused_with_the_way_out() {
+        let mut file = vec![0; 512];
+        file[..19].copy_from_slice(b"MATLAB 7.3 MAT-file");
+        file[124..128].copy_from_slice(b"\x00\x02IM");
+        file.extend(b"\x89HDF\r\n\x1a\n");
+        let message = "data: the file is MATLAB level 7.3 (HDF5), which is not read; save it in MATLAB with `save -v7`";
+        assert_eq!(error(&file[512..]).0, message);
+        assert_eq!(error(file).0, message);
+    }
+
+    #[test]
+    fn other_binary_file_is_refused_with_the_way_out() {
+        let message =
+            "data: the file is neither CSV nor MATLAB level 4 or 5; save it as CSV, or in MATLAB with `save -v7`";
+        assert_eq!(error(b"PK\x03\x04\x14\0\x06\0\x08\0\0\0!\0").0, message);
+        assert_eq!(error([0; 10]).0, message);
+    }
+}
+
+fn le(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn be(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_be_bytes()).collect()
+}
+
+fn word(big_endian: bool, word: u32) -> [u8; 4] {
+    if big_endian { word.to_be_bytes() } else { word.to_le_bytes() }
+}
+
+/// A matrix of level 4; `code` is 10 P + T.
+fn level4(big_endian: bool, name: &str, code: u32, rows: u32, columns: u32, numbers: &[u8]) -> Vec<u8> {
+    let code = code + if big_endian { 1000 } else { 0 };
+    let header = [code, rows, columns, 0, name.len() as u32 + 1].map(|value| word(big_endian, value));
+    [header.concat().as_slice(), name.as_bytes(), &[0], numbers].concat()
+}
+
+mod mat4 {
+    use super::*;
+
+    #[test]
+    fn both_byte_orders_give_the_same_columns() {
+        let little = [
+            level4(false, "t", 0, 3, 1, &le(&[0.0, 0.5, 1.0])),
+            level4(false, "Data", 0, 2, 2, &le(&[1.0, 2.0, 3.0, f64::NAN])),
+        ];
+        let big = [
+            level4(true, "t", 0, 3, 1, &be(&[0.0, 0.5, 1.0])),
+            level4(true, "Data", 0, 2, 2, &be(&[1.0, 2.0, 3.0, f64::NAN])),
+        ];
+        for file in [little, big] {
+            let file = read(file.concat());
+            assert_eq!(file.format.to_string(), "MATLAB level 4");
+            assert_eq!(file.column_names(), ["t", "Data:1", "Data:2"]);
+            assert_same(values(&file, "t"), &[0.0, 0.5, 1.0]);
+            assert_same(values(&file, "Data:2"), &[3.0, f64::NAN]);
+            assert_eq!(file.span_of("t", 0), 0..0);
+        }
+    }
+
+    #[test]
+    fn every_kind_of_number_is_read() {
+        let file = [
+            level4(false, "single", 10, 1, 1, &(-1.5_f32).to_le_bytes()),
+            level4(false, "int32", 20, 1, 1, &(-70_000_i32).to_le_bytes()),
+            level4(true, "int16", 30, 1, 1, &(-300_i16).to_be_bytes()),
+            level4(true, "uint16", 40, 1, 1, &60_000_u16.to_be_bytes()),
+            level4(false, "uint8", 50, 1, 1, &[200]),
+        ];
+        let file = read(file.concat());
+        let found: Vec<f64> = file.variables.iter().map(|variable| variable.values[0]).collect();
+        assert_same(&found, &[-1.5, -70_000.0, -300.0, 60_000.0, 200.0]);
+    }
+
+    #[test]
+    fn what_is_not_a_full_real_matrix_is_skipped_with_its_reason() {
+        let mut complex = level4(false, "z", 0, 1, 1, &le(&[1.0, 2.0]));
+        complex[12] = 1;
+        let sparse = level4(false, "s", 2, 2, 3, &le(&[1.0; 6]));
+        let file = [level4(false, "note", 51, 1, 2, b"hi"), complex, sparse, level4(false, "none", 0, 0, 9, &[])];
+        let file = read([file.concat(), level4(false, "y", 0, 1, 1, &le(&[7.0]))].concat());
+        assert_eq!(file.skipped, ["note: text", "z: complex numbers", "s: a sparse matrix", "none: empty"]);
+        assert_eq!(file.column_names(), ["y"]);
+    }
+
+    #[test]
+    fn damaged_file_is_refused() {
+        let cut_off = |k| {
+            format!(
+                "data: the file ends inside variable {k}: it is cut off or damaged; copy it again, or save it again"
+            )
+        };
+        let good = level4(false, "y", 0, 2, 1, &le(&[7.0, 8.0]));
+        assert_eq!(error(&good[..good.len() - 1]).0, cut_off(1));
+        assert_eq!(error([&good[..], &good[..15]].concat()).0, cut_off(2));
+        let largest = i32::MAX as u32;
+        assert_eq!(error(level4(false, "y", 0, largest, largest, &[])).0, cut_off(1));
+        let (no_header, _) = error([&good[..], &[255; 20]].concat());
+        assert!(no_header.starts_with("data: variable 2 of the file has no MATLAB level 4 header"), "{no_header}");
+    }
+
+    #[test]
+    fn wide_matrix_is_turned() {
+        let file = read(level4(false, "Y", 0, 2, 3, &le(&[1.0, 10.0, 2.0, 20.0, 3.0, 30.0])));
+        assert_eq!((file.variables[0].rows, file.variables[0].columns), (3, 2));
+        assert_same(values(&file, "Y:1"), &[1.0, 2.0, 3.0]);
+        assert_same(values(&file, "Y:2"), &[10.0, 20.0, 30.0]);
+    }
+
+    #[test]
+    fn last_of_two_variables_with_one_name_wins() {
+        let file = read([level4(false, "y", 0, 1, 1, &le(&[1.0])), level4(false, "y", 0, 1, 1, &le(&[2.0]))].concat());
+        assert_eq!(file.column_names(), ["y"]);
+        assert_same(values(&file, "y"), &[2.0]);
+    }
+
+    #[test]
+    fn name_of_a_matrix_or_a_column_beyond_it_is_refused() {
+        let infinite = level4(false, "w", 0, 2, 1, &le(&[1.0, f64::INFINITY]));
+        let file = read([level4(false, "Data", 0, 2, 2, &le(&[1.0; 4])), infinite].concat());
+        let error = |name| file.column(name).unwrap_err().to_string();
+        assert_eq!(error("Data"), "`Data` of data is a matrix with 2 columns of 2 samples; write `Data:1` to `Data:2`");
+        assert_eq!(error("Data:3"), "no column `Data:3` in data; did you mean `Data:1`?");
+        assert_eq!(error("Data:0"), "no column `Data:0` in data; did you mean `Data:1`?");
+        assert_eq!(error("w"), "column `w` of data is infinite in row 2; make it NaN, which is a gap");
+    }
+}
+
+const DOUBLE: u32 = 6;
+const MATRIX: u32 = 14;
+
+fn level5(big_endian: bool, elements: &[Vec<u8>]) -> Vec<u8> {
+    let mut file = vec![b' '; 124];
+    file[..10].copy_from_slice(b"MATLAB 5.0");
+    file.extend(if big_endian { b"\x01\x00MI" } else { b"\x00\x01IM" });
+    file.extend(elements.concat());
+    file
+}
+
+fn element(big_endian: bool, kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut element = [word(big_endian, kind), word(big_endian, data.len() as u32)].concat();
+    element.extend(data);
+    element.resize(element.len().next_multiple_of(8), 0);
+    element
+}
+
+/// An array of a class with flags; `data` are its elements after the name.
+fn array(big_endian: bool, class: u32, sizes: &[u32], name: &str, data: &[u8]) -> Vec<u8> {
+    let flags = [word(big_endian, class), word(big_endian, 0)].concat();
+    let sizes: Vec<u8> = sizes.iter().flat_map(|size| word(big_endian, *size)).collect();
+    let parts = [
+        element(big_endian, 6, &flags),
+        element(big_endian, 5, &sizes),
+        element(big_endian, 1, name.as_bytes()),
+        data.to_vec(),
+    ];
+    element(big_endian, MATRIX, &parts.concat())
+}
+
+fn doubles(name: &str, rows: u32, columns: u32, values: &[f64]) -> Vec<u8> {
+    array(false, DOUBLE, &[rows, columns], name, &element(false, 9, &le(values)))
+}
+
+fn compressed(array: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(array).unwrap();
+    let data = encoder.finish().unwrap();
+    // N.B.: a compressed element is not padded.
+    [&word(false, 15)[..], &word(false, data.len() as u32), &data].concat()
+}
+
+fn cell(name: &str, cells: &[Vec<u8>]) -> Vec<u8> {
+    array(false, 1, &[1, cells.len() as u32], name, &cells.concat())
+}
+
+mod mat5 {
+    use super::*;
+
+    #[test]
+    fn plain_and_compressed_and_both_byte_orders_give_the_same_columns() {
+        let plain = doubles("y", 3, 1, &[1.0, -2.5, f64::NAN]);
+        let big = array(true, DOUBLE, &[3, 1], "y", &element(true, 9, &be(&[1.0, -2.5, f64::NAN])));
+        for file in [level5(false, &[compressed(&plain)]), level5(false, &[plain]), level5(true, &[big])] {
+            let file = read(file);
+            assert_eq!(file.format.to_string(), "MATLAB level 5");
+            assert_same(values(&file, "y"), &[1.0, -2.5, f64::NAN]);
+        }
+    }
+
+    #[test]
+    fn every_class_and_every_storage_is_read() {
+        let bytes = |bytes: &[u8]| bytes.to_vec();
+        let stored = [
+            (1, 8, bytes(&(-3_i8).to_le_bytes()), -3.0),
+            (2, 9, bytes(&[200]), 200.0),
+            (3, 10, bytes(&(-300_i16).to_le_bytes()), -300.0),
+            (4, 11, bytes(&60_000_u16.to_le_bytes()), 60_000.0),
+            (5, 12, bytes(&(-70_000_i32).to_le_bytes()), -70_000.0),
+            (6, 13, bytes(&4_000_000_000_u32.to_le_bytes()), 4e9),
+            (7, 7, bytes(&0.5_f32.to_le_bytes()), 0.5),
+            (9, DOUBLE, le(&[0.1]), 0.1),
+            (12, 14, bytes(&(-1_i64 << 40).to_le_bytes()), -2_f64.powi(40)),
+            (13, 15, bytes(&(1_u64 << 63).to_le_bytes()), 2_f64.powi(63)),
+            // MATLAB stores doubles as the smallest integers that hold them; a logical is a flagged uint8.
+            (2, DOUBLE, bytes(&[42]), 42.0),
+            (2, 0x0200 + 9, bytes(&[1]), 1.0),
+        ];
+        for (kind, class, data, expected) in stored {
+            let array = array(false, class, &[1, 1], "y", &element(false, kind, &data));
+            assert_same(values(&read(level5(false, &[array])), "y"), &[expected]);
+        }
+    }
+
+    #[test]
+    fn small_elements_are_read() {
+        for big_endian in [false, true] {
+            let small = |kind: u32, data: &[u8]| {
+                let data = [data, &[0; 4][data.len()..]].concat();
+                [&word(big_endian, (data.iter().filter(|byte| **byte != 0).count() as u32) << 16 | kind)[..], &data]
+                    .concat()
+            };
+            let flags = [word(big_endian, DOUBLE), word(big_endian, 0)].concat();
+            let sizes = [word(big_endian, 3), word(big_endian, 1)].concat();
+            let parts = [
+                element(big_endian, 6, &flags),
+                element(big_endian, 5, &sizes),
+                small(1, b"abc"),
+                small(2, &[7, 8, 9]),
+            ];
+            let file = read(level5(big_endian, &[element(big_endian, MATRIX, &parts.concat())]));
+            assert_same(values(&file, "abc"), &[7.0, 8.0, 9.0]);
+        }
+    }
+
+    #[test]
+    fn cells_are_variables_with_their_number_in_the_name() {
+        let inner = cell("", &[doubles("", 1, 1, &[5.0])]);
+        let text = array(false, 4, &[1, 1], "", &element(false, 4, &[65, 0]));
+        let swings = [
+            doubles("", 2, 1, &[1.0, 2.0]),
+            doubles("", 2, 2, &[1.0, 2.0, 3.0, 4.0]),
+            text,
+            element(false, MATRIX, &[]),
+            inner,
+        ];
+        let file = read(level5(false, &[compressed(&cell("Y_id", &swings))]));
+        assert_eq!(file.column_names(), ["Y_id{1}", "Y_id{2}:1", "Y_id{2}:2", "Y_id{5}{1}"]);
+        assert_eq!(file.skipped, ["Y_id{3}: text", "Y_id{4}: empty"]);
+        assert_same(values(&file, "Y_id{1}"), &[1.0, 2.0]);
+        assert_same(values(&file, "Y_id{2}:2"), &[3.0, 4.0]);
+        assert_same(values(&file, "Y_id{5}{1}"), &[5.0]);
+    }
+
+    #[test]
+    fn one_unreadable_variable_does_not_spoil_the_others() {
+        let named = |class, name| array(false, class, &[1, 1], name, &[]);
+        let opaque = [element(false, 6, &[17, 0, 0, 0, 0, 0, 0, 0]), element(false, 1, b"table")].concat();
+        let mut broken = compressed(&doubles("lost", 1, 1, &[1.0]));
+        let end = broken.len();
+        broken[end - 1] ^= 1;
+        let elements = [
+            named(2, "structure"),
+            named(3, "thing"),
+            named(4, "note"),
+            named(5, "sparse"),
+            named(0x0800 + DOUBLE, "complex"),
+            named(16, "function"),
+            element(false, MATRIX, &opaque),
+            named(99, "news"),
+            array(false, DOUBLE, &[1, 1, 2], "deep", &[]),
+            array(false, DOUBLE, &[2, 2], "short", &element(false, 9, &le(&[1.0]))),
+            array(false, DOUBLE, &[u32::MAX, u32::MAX], "vast", &element(false, 9, &le(&[1.0]))),
+            array(false, DOUBLE, &[1, 1], "kind", &element(false, 8, &le(&[1.0]))),
+            array(false, DOUBLE, &[0, 0], "none", &element(false, 9, &[])),
+            array(false, 1, &[1, 2], "cells", &doubles("", 1, 1, &[3.0])),
+            element(false, 77, &[0; 8]),
+            element(false, MATRIX, &[1, 2, 3]),
+            broken,
+            compressed(&[1, 2, 3]),
+            doubles("y", 1, 1, &[7.0]),
+        ];
+        let file = read(level5(false, &elements));
+        assert_eq!(file.column_names(), ["cells{1}", "y"]);
+        let expected = [
+            "structure: a struct",
+            "thing: an object",
+            "note: text",
+            "sparse: a sparse matrix",
+            "complex: complex numbers",
+            "function: a function",
+            "table: an object (table, string, datetime or the like)",
+            "news: an array of the unknown class 99",
+            "deep: an array with 3 dimensions",
+            "short: damaged",
+            "vast: damaged",
+            "kind: numbers of the unknown type 8",
+            "none: empty",
+            "cells: damaged from element 2 on",
+            "variable 15: an element of the unknown type 77",
+            "variable 16: damaged",
+            "variable 17: damaged, it cannot be decompressed (corrupt deflate stream)",
+            "variable 18: damaged",
+        ];
+        assert_eq!(file.skipped, expected);
+    }
+
+    #[test]
+    fn file_that_ends_too_early_is_refused() {
+        let file = level5(false, &[doubles("t", 1, 1, &[1.0]), compressed(&doubles("y", 3, 1, &[1.0, 2.0, 3.0]))]);
+        let cut_off = |k| {
+            format!(
+                "data: the file ends inside variable {k}: it is cut off or damaged; copy it again, or save it again"
+            )
+        };
+        assert_eq!(error(&file[..file.len() - 1]).0, cut_off(2));
+        assert_eq!(error(&file[..130]).0, cut_off(1));
+        assert_eq!(error("MATLAB 5.0 MAT-file, Platform").0, cut_off(1));
+        assert_eq!(read([file, vec![0; 13]].concat()).column_names(), ["t", "y"]);
+    }
+
+    #[test]
+    fn file_without_numbers_is_refused() {
+        let note = array(false, 4, &[1, 1], "note", &[]);
+        let found = |found: &str| {
+            let fact = "data: the MATLAB level 5 file holds no matrix of numbers";
+            format!("{fact} (found: {found}); save real, full matrices as variables of their own")
+        };
+        assert_eq!(error(level5(false, &[note])).0, found("note: text"));
+        assert_eq!(error(level5(false, &[])).0, found("nothing"));
+    }
+
+    #[test]
+    fn what_grows_beyond_the_budget_is_skipped() {
+        let file = level5(false, &[compressed(&doubles("large", 1000, 1, &[0.0; 1000])), doubles("y", 1, 1, &[7.0])]);
+        let reading = |budget| super::super::mat5::read_within(&file, budget).unwrap().finish();
+        assert_eq!(reading(20_000).0.len(), 2);
+        let (variables, skipped) = reading(10_000);
+        assert_eq!((variables.len(), skipped), (1, vec!["large: too large when it is read".to_owned()]));
+    }
+
+    #[test]
+    fn cells_nested_without_end_are_refused() {
+        let nested = (0..100).fold(doubles("", 1, 1, &[1.0]), |inner, _| cell("", &[inner]));
+        let file = read(level5(false, &[cell("c", &[nested]), doubles("y", 1, 1, &[7.0])]));
+        assert_eq!(file.column_names(), ["y"]);
+        assert!(file.skipped[0].ends_with("{1}{1}: cells nested deeper than 32"), "{:?}", file.skipped);
+    }
+}
+
+/// Reads and asks for everything; whatever comes is fine but a panic.
+fn exercise(bytes: Vec<u8>) {
+    match DataFile::parse("data", bytes) {
+        Err(error) => assert!(!error.to_string().is_empty()),
+        Ok(file) => {
+            for name in file.column_names() {
+                let Ok(column) = file.column(&name) else { continue };
+                for (row, value) in column.values.iter().enumerate() {
+                    let cell = &file.source.text[file.span_of(&name, row)];
+                    let number = cell.replace('"', "").trim().replace(',', ".").parse();
+                    assert!(value.is_nan() || number == Ok(*value) || file.format != Format::Csv, "{cell:?} {value}");
+                }
+            }
+        }
+    }
+}
+
+fn good_files() -> [Vec<u8>; 4] {
+    let wide = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let elements = [
+        doubles("t", 6, 1, &wide),
+        cell("Y", &[doubles("", 2, 3, &wide), cell("", &[doubles("", 3, 2, &wide)])]),
+        array(false, 9, &[2, 2], "b", &element(false, 2, &[1, 2, 3, 4])),
+    ];
+    [
+        b"\xef\xbb\xbf# rig\r\nt[s];\"u[N*m]\";how\r\n0;1,5;x\r\n1;;\"y\"\"z\"\r\n2;NaN;\n".to_vec(),
+        [level4(false, "t", 0, 2, 3, &le(&wide)), level4(true, "note", 51, 1, 2, b"hi")].concat(),
+        level5(false, &elements),
+        level5(false, &elements.each_ref().map(|array| compressed(array))),
+    ]
+}
+
+fn seeded() -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(seeded())]
+
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        exercise(bytes.clone());
+        exercise([level4(false, "t", 0, 1, 1, &le(&[1.0])), bytes.clone()].concat());
+        exercise(level5(false, std::slice::from_ref(&bytes)));
+        exercise(level5(true, &[element(true, MATRIX, &bytes)]));
+        exercise(level5(false, &[compressed(&element(false, MATRIX, &bytes))]));
+    }
+
+    #[test]
+    fn arbitrary_cells_are_found_where_they_stand(text in "[\",;\t\n\r a1#\u{b0}]{0,80}") {
+        exercise(text.clone().into_bytes());
+        exercise(format!("a,b\n1,1\n{text}").into_bytes());
+    }
+
+    #[test]
+    fn mutated_and_cut_files_never_panic(
+        changes in prop::collection::vec((any::<Index>(), prop_oneof![Just(0), Just(255), any::<u8>()]), 0..6),
+        end in any::<Index>(),
+    ) {
+        for mut file in good_files() {
+            for (place, byte) in &changes {
+                let place = place.index(file.len());
+                file[place] = *byte;
+            }
+            exercise(file.clone());
+            file.truncate(end.index(file.len()));
+            exercise(file);
+        }
+    }
+}
+
+#[test]
+fn unharmed_files_of_the_property_tests_are_read() {
+    let names = good_files().map(|file| read(file).column_names().join(" "));
+    let level5 = "t Y{1}:1 Y{1}:2 Y{2}{1}:1 Y{2}{1}:2 b:1 b:2";
+    assert_eq!(names, ["t u", "t:1 t:2", level5, level5]);
+}

@@ -1,0 +1,161 @@
+//! Inputs that drive a model, and measurements that it is compared with.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What an experiment is used for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Parameters are estimated from it.
+    #[default]
+    Calibration,
+    /// It helps to choose between models, but moves no parameter.
+    Selection,
+    /// It is reported only.
+    Validation,
+}
+
+/// How a sampled input acts between its samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Hold {
+    /// The value stays until the next sample.
+    #[default]
+    Zero,
+    /// Straight line from sample to sample.
+    First,
+}
+
+/// How an input of a model moves over time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Input {
+    /// The same value throughout.
+    Constant(f64),
+    /// `before` until `time` (s), `after` from then on.
+    Step {
+        /// When it steps, s.
+        time: f64,
+        /// Value before.
+        before: f64,
+        /// Value from `time` on.
+        after: f64,
+    },
+    /// `offset + amplitude sin(2 pi frequency t + phase)`.
+    Sine {
+        /// Amplitude, in the unit of the input.
+        amplitude: f64,
+        /// Frequency, Hz.
+        frequency: f64,
+        /// Phase, rad.
+        phase: f64,
+        /// Mean value.
+        offset: f64,
+    },
+    /// Recorded samples.
+    Sampled {
+        /// Times of the samples, s, increasing.
+        times: Vec<f64>,
+        /// The samples, in the unit of the input; all finite.
+        values: Vec<f64>,
+        /// What happens between them.
+        hold: Hold,
+    },
+}
+
+impl Input {
+    /// The value at time `t`, from the right where it jumps.
+    pub fn at(&self, t: f64) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Step { time, before, after } => {
+                if t >= *time {
+                    *after
+                } else {
+                    *before
+                }
+            }
+            Self::Sine { amplitude, frequency, phase, offset } => {
+                offset + amplitude * (std::f64::consts::TAU * frequency * t + phase).sin()
+            }
+            Self::Sampled { times, values, hold } => {
+                let after = times.partition_point(|&time| time <= t);
+                match (after, hold) {
+                    (0, _) => values[0],
+                    (k, Hold::First) if k < times.len() => {
+                        let s = (t - times[k - 1]) / (times[k] - times[k - 1]);
+                        values[k - 1] + s * (values[k] - values[k - 1])
+                    }
+                    (k, _) => values[k - 1],
+                }
+            }
+        }
+    }
+
+    /// The first time after `t` at which the value or its slope jumps; infinity if it never does again.
+    pub fn next_break(&self, t: f64) -> f64 {
+        match self {
+            Self::Constant(_) | Self::Sine { .. } => f64::INFINITY,
+            Self::Step { time, .. } => {
+                if *time > t {
+                    *time
+                } else {
+                    f64::INFINITY
+                }
+            }
+            Self::Sampled { times, .. } => {
+                times.get(times.partition_point(|&time| time <= t)).copied().unwrap_or(f64::INFINITY)
+            }
+        }
+    }
+}
+
+/// One measured signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// The model's signal that it measures.
+    pub signal: String,
+    /// Times of the samples, s, increasing; channels may differ.
+    pub times: Vec<f64>,
+    /// The samples, in the unit of the signal; gaps are left out.
+    pub values: Vec<f64>,
+    /// Standard deviation of the noise, in the unit of the signal, where it is known.
+    pub noise: Option<f64>,
+}
+
+/// A measurement: what was recorded, what it is used for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// The measured signals.
+    pub channels: Vec<Channel>,
+    /// What it is used for.
+    pub role: Role,
+}
+
+impl Experiment {
+    /// The channel that measures `signal`.
+    pub fn channel(&self, signal: &str) -> Option<&Channel> {
+        self.channels.iter().find(|channel| channel.signal == signal)
+    }
+
+    /// Time of the last sample of all channels, s.
+    pub fn end(&self) -> f64 {
+        self.channels.iter().filter_map(|c| c.times.last().copied()).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_are_continuous_from_the_right_and_name_their_next_jump() {
+        let step = Input::Step { time: 1.0, before: 0.0, after: 2.0 };
+        assert_eq!((step.at(0.999), step.at(1.0)), (0.0, 2.0));
+        assert_eq!((step.next_break(0.0), step.next_break(1.0)), (1.0, f64::INFINITY));
+        let sampled = |hold| Input::Sampled { times: vec![0.0, 1.0, 2.0], values: vec![0.0, 4.0, 6.0], hold };
+        assert_eq!((sampled(Hold::Zero).at(0.5), sampled(Hold::First).at(0.5)), (0.0, 2.0));
+        assert_eq!((sampled(Hold::Zero).at(1.0), sampled(Hold::First).at(5.0)), (4.0, 6.0));
+        assert_eq!(sampled(Hold::Zero).next_break(0.0), 1.0);
+    }
+}

@@ -1,0 +1,218 @@
+//! Experiments of a study file: from the columns of a data file to channels and inputs.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::sections::{ChannelTable, ExperimentSection, InputTable};
+use super::tree::Node;
+use super::{Files, read_seconds, read_unit};
+use crate::data::{Column, DataFile};
+use crate::diagnostic::{Diagnostic, Source};
+use crate::experiment::Input;
+use crate::study::{CaseDraft, ChannelDraft, Free, Measured};
+use crate::unit::{Quantity, Unit};
+
+/// Reads an experiment and its data file.
+pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<CaseDraft, Diagnostic> {
+    let section: ExperimentSection = node.read()?;
+    let file = open(node, &section.file, files)?;
+    let table = Table::new(node, &section, &file)?;
+
+    let mut channels = Vec::new();
+    for (signal, channel) in &section.channels.0 {
+        let place = entry(node, "channels", signal);
+        channels.push(table.channel(&place, signal, &channel.0)?);
+    }
+    let mut inputs = Vec::new();
+    for (input, column) in &section.inputs.0 {
+        let place = entry(node, "inputs", input);
+        let (values, unit) = table.input(&place, &column.0)?;
+        inputs.push((input.clone(), values, unit));
+    }
+    let free = section.free.0.into_iter().map(|(state, given)| Free {
+        state,
+        start: given.start,
+        min: given.min,
+        max: given.max,
+    });
+    Ok(CaseDraft {
+        name,
+        parameters: section.parameters.0,
+        inputs,
+        horizon: None,
+        measured: Some(Measured { channels, role: section.role, free: free.collect() }),
+    })
+}
+
+fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
+    node.child(table).and_then(|table| table.child(key)).expect("it was just read")
+}
+
+fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diagnostic> {
+    let bytes = files.read(path).map_err(|error| {
+        let why = match error.kind() {
+            std::io::ErrorKind::NotFound => format!("no data file `{}`", files.show(path)),
+            _ => format!("the data file `{}` cannot be read: {error}", files.show(path)),
+        };
+        let place = node.child("file").expect("it was just read");
+        place.diagnostic(why).with_help("paths count from the folder of the study file")
+    })?;
+    DataFile::parse(&files.show(path), bytes)
+}
+
+/// The part of a data file that an experiment uses, with its time.
+struct Table<'f> {
+    file: &'f DataFile,
+    /// Name of the time column.
+    time: String,
+    /// Times of the rows used, s, as the study counts them.
+    times: Vec<f64>,
+    /// Rows used.
+    rows: Range<usize>,
+}
+
+impl<'f> Table<'f> {
+    fn new(node: &Node<'_>, section: &ExperimentSection, file: &'f DataFile) -> Result<Self, Diagnostic> {
+        let place = node.child("time").unwrap_or_else(|| node.child("file").expect("it was just read"));
+        let time = match &section.time {
+            Some(time) => time.clone(),
+            None => guess_time(file).ok_or_else(|| {
+                place
+                    .diagnostic("no column of the file is called `t` or `time`".to_owned())
+                    .with_help(format!("say which: time = \"...\"; the file has {}", file.column_names().join(", ")))
+            })?,
+        };
+        let column = column_at(&place, file, &time)?;
+        let unit = match (&section.time_unit, column.unit) {
+            (Some(unit), _) => read_unit(node, "time-unit", unit)?,
+            (None, Some(unit)) => read_unit(node, "time", unit)?,
+            (None, None) => Unit::known("s"),
+        };
+        let factor = unit.factor_to(&Unit::known("s")).ok_or_else(|| {
+            place
+                .diagnostic(format!("the time column is in `{unit}`, which is not a time"))
+                .with_help("give `time-unit`")
+        })?;
+        let times: Vec<f64> = column.values.iter().map(|t| t * factor).collect();
+        check_times(file, &time, &times)?;
+
+        let from = read_seconds(node, "from", section.from.as_ref())?.unwrap_or(f64::NEG_INFINITY);
+        let to = read_seconds(node, "to", section.to.as_ref())?.unwrap_or(f64::INFINITY);
+        let first = times.partition_point(|&t| t < from).max(section.skip);
+        let last = times.partition_point(|&t| t <= to);
+        if first + 2 > last {
+            let seen = format!("the file runs from {} to {} s", times[0], times[times.len() - 1]);
+            return Err(node
+                .key_diagnostic(format!("{} samples are left of the file", last.saturating_sub(first)))
+                .with_help(format!("{seen}; widen `from`, `to` and `skip`")));
+        }
+        let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
+        let times = times[first..last].iter().map(|t| t - origin).collect();
+        Ok(Self { file, time, times, rows: first..last })
+    }
+
+    fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelDraft, Diagnostic> {
+        let (values, unit) =
+            self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+        Ok(ChannelDraft {
+            signal: signal.to_owned(),
+            times: self.times.clone(),
+            values,
+            unit,
+            noise: table.noise.clone(),
+        })
+    }
+
+    fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>), Diagnostic> {
+        let (values, unit) =
+            self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+        if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
+            return Err(self
+                .at(&table.column, self.rows.start + gap)
+                .unwrap_or_else(|| place.diagnostic(String::new()))
+                .with_message(format!("input column `{}` has a gap at {} s", table.column, self.times[gap]))
+                .with_help("an input must be known throughout: fill the gap, or cut it off with `from` and `to`"));
+        }
+        Ok((Input::Sampled { times: self.times.clone(), values, hold: table.hold }, unit))
+    }
+
+    fn values(
+        &self,
+        place: &Node<'_>,
+        name: &str,
+        unit: Option<&str>,
+        scale: Option<f64>,
+        offset: Option<&Quantity>,
+    ) -> Result<(Vec<f64>, Option<Unit>), Diagnostic> {
+        let at = place.child("column").unwrap_or_else(|| place.clone());
+        let column = column_at(&at, self.file, name)?;
+        let time_rows = self.file.column(&self.time)?.values.len();
+        if column.values.len() != time_rows {
+            return Err(at.diagnostic(format!(
+                "`{name}` has {} rows, the time `{}` has {time_rows}",
+                column.values.len(),
+                self.time
+            )));
+        }
+        let unit = match (unit, column.unit) {
+            (Some(unit), _) => Some(read_unit(place, "unit", unit)?),
+            (None, Some(unit)) => Some(read_unit(place, "column", unit)?),
+            (None, None) => None,
+        };
+        let scale = scale.unwrap_or(1.0);
+        let offset = match (offset, &unit) {
+            (None, _) => 0.0,
+            (Some(q), Some(unit)) => {
+                q.to(unit).map_err(|e| place.child("offset").unwrap_or_else(|| place.clone()).diagnostic(e))?
+            }
+            (Some(q), None) => q.number,
+        };
+        Ok((column.values[self.rows.clone()].iter().map(|v| scale * v + offset).collect(), unit))
+    }
+
+    fn at(&self, column: &str, row: usize) -> Option<Diagnostic> {
+        let span = self.file.span_of(column, row);
+        (!span.is_empty()).then(|| Diagnostic::new("").at(&self.file.source, span))
+    }
+}
+
+impl Diagnostic {
+    fn with_message(mut self, message: String) -> Self {
+        self.message = message;
+        self
+    }
+}
+
+/// A column that is called `t` or `time`, in any case.
+fn guess_time(file: &DataFile) -> Option<String> {
+    file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"))
+}
+
+/// A column, with the study's place where the file does not have it.
+fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Column<'f>, Diagnostic> {
+    file.column(name).map_err(|error| {
+        let located = place.diagnostic(error.message);
+        Diagnostic { help: error.help, ..located }
+    })
+}
+
+fn check_times(file: &DataFile, column: &str, times: &[f64]) -> Result<(), Diagnostic> {
+    let wrong = |row: usize, message: String| {
+        let source: &Arc<Source> = &file.source;
+        Diagnostic::new(message)
+            .with_help(
+                "each row must be later than the one before; cut the file with `from`, `to` or `skip`, or sort it",
+            )
+            .at(source, file.span_of(column, row))
+    };
+    if let Some(row) = times.iter().position(|t| !t.is_finite()) {
+        return Err(wrong(row, format!("the time `{column}` has a gap in row {}", row + 1)));
+    }
+    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        Some(row) => Err(wrong(
+            row + 1,
+            format!("time does not increase: {} s follows {} s in row {}", times[row + 1], times[row], row + 2),
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,228 @@
+//! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
+//! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
+
+mod experiment;
+mod schema;
+mod sections;
+mod tree;
+
+use std::io;
+use std::sync::Arc;
+
+pub use schema::{describe, schema_of, study_schema};
+
+use crate::catalogue::{Catalogue, SolverChoice};
+use crate::criterion::Usage;
+use crate::diagnostic::{Diagnostic, Source, suggestion};
+use crate::study::{CaseDraft, CriterionDraft, Draft, ModelDraft, Study, TunerDraft};
+use crate::unit::{Quantity, Unit};
+use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
+use tree::{Node, Text};
+
+/// Where data files come from: a folder, or the program itself.
+pub trait Files {
+    /// The bytes of a file, by its path as the study names it.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    fn read(&self, path: &str) -> io::Result<Vec<u8>>;
+
+    /// The path as it is shown to the user.
+    fn show(&self, path: &str) -> String;
+}
+
+/// A study file, read and checked.
+pub struct StudyFile {
+    /// The study.
+    pub study: Study,
+    /// The solver it names, or the first of the catalogue.
+    pub solver: SolverChoice,
+    /// Largest number of points evaluated, where the study limits it.
+    pub max_evaluations: Option<usize>,
+    /// Its text, with the settings of the command line at the end.
+    pub source: Arc<Source>,
+}
+
+/// Reads a study file; `settings` are `key=value` pairs that go over it.
+///
+/// # Errors
+/// The first mistake: with file, line and column, the fact and the way out.
+pub fn read(
+    catalogue: &Catalogue,
+    name: &str,
+    text: &str,
+    settings: &[String],
+    files: &dyn Files,
+) -> Result<StudyFile, Diagnostic> {
+    let text = Text::new(name, text, settings);
+    let root = text.parse()?;
+    root.check_keys(&["study", "models", "tuners", "cases", "experiments", "criteria", "solver"])?;
+    let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
+
+    let mut draft = Draft {
+        name: study.name,
+        task: study.task,
+        objective: study.objective,
+        seed: study.seed.unwrap_or(1),
+        ..Draft::default()
+    };
+    for (name, node) in root.table("models")? {
+        draft.models.push((name, read_model(catalogue, &node)?));
+    }
+    for (name, node) in root.table("tuners")? {
+        draft.tuners.push((name, read_tuner(&node)?));
+    }
+    for (name, node) in root.table("cases")? {
+        draft.cases.push(read_case(name, &node)?);
+    }
+    for (name, node) in root.table("experiments")? {
+        if draft.cases.iter().any(|case| case.name == name) {
+            return Err(node.key_diagnostic(format!("a case and an experiment are both called `{name}`")));
+        }
+        draft.cases.push(experiment::read(name, &node, files)?);
+    }
+    for (name, node) in root.table("criteria")? {
+        draft.criteria.push((name, read_criterion(catalogue, &node)?));
+    }
+    let (solver, max_evaluations) = read_solver(catalogue, &root)?;
+    let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
+    Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()) })
+}
+
+/// The one key of a table that is not among the common ones, as a kind of the catalogue.
+fn kind<'t, 'k, K>(
+    node: &Node<'t>,
+    common: &[&'static str],
+    known: &'k [K],
+    name_of: impl Fn(&K) -> &'static str,
+    what: &str,
+) -> Result<(&'k K, Node<'t>), Diagnostic> {
+    let mut found = None;
+    for (key, value) in node.entries()? {
+        if common.contains(&key.as_str()) {
+            continue;
+        }
+        let Some(kind) = known.iter().find(|k| name_of(k) == key) else {
+            let names: Vec<&str> = known.iter().map(&name_of).chain(common.iter().copied()).collect();
+            let help = suggestion(&key, names.iter().copied());
+            return Err(value
+                .key_diagnostic(format!("`{key}` is neither a kind of {what} nor an option"))
+                .with_help(help));
+        };
+        if found.is_some() {
+            return Err(value
+                .key_diagnostic(format!("a {what} is of one kind, but two are named"))
+                .with_help("remove one"));
+        }
+        found = Some((kind, value));
+    }
+    found.ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(name_of).collect();
+        node.key_diagnostic(format!("the {what} has no kind")).with_help(format!("name one of: {}", names.join(", ")))
+    })
+}
+
+fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diagnostic> {
+    let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
+    let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
+    let model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
+    Ok(ModelDraft { model, parameters: common.parameters.0 })
+}
+
+fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
+    let section: TunerSection = node.read()?;
+    Ok(TunerDraft {
+        unit: section.unit.as_deref().map(|unit| read_unit(node, "unit", unit)).transpose()?,
+        start: section.start,
+        min: section.min,
+        max: section.max,
+        scale: section.scale,
+        integer: section.integer,
+        values: section.values,
+        inactive: section.active == Some(false),
+        tie: section.tie,
+        per_case: section.per_case,
+    })
+}
+
+fn read_unit(node: &Node<'_>, key: &str, text: &str) -> Result<Unit, Diagnostic> {
+    Unit::parse(text).map_err(|why| {
+        node.child(key).map_or_else(|| node.diagnostic(why.clone()), |n| n.diagnostic(why.clone())).with_help(
+            "units are products of powers, such as \"kg m2\" or \"N m s/rad\"; write angles in rad or deg, times in s",
+        )
+    })
+}
+
+fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
+    let options: CaseOptions = node.only(CaseOptions::KEYS).read()?;
+    let mut parameters = Vec::new();
+    for (key, value) in node.entries()? {
+        if !CaseOptions::KEYS.contains(&key.as_str()) {
+            parameters.push((key, value.read::<Quantity>()?));
+        }
+    }
+    let horizon = read_seconds(node, "horizon", options.horizon.as_ref())?;
+    let inputs = options.inputs.0.into_iter().map(|(name, input)| (name, input.into(), None)).collect();
+    Ok(CaseDraft { name, parameters, inputs, horizon, measured: None })
+}
+
+fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
+    let second = Unit::known("s");
+    quantity
+        .map(|q| {
+            q.to(&second).map_err(|why| {
+                node.child(key).map_or_else(|| node.diagnostic(why.clone()), |n| n.diagnostic(why.clone()))
+            })
+        })
+        .transpose()
+}
+
+fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionDraft, Diagnostic> {
+    let (kind, options) = kind(node, CriterionCommon::KEYS, &catalogue.criteria, |k| k.name, "criterion")?;
+    let common: CriterionCommon = node.only(CriterionCommon::KEYS).read()?;
+    let criterion = options.read_with(&(kind.schema)(), kind.read)?;
+    Ok(CriterionDraft {
+        criterion: Box::new(Located { inner: criterion, kind: kind.name }),
+        model: common.model,
+        cases: common.cases,
+        usage: common.usage.unwrap_or(Usage::Minimise),
+        demand: common.demand,
+        good: common.good,
+        bad: common.bad,
+        weight: common.weight.unwrap_or(1.0),
+    })
+}
+
+/// A criterion of a study file: its mistakes stand under the name of its kind.
+struct Located {
+    inner: Box<dyn crate::criterion::CriterionSpec>,
+    kind: &'static str,
+}
+
+impl crate::criterion::CriterionSpec for Located {
+    fn bind(
+        &self,
+        signals: &[crate::model::Variable],
+    ) -> Result<Box<dyn crate::criterion::Criterion>, crate::study::Mistake> {
+        self.inner.bind(signals).map_err(|mistake| mistake.within(self.kind))
+    }
+
+    fn needs_measurement(&self) -> Option<&str> {
+        self.inner.needs_measurement()
+    }
+}
+
+fn read_solver(catalogue: &Catalogue, root: &Node<'_>) -> Result<(SolverChoice, Option<usize>), Diagnostic> {
+    let default = || catalogue.solvers.first().expect("a catalogue has a solver").default_choice();
+    let Some(node) = root.child("solver") else { return Ok((default(), None)) };
+    let common: SolverCommon = node.only(SolverCommon::KEYS).read()?;
+    if common.max_evaluations == Some(0) {
+        let place = node.child("max-evaluations").expect("it was read");
+        return Err(place.diagnostic("a run needs at least one evaluation".to_owned()));
+    }
+    if node.entries()?.iter().all(|(key, _)| SolverCommon::KEYS.contains(&key.as_str())) {
+        return Ok((default(), common.max_evaluations));
+    }
+    let (kind, options) = kind(&node, SolverCommon::KEYS, &catalogue.solvers, |k| k.name, "solver")?;
+    Ok((options.read_with(&(kind.schema)(), kind.read)?, common.max_evaluations))
+}

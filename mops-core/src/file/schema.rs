@@ -1,0 +1,181 @@
+//! The JSON schema of study files, made from the types that read them, and the manual pages made from it.
+
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema};
+use serde_json::{Map, Value, json};
+
+use super::sections::{
+    CaseOptions, CriterionCommon, Entries, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
+};
+use crate::catalogue::Catalogue;
+use crate::unit::Quantity;
+
+/// The schema of a type, complete in itself.
+pub fn schema_of<T: JsonSchema>() -> Schema {
+    let mut settings = SchemaSettings::draft07();
+    settings.inline_subschemas = true;
+    settings.meta_schema = None;
+    settings.into_generator().into_root_schema_for::<T>()
+}
+
+/// The schema of a whole study file, for editors.
+pub fn study_schema(catalogue: &Catalogue) -> Value {
+    let kinds = |list: Vec<(&str, Schema)>| -> Map<String, Value> {
+        list.into_iter().map(|(name, schema)| (name.to_owned(), schema.to_value())).collect()
+    };
+    let models = kinds(catalogue.models.iter().map(|k| (k.name, (k.schema)())).collect());
+    let criteria = kinds(catalogue.criteria.iter().map(|k| (k.name, (k.schema)())).collect());
+    let solvers = kinds(catalogue.solvers.iter().map(|k| (k.name, (k.schema)())).collect());
+    let value = |schema: Schema| schema.to_value();
+    let mut case = value(schema_of::<CaseOptions>());
+    case["additionalProperties"] = value(schema_of::<Quantity>());
+    json!({
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "mops study",
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["study", "models", "criteria"],
+        "properties": {
+            "study": value(schema_of::<StudySection>()),
+            "models": named(one_kind(value(schema_of::<ModelCommon>()), models, true)),
+            "tuners": value(schema_of::<Entries<TunerSection>>()),
+            "cases": named(case),
+            "experiments": value(schema_of::<Entries<ExperimentSection>>()),
+            "criteria": named(one_kind(value(schema_of::<CriterionCommon>()), criteria, true)),
+            "solver": one_kind(value(schema_of::<SolverCommon>()), solvers, false),
+        },
+    })
+}
+
+/// A table with any names, each of the given schema.
+fn named(schema: Value) -> Value {
+    json!({ "type": "object", "additionalProperties": schema })
+}
+
+/// The common keys and exactly one kind (at most one where it may be absent).
+fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Value {
+    if must_be {
+        common["oneOf"] = kinds.keys().map(|name| json!({ "required": [name] })).collect();
+    }
+    if !common["properties"].is_object() {
+        common["properties"] = json!({});
+    }
+    common["properties"].as_object_mut().expect("just made").extend(kinds);
+    common
+}
+
+/// What may stand under a table's keys.
+pub(super) enum Keys<'s> {
+    /// Any key, all of one schema.
+    Any(&'s Value),
+    /// These keys.
+    Known(Vec<(&'s String, &'s Value)>),
+}
+
+impl<'s> Keys<'s> {
+    pub fn get(&self, key: &str) -> Option<&'s Value> {
+        match self {
+            Self::Any(schema) => Some(schema),
+            Self::Known(known) => known.iter().find(|(name, _)| *name == key).map(|(_, schema)| *schema),
+        }
+    }
+
+    pub fn names(&self) -> Vec<&'s str> {
+        match self {
+            Self::Any(_) => Vec::new(),
+            Self::Known(known) => known.iter().map(|(name, _)| name.as_str()).collect(),
+        }
+    }
+}
+
+/// The keys that a schema allows; `None` if it allows no table, or anything.
+pub(super) fn keys_of(schema: &Value) -> Option<Keys<'_>> {
+    if let Some(Value::Object(any)) = schema.get("additionalProperties").filter(|s| s.is_object()) {
+        let _ = any;
+        return Some(Keys::Any(&schema["additionalProperties"]));
+    }
+    let mut known: Vec<(&String, &Value)> = Vec::new();
+    if let Some(properties) = schema.get("properties").and_then(Value::as_object) {
+        known.extend(properties);
+    }
+    for choice in ["anyOf", "oneOf", "allOf"] {
+        for alternative in schema.get(choice).and_then(Value::as_array).into_iter().flatten() {
+            match keys_of(alternative) {
+                Some(Keys::Any(schema)) => return Some(Keys::Any(schema)),
+                Some(Keys::Known(more)) => known.extend(more),
+                None => {}
+            }
+        }
+    }
+    let closed = schema.get("additionalProperties") == Some(&Value::Bool(false));
+    (closed || !known.is_empty()).then_some(Keys::Known(known))
+}
+
+/// The documentation of a key, on one line.
+pub(super) fn documentation(schema: &Value, key: &str) -> Option<String> {
+    let text = keys_of(schema)?.get(key)?.get("description")?.as_str()?.replace('\n', " ");
+    Some(text.trim_end_matches('.').to_owned())
+}
+
+/// A kind's page in the manual, from its schema: what it is, then its options.
+pub fn describe(name: &str, schema: &Schema) -> String {
+    let schema = schema.as_value();
+    let mut page = format!("{name}\n\n");
+    if let Some(about) = schema.get("description").and_then(Value::as_str) {
+        page += about;
+        page += "\n\n";
+    }
+    page += "Options:\n";
+    let count = options(&mut page, schema, 1);
+    if count == 0 {
+        page += "  none\n";
+    }
+    page
+}
+
+fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
+    let Some(Keys::Known(known)) = keys_of(schema) else { return 0 };
+    let required: Vec<&str> =
+        schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
+    for (key, option) in &known {
+        let indent = "  ".repeat(depth);
+        let default = option.get("default").filter(|d| !d.is_null()).map(|d| format!(", default {d}"));
+        let need = if required.contains(&key.as_str()) { ", required".to_owned() } else { default.unwrap_or_default() };
+        *page += &format!("{indent}{key} ({}{need})\n", type_name(option));
+        let about = option.get("description").and_then(Value::as_str).unwrap_or_default();
+        for line in about.lines() {
+            *page += &format!("{indent}    {line}\n");
+        }
+        options(page, option, depth + 2);
+    }
+    known.len()
+}
+
+fn type_name(schema: &Value) -> String {
+    if let Some(values) = schema.get("enum").and_then(Value::as_array) {
+        return values.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(" | ");
+    }
+    if let Some(value) = schema.get("const").and_then(Value::as_str) {
+        return value.to_owned();
+    }
+    for choice in ["anyOf", "oneOf"] {
+        if let Some(alternatives) = schema.get(choice).and_then(Value::as_array) {
+            let mut names: Vec<String> = alternatives.iter().map(type_name).filter(|n| n != "null").collect();
+            names.dedup();
+            return names.join(" | ");
+        }
+    }
+    match schema.get("type") {
+        Some(Value::String(name)) if name == "array" => {
+            format!("list of {}", schema.get("items").map_or_else(|| "anything".into(), type_name))
+        }
+        Some(Value::String(name)) if name == "object" => "table".to_owned(),
+        Some(Value::String(name)) => name.clone(),
+        Some(Value::Array(names)) => {
+            let names: Vec<&str> = names.iter().filter_map(Value::as_str).filter(|n| *n != "null").collect();
+            // A quantity is a number, or a text with a unit.
+            if names == ["number", "string"] { "quantity".to_owned() } else { names.join(" | ") }
+        }
+        _ => "table".to_owned(),
+    }
+}

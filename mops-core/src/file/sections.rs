@@ -1,0 +1,377 @@
+//! What may stand in the tables of a study file. The documentation of each key is what `mops schema` gives to editors.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+
+use crate::criterion::Usage;
+use crate::experiment::{Hold, Input, Role};
+use crate::study::{Objective, Task};
+use crate::tuner::Scale;
+use crate::unit::Quantity;
+
+/// What the study is.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct StudySection {
+    /// Name, as it stands in reports.
+    pub name: String,
+    /// What it is for: `design` (the default) or `calibration`.
+    #[serde(default)]
+    pub task: Task,
+    /// How scaled values are combined: `max` (of a design) or `sum` (of a calibration).
+    pub objective: Option<Objective>,
+    /// Seed of all random numbers; 1 where absent.
+    pub seed: Option<u64>,
+}
+
+/// What every model may have beside its kind.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ModelCommon {
+    /// Values of parameters that neither a tuner nor a case sets.
+    #[serde(default)]
+    pub parameters: Entries<Quantity>,
+}
+
+impl ModelCommon {
+    pub const KEYS: &[&str] = &["parameters"];
+}
+
+/// A quantity that a solver may change; its name is that of a model's parameter.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct TunerSection {
+    /// Value at the start.
+    pub start: Option<Quantity>,
+    /// Smallest value.
+    pub min: Option<Quantity>,
+    /// Largest value.
+    pub max: Option<Quantity>,
+    /// Unit of the values; the parameter's where absent.
+    pub unit: Option<String>,
+    /// How the range is spread: `linear` or `log`.
+    #[serde(default)]
+    pub scale: Scale,
+    /// Whole numbers only.
+    #[serde(default)]
+    pub integer: bool,
+    /// These values only.
+    pub values: Option<Vec<Quantity>>,
+    /// `false` keeps the tuner at its start value.
+    pub active: Option<bool>,
+    /// Expression of tuners that stand before this one, such as `"4*Td"`; the tuner follows it.
+    pub tie: Option<String>,
+    /// One value for every case or experiment instead of one for the study.
+    #[serde(default)]
+    pub per_case: bool,
+}
+
+/// What a case may have beside values of parameters.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct CaseOptions {
+    /// What drives the model's inputs; an input that is not named is 0.
+    #[serde(default)]
+    pub inputs: Entries<InputSection>,
+    /// End of the simulation.
+    pub horizon: Option<Quantity>,
+}
+
+impl CaseOptions {
+    pub const KEYS: &[&str] = &["inputs", "horizon"];
+}
+
+/// How an input moves.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) enum InputSection {
+    /// The same value throughout.
+    Constant(f64),
+    /// A step.
+    Step {
+        /// When, s.
+        #[serde(default)]
+        time: f64,
+        /// Value before.
+        #[serde(default)]
+        before: f64,
+        /// Value from then on.
+        after: f64,
+    },
+    /// `offset + amplitude sin(2 pi frequency t + phase)`.
+    Sine {
+        /// Amplitude.
+        amplitude: f64,
+        /// Frequency, Hz.
+        frequency: f64,
+        /// Phase, rad.
+        #[serde(default)]
+        phase: f64,
+        /// Mean value.
+        #[serde(default)]
+        offset: f64,
+    },
+}
+
+impl From<InputSection> for Input {
+    fn from(section: InputSection) -> Self {
+        match section {
+            InputSection::Constant(value) => Self::Constant(value),
+            InputSection::Step { time, before, after } => Self::Step { time, before, after },
+            InputSection::Sine { amplitude, frequency, phase, offset } => {
+                Self::Sine { amplitude, frequency, phase, offset }
+            }
+        }
+    }
+}
+
+/// A measurement.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ExperimentSection {
+    /// Data file: CSV, or MATLAB level 4 or 5; its path from the study's folder.
+    pub file: String,
+    /// Column of the time; its unit is the header's, else s.
+    pub time: Option<String>,
+    /// Unit of the time column, where its header does not say.
+    pub time_unit: Option<String>,
+    /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
+    #[serde(default)]
+    pub channels: Entries<ChannelSection>,
+    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`.
+    #[serde(default)]
+    pub inputs: Entries<InputColumn>,
+    /// What it is used for: `calibration` (the default), `selection` or `validation`.
+    #[serde(default)]
+    pub role: Role,
+    /// States whose start values are estimated: `["phi", "theta"]`, or a table with `start`, `min`, `max` for each.
+    #[serde(default)]
+    pub free: FreeSection,
+    /// Values of parameters that hold in this experiment.
+    #[serde(default)]
+    pub parameters: Entries<Quantity>,
+    /// Time in the file from which it is used.
+    pub from: Option<Quantity>,
+    /// Time in the file up to which it is used.
+    pub to: Option<Quantity>,
+    /// Number of samples dropped at the start of the file; sensors often begin with a wrong one.
+    #[serde(default)]
+    pub skip: usize,
+    /// `false` keeps the times of the file; otherwise the first sample used is at time 0.
+    pub reset_time: Option<bool>,
+}
+
+/// Where a measured signal stands in the file, and what makes it the model's.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ChannelTable {
+    /// Column of the file.
+    pub column: String,
+    /// Unit of the column; the header's, else the signal's, where absent.
+    pub unit: Option<String>,
+    /// Factor that the column is multiplied by, such as -1 for a sensor mounted the other way round.
+    pub scale: Option<f64>,
+    /// What is added after scaling, in the column's unit.
+    pub offset: Option<Quantity>,
+    /// Standard deviation of the noise; residuals are weighted by it.
+    pub noise: Option<Quantity>,
+}
+
+/// Where a recorded input stands in the file.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct InputTable {
+    /// Column of the file.
+    pub column: String,
+    /// Unit of the column; the header's, else the input's, where absent.
+    pub unit: Option<String>,
+    /// Factor that the column is multiplied by.
+    pub scale: Option<f64>,
+    /// What is added after scaling, in the column's unit.
+    pub offset: Option<Quantity>,
+    /// How it acts between samples: `zero` (the default: it stays) or `first` (straight lines).
+    #[serde(default)]
+    pub hold: Hold,
+}
+
+/// A state whose start value is estimated; what is absent is read off the data.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct FreeTable {
+    /// First guess.
+    pub start: Option<Quantity>,
+    /// Smallest value.
+    pub min: Option<Quantity>,
+    /// Largest value.
+    pub max: Option<Quantity>,
+}
+
+/// What every criterion may have beside its kind.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct CriterionCommon {
+    /// The model it reads; needed where there are several.
+    pub model: Option<String>,
+    /// The cases it is evaluated in; all where absent.
+    pub cases: Option<Vec<String>>,
+    /// `minimise` (the default), `inequality`, `equality` or `monitor`.
+    pub usage: Option<Usage>,
+    /// The value to reach: the criterion is divided by it. Must be positive.
+    pub demand: Option<Quantity>,
+    /// Value that scales to 0, where a demand does not fit; goes with `bad`.
+    pub good: Option<Quantity>,
+    /// Value that scales to 1, where a demand does not fit; goes with `good`.
+    pub bad: Option<Quantity>,
+    /// Weight of its scaled value in the objective; 1 where absent.
+    pub weight: Option<f64>,
+}
+
+impl CriterionCommon {
+    pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight"];
+}
+
+/// What every solver may have beside its kind.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct SolverCommon {
+    /// Largest number of points that are evaluated.
+    pub max_evaluations: Option<usize>,
+}
+
+impl SolverCommon {
+    pub const KEYS: &[&str] = &["max-evaluations"];
+}
+
+/// A table with any keys, in the order of the file.
+#[derive(Debug)]
+pub(super) struct Entries<T>(pub Vec<(String, T)>);
+
+impl<T> Default for Entries<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for InOrder<T> {
+            type Value = Entries<T>;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table")
+            }
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Entries<T>, M::Error> {
+                let mut entries = Vec::new();
+                while let Some(entry) = map.next_entry()? {
+                    entries.push(entry);
+                }
+                Ok(Entries(entries))
+            }
+        }
+        deserializer.deserialize_map(InOrder(PhantomData))
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Entries<T> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("EntriesOf{}", T::schema_name()).into()
+    }
+    fn inline_schema() -> bool {
+        true
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "object", "additionalProperties": generator.subschema_for::<T>() })
+    }
+}
+
+/// A text, or a table: `"column"` is short for `{ column = "column" }`.
+macro_rules! column_or_table {
+    ($name:ident, $table:ident, $short:expr) => {
+        #[derive(Debug)]
+        pub(super) struct $name(pub $table);
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Either;
+                impl<'de> Visitor<'de> for Either {
+                    type Value = $name;
+                    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                        f.write_str("the name of a column, or a table with `column`")
+                    }
+                    fn visit_str<E>(self, column: &str) -> Result<$name, E> {
+                        let make: fn(String) -> $table = $short;
+                        Ok($name(make(column.to_owned())))
+                    }
+                    fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<$name, M::Error> {
+                        $table::deserialize(serde::de::value::MapAccessDeserializer::new(map)).map($name)
+                    }
+                }
+                deserializer.deserialize_any(Either)
+            }
+        }
+
+        impl JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+            fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "anyOf": [{ "type": "string" }, generator.subschema_for::<$table>()] })
+            }
+        }
+    };
+}
+
+column_or_table!(ChannelSection, ChannelTable, |column| ChannelTable {
+    column,
+    unit: None,
+    scale: None,
+    offset: None,
+    noise: None
+});
+column_or_table!(InputColumn, InputTable, |column| InputTable {
+    column,
+    unit: None,
+    scale: None,
+    offset: None,
+    hold: Hold::Zero
+});
+
+/// Free start values: a list of states, or a table.
+#[derive(Debug, Default)]
+pub(super) struct FreeSection(pub Vec<(String, FreeTable)>);
+
+impl<'de> Deserialize<'de> for FreeSection {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = FreeSection;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list of states, or a table with `start`, `min`, `max` for each")
+            }
+            fn visit_seq<S: serde::de::SeqAccess<'de>>(self, mut list: S) -> Result<FreeSection, S::Error> {
+                let mut states = Vec::new();
+                while let Some(state) = list.next_element::<String>()? {
+                    states.push((state, FreeTable::default()));
+                }
+                Ok(FreeSection(states))
+            }
+            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<FreeSection, M::Error> {
+                Entries::deserialize(serde::de::value::MapAccessDeserializer::new(map)).map(|e| FreeSection(e.0))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+impl JsonSchema for FreeSection {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "FreeSection".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let table = generator.subschema_for::<Entries<FreeTable>>();
+        json_schema!({ "anyOf": [{ "type": "array", "items": { "type": "string" } }, table] })
+    }
+}

@@ -1,0 +1,53 @@
+//! Vocabulary and machinery of mops: tuner, criterion, demand, usage, case, experiment, study, the min-max problem, run.
+//!
+//! This crate knows no concrete criterion, model or solver; they come in through a [`Catalogue`].
+
+mod case;
+mod catalogue;
+mod conclude;
+mod criterion;
+pub mod data;
+mod diagnostic;
+mod differences;
+mod experiment;
+mod expression;
+pub mod file;
+mod model;
+mod outcome;
+mod problem;
+mod random;
+mod run;
+mod scalar;
+mod solver;
+mod study;
+mod trace;
+mod tuner;
+mod unit;
+
+pub use case::Case;
+pub use catalogue::{
+    Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, Shipped, SolverChoice, SolverKind,
+    SolverOptions,
+};
+pub use conclude::{Ending, conclude};
+pub use criterion::{Criterion, CriterionSpec, Demand, Usage, Value};
+pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
+pub use experiment::{Channel, Experiment, Hold, Input, Role};
+pub use expression::{Expression, SyntaxError};
+pub use model::{Analysis, Event, Failure, Interface, Job, Model, Parameter, Response, State, Variable, Work};
+pub use outcome::{
+    CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,
+    Pareto, StartReport, TunerReport, criterion_reports,
+};
+pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
+pub use random::{Stream, stream};
+pub use run::{Budget, Record, Run, State as RunState, Watch};
+pub use scalar::{Dual, Scalar};
+pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
+pub use study::{
+    CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, JobPlan, Measured, Mistake, ModelDraft, Objective,
+    ParameterSource, Row, Study, Task, TunerDraft,
+};
+pub use trace::{Piece, Trace};
+pub use tuner::{Grid, Scale, Tuner};
+pub use unit::{Quantity, Unit};

@@ -1,0 +1,213 @@
+//! What a model is: signals, parameters, states, inputs, and the analysis that criteria read.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::case::Case;
+use crate::trace::Trace;
+use crate::unit::Unit;
+
+/// A named quantity of a model: a signal it offers, a parameter it takes, or an input that drives it.
+#[derive(Debug, Clone)]
+pub struct Variable {
+    /// Name, as it stands in study files.
+    pub name: String,
+    /// Unit in which the model computes.
+    pub unit: Unit,
+    /// What it is, in one line.
+    pub about: String,
+}
+
+impl Variable {
+    /// A variable whose unit is written in the program.
+    ///
+    /// # Panics
+    /// If `unit` is not a unit.
+    pub fn new(name: impl Into<String>, unit: &str, about: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: Unit::known(unit), about: about.into() }
+    }
+}
+
+/// A parameter of a model.
+#[derive(Debug, Clone)]
+pub struct Parameter {
+    /// Name, unit and meaning.
+    pub variable: Variable,
+    /// Value where the study gives none; without it the study must give one.
+    pub default: Option<f64>,
+    /// Smallest and largest meaningful value.
+    pub range: [f64; 2],
+}
+
+impl Parameter {
+    /// A parameter that may take any value.
+    pub fn new(name: impl Into<String>, unit: &str, about: impl Into<String>) -> Self {
+        Self { variable: Variable::new(name, unit, about), default: None, range: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// Gives it a value where the study does not.
+    #[must_use]
+    pub fn with_default(mut self, value: f64) -> Self {
+        self.default = Some(value);
+        self
+    }
+
+    /// Restricts it to values from `low` to `high`.
+    #[must_use]
+    pub fn within(mut self, low: f64, high: f64) -> Self {
+        self.range = [low, high];
+        self
+    }
+}
+
+/// A state whose start value an experiment may leave free.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Name of the state.
+    pub name: String,
+    /// Name of the parameter that is its start value.
+    pub start: String,
+    /// The signal that shows it, if one does.
+    pub signal: Option<String>,
+    /// The signal of which it is the rate of change, if it is one.
+    pub rate_of: Option<String>,
+}
+
+/// What a model offers and takes; fixed once it is built.
+#[derive(Debug, Clone, Default)]
+pub struct Interface {
+    /// What criteria can read.
+    pub signals: Vec<Variable>,
+    /// What tuners, cases and the study can set.
+    pub parameters: Vec<Parameter>,
+    /// States with a start value.
+    pub states: Vec<State>,
+    /// What experiments and cases can drive; 0 where nothing does.
+    pub inputs: Vec<Variable>,
+    /// End of the simulation, s, where no experiment gives one.
+    pub horizon: Option<f64>,
+}
+
+/// What one analysis is asked for.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// The case: inputs and, in an identification, what was measured.
+    pub case: &'a Case,
+    /// Values of the model's parameters, in the order of [`Interface::parameters`].
+    pub parameters: &'a [f64],
+    /// Signals that are wanted, as indices into [`Interface::signals`].
+    pub signals: &'a [usize],
+    /// End of the simulation, s.
+    pub horizon: f64,
+}
+
+/// A model: turns parameters and a case into something criteria can read.
+///
+/// An analysis is a pure function of the job: no state, no clock, no random numbers.
+pub trait Model: Send + Sync {
+    /// What it offers and takes.
+    fn interface(&self) -> &Interface;
+
+    /// Analyses one case.
+    ///
+    /// # Errors
+    /// A [`Failure`] is a value that loses against every success; it is counted and reported, and ends nothing.
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure>;
+}
+
+/// What an analysis gives.
+#[derive(Debug, Clone)]
+pub enum Analysis {
+    /// A simulation.
+    Time(Response),
+}
+
+impl Analysis {
+    /// The trace of a signal.
+    ///
+    /// # Panics
+    /// If the signal was not asked for: names are checked when the study is built.
+    pub fn trace(&self, signal: &str) -> &Trace {
+        let Self::Time(response) = self;
+        response.trace(signal).expect("signals are checked when the study is built")
+    }
+}
+
+/// A simulated response: a trace for every signal that was asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Response {
+    /// Names and traces.
+    pub traces: Vec<(String, Trace)>,
+    /// Discrete events on the way (a joint stuck, a limit reached), in order of time.
+    pub events: Vec<Event>,
+    /// Work done.
+    pub work: Work,
+}
+
+impl Response {
+    /// The trace of a signal, if it was asked for.
+    pub fn trace(&self, signal: &str) -> Option<&Trace> {
+        self.traces.iter().find(|(name, _)| name == signal).map(|(_, trace)| trace)
+    }
+}
+
+/// A discrete event of a simulation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// When, s.
+    pub time: f64,
+    /// What happened, such as `arm sticks`.
+    pub what: String,
+}
+
+/// What a simulation cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Steps accepted.
+    pub steps: usize,
+    /// Steps rejected by the error control.
+    pub rejected: usize,
+    /// Evaluations of the right-hand side.
+    pub derivatives: usize,
+}
+
+/// Why an analysis gave nothing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Failure {
+    /// A state or a derivative stopped being finite at this time, s.
+    Diverged(f64),
+    /// The limit on steps was reached at this time, s.
+    StepLimit(f64),
+    /// The step size became too small for the clock at this time, s: the equations are stiff or singular there.
+    StepTooSmall(f64),
+    /// Parameter values for which the model is not defined.
+    Undefined(String),
+    /// A criterion has no value for this response.
+    Criterion(String),
+}
+
+impl Failure {
+    /// The kind alone, to count failures by.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Diverged(_) => "diverged",
+            Self::StepLimit(_) => "step limit",
+            Self::StepTooSmall(_) => "step too small",
+            Self::Undefined(_) => "model undefined",
+            Self::Criterion(_) => "criterion undefined",
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Diverged(t) => write!(f, "diverged at {t:.4} s"),
+            Self::StepLimit(t) => write!(f, "took too many steps, the last at {t:.4} s"),
+            Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
+            Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
+        }
+    }
+}

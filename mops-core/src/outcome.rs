@@ -1,0 +1,262 @@
+//! What a run leaves behind: the content of `result.json`. Numbers that are not finite are written as null.
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::criterion::Usage;
+use crate::experiment::Role;
+use crate::problem::{Evaluation, FEASIBLE};
+use crate::solver::Stop;
+use crate::study::{Study, Task};
+
+/// Whether the result can be improved in one criterion without loss in another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pareto {
+    /// To first order no direction improves one criterion and worsens none.
+    CertifiedLocal,
+    /// Nothing was shown.
+    NotShown,
+    /// A direction that improves is known.
+    No,
+}
+
+/// The result of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// Version of this format.
+    pub format: u32,
+    /// Version of the program.
+    pub mops: &'static str,
+    /// Name of the study.
+    pub study: String,
+    /// What it is for.
+    pub task: Task,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Kind of the solver.
+    pub solver: String,
+    /// Why the run stopped.
+    pub stop: Stop,
+    /// Points evaluated.
+    pub evaluations: usize,
+    /// Models run.
+    pub simulations: usize,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+    /// Whether every constraint holds.
+    pub feasible: bool,
+    /// The largest weighted scaled value among those minimised.
+    pub worst_scaled: f64,
+    /// What was minimised: the worst scaled value of a design, the sum of a calibration.
+    pub objective: f64,
+    /// The largest violation of a constraint, in scaled values.
+    pub violation: f64,
+    /// Whether one criterion can be improved at no cost.
+    pub pareto: Pareto,
+    /// The tuners at the best point.
+    pub tuners: Vec<TunerReport>,
+    /// The criteria at the best point.
+    pub criteria: Vec<CriterionReport>,
+    /// The same at the start values.
+    pub start: StartReport,
+    /// Points of the front; of a single design, the design itself.
+    pub front: Vec<Value>,
+    /// Of a calibration: estimates and errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationReport>,
+    /// What failed on the way.
+    pub failures: Vec<FailureReport>,
+    /// What a reader should know.
+    pub warnings: Vec<String>,
+}
+
+/// A tuner of a result.
+#[derive(Debug, Clone, Serialize)]
+pub struct TunerReport {
+    /// Name.
+    pub name: String,
+    /// Value at the best point.
+    pub value: f64,
+    /// Value at the start.
+    pub start: f64,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+    /// Unit of all of these.
+    pub unit: String,
+    /// `lower` or `upper` where the value is at that bound.
+    pub at_bound: Option<&'static str>,
+    /// Whether the solver could change it.
+    pub active: bool,
+}
+
+/// A criterion of a result, in one case.
+#[derive(Debug, Clone, Serialize)]
+pub struct CriterionReport {
+    /// Name.
+    pub name: String,
+    /// The model it reads.
+    pub model: String,
+    /// The case.
+    pub case: String,
+    /// What the study does with it.
+    pub usage: Usage,
+    /// The demand; null where `good` and `bad` stand for it.
+    pub demand: Option<f64>,
+    /// Value that scales to 0, where given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub good: Option<f64>,
+    /// Value that scales to 1, where given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bad: Option<f64>,
+    /// The value.
+    pub value: f64,
+    /// By its demand.
+    pub scaled: f64,
+    /// Unit of the value.
+    pub unit: String,
+    /// Whether the demand is met.
+    pub met: bool,
+    /// What a reader must know of the value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<&'static str>,
+}
+
+/// The result at the start values.
+#[derive(Debug, Clone, Serialize)]
+pub struct StartReport {
+    /// Whether every constraint holds.
+    pub feasible: bool,
+    /// The largest weighted scaled value among those minimised.
+    pub worst_scaled: f64,
+    /// The criteria.
+    pub criteria: Vec<CriterionReport>,
+}
+
+/// What a calibration gives beside its tuners.
+#[derive(Debug, Clone, Serialize)]
+pub struct CalibrationReport {
+    /// Estimates, with what the data tell of their uncertainty.
+    pub parameters: Vec<ParameterReport>,
+    /// How well each experiment is met.
+    pub experiments: Vec<ExperimentReport>,
+}
+
+/// An estimated parameter.
+#[derive(Debug, Clone, Serialize)]
+pub struct ParameterReport {
+    /// Name.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard error to first order, for white residuals; null where the data do not tell.
+    pub std_error: f64,
+    /// Estimate +- 1.96 standard errors.
+    pub interval95: [f64; 2],
+    /// Unit of all of these.
+    pub unit: String,
+}
+
+/// How well an experiment is met.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExperimentReport {
+    /// Name.
+    pub name: String,
+    /// What it is used for.
+    pub role: Role,
+    /// Its channels.
+    pub channels: Vec<ChannelReport>,
+}
+
+/// How well a channel is met.
+#[derive(Debug, Clone, Serialize)]
+pub struct ChannelReport {
+    /// The measured signal.
+    pub name: String,
+    /// Root of the mean square of measured - simulated.
+    pub rmse: f64,
+    /// Standard deviation of the noise, where known.
+    pub noise: Option<f64>,
+    /// `100 (1 - |y - yhat| / |y - mean y|)`.
+    pub fit_percent: f64,
+    /// Unit of error and noise.
+    pub unit: String,
+}
+
+/// Simulations that failed.
+#[derive(Debug, Clone, Serialize)]
+pub struct FailureReport {
+    /// The model.
+    pub model: String,
+    /// The case.
+    pub case: String,
+    /// Why.
+    pub failure: String,
+    /// How often.
+    pub count: usize,
+}
+
+/// The tuners of an evaluation, beside their start values.
+pub(crate) fn tuners(study: &Study, at: &Evaluation) -> Vec<TunerReport> {
+    let start = study.start();
+    let report = |(i, tuner): (usize, &crate::tuner::Tuner)| TunerReport {
+        name: tuner.name.clone(),
+        value: at.tuners[i],
+        start: start[i],
+        bounds: tuner.bounds,
+        unit: tuner.unit.to_string(),
+        at_bound: if tuner.active { tuner.at_bound(at.tuners[i]) } else { None },
+        active: tuner.active,
+    };
+    study.tuners.iter().enumerate().map(report).collect()
+}
+
+/// The criteria of an evaluation.
+pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport> {
+    let report = |(row, reading): (&crate::study::Row, &Option<crate::problem::Reading>)| {
+        let plan = &study.jobs[row.job];
+        let scaled = reading.map_or(f64::NAN, |r| r.scaled);
+        let pair = row.demand.good != 0.0;
+        CriterionReport {
+            name: row.name.clone(),
+            model: study.models[plan.model].0.clone(),
+            case: study.cases[plan.case].name.clone(),
+            usage: row.usage,
+            demand: (!pair).then_some(row.demand.bad),
+            good: pair.then_some(row.demand.good),
+            bad: pair.then_some(row.demand.bad),
+            value: reading.map_or(f64::NAN, |r| r.value),
+            scaled,
+            unit: row.unit.to_string(),
+            met: match row.usage {
+                Usage::Equality => (scaled - 1.0).abs() <= FEASIBLE,
+                _ => scaled <= 1.0 + FEASIBLE,
+            },
+            note: reading.and_then(|r| r.note),
+        }
+    };
+    study.rows.iter().zip(&at.readings).map(report).collect()
+}
+
+/// The largest weighted scaled value among the rows minimised in calibration cases; NaN if one has none.
+pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
+    let counts =
+        |row: &&crate::study::Row| row.usage == Usage::Minimise && study.case_of(row).role() == Role::Calibration;
+    let rows = study.rows.iter().zip(&at.readings).filter(|(row, _)| counts(row));
+    rows.map(|(row, reading)| reading.map_or(f64::NAN, |r| row.weight * r.scaled))
+        .reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) })
+        .unwrap_or(0.0)
+}
+
+/// A point of a front: its tuners and its criteria.
+pub(crate) fn front_point(study: &Study, at: &Evaluation) -> Value {
+    let tuners: Map<String, Value> =
+        study.tuners.iter().zip(&at.tuners).map(|(t, &v)| (t.name.clone(), json!(v))).collect();
+    let criteria: Map<String, Value> = study
+        .rows
+        .iter()
+        .zip(&at.readings)
+        .map(|(row, reading)| (study.key(row), json!(reading.map(|r| r.value))))
+        .collect();
+    json!({ "tuners": tuners, "criteria": criteria })
+}

@@ -1,0 +1,300 @@
+//! The weighted min-max problem over the unit box that a study poses.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::criterion::{Usage, Value};
+use crate::experiment::Role;
+use crate::model::{Analysis, Failure, Job};
+use crate::solver::Shape;
+use crate::study::{Objective, Row, Study};
+
+/// Constraints count as satisfied up to this much of their scaled value.
+pub const FEASIBLE: f64 = 1e-6;
+
+/// A study as solvers see it: active tuners as coordinates of the unit box, criteria as rows of scaled values.
+#[derive(Clone)]
+pub struct Problem {
+    study: Arc<Study>,
+    /// Active tuners, by index.
+    active: Vec<usize>,
+    /// Values of the tuners that are not active.
+    base: Vec<f64>,
+    shape: Shape,
+    /// Jobs that are run.
+    jobs: Vec<usize>,
+}
+
+/// What a point is worth.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    /// The point of the unit box.
+    pub point: Vec<f64>,
+    /// Values of all tuners of the study.
+    pub tuners: Vec<f64>,
+    /// A reading per row of the study; `None` where its simulation failed or was not run.
+    pub readings: Vec<Option<Reading>>,
+    /// Scaled values of all rows, 0 for those that are only watched; `None` if a row that counts has no value.
+    pub scaled: Option<Vec<f64>>,
+    /// Weighted residuals whose sum of squares is the objective; empty if it is no sum of squares.
+    pub residuals: Vec<f64>,
+    /// What failed: index of the job, and why.
+    pub failures: Vec<(usize, Failure)>,
+    /// What it is worth.
+    pub merit: Merit,
+}
+
+/// The value of a criterion in a case.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// In the criterion's unit.
+    pub value: f64,
+    /// By its demand.
+    pub scaled: f64,
+    /// What a reader must know of it.
+    pub note: Option<&'static str>,
+}
+
+/// What a point is worth; [`Merit::is_better_than`] orders points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Merit {
+    /// The largest violation of a constraint, in scaled values; infinite for a failed point.
+    pub violation: f64,
+    /// The objective; infinite for a failed point.
+    pub objective: f64,
+}
+
+impl Merit {
+    /// A point without a value: worse than every other.
+    pub const FAILED: Self = Self { violation: f64::INFINITY, objective: f64::INFINITY };
+
+    /// Whether every constraint holds to within [`FEASIBLE`].
+    pub fn is_feasible(&self) -> bool {
+        self.violation <= FEASIBLE
+    }
+
+    /// Feasible points by their objective, before all others by their violation; failed points last.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        match (self.is_feasible(), other.is_feasible()) {
+            (true, true) => self.objective < other.objective,
+            (feasible, other_feasible) if feasible != other_feasible => feasible,
+            _ => (self.violation, self.objective) < (other.violation, other.objective),
+        }
+    }
+}
+
+impl Problem {
+    /// The problem of the study itself: tuners of the study and of its calibration cases; the other cases are watched.
+    pub fn new(study: Arc<Study>) -> Self {
+        let base = study.start();
+        let counts = |case: Option<usize>| case.is_none_or(|c| study.cases[c].role() == Role::Calibration);
+        let active =
+            (0..study.tuners.len()).filter(|&i| study.tuners[i].active && counts(study.tuners[i].case)).collect();
+        Self::with(study, active, base, |row, study| {
+            if study.case_of(row).role() == Role::Calibration { row.usage } else { Usage::Monitor }
+        })
+    }
+
+    /// The problem of one case alone: the tuners of that case are active, all others keep the values in `tuners`. This
+    /// is how start values are estimated again on data that must move no parameter.
+    pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
+        let active = (0..study.tuners.len()).filter(|&i| study.tuners[i].case == Some(case)).collect();
+        let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
+            if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
+        });
+        problem.jobs.retain(|&job| problem.study.jobs[job].case == case);
+        problem
+    }
+
+    fn with(study: Arc<Study>, active: Vec<usize>, base: Vec<f64>, usage: impl Fn(&Row, &Study) -> Usage) -> Self {
+        let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, &study), row.weight)).collect();
+        let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
+        let jobs = (0..study.jobs.len()).collect();
+        let shape = Shape { spacing, rows, objective: study.objective, residuals: 0 };
+        let mut problem = Self { study, active, base, shape, jobs };
+        problem.shape.residuals = problem.count_residuals();
+        problem
+    }
+
+    /// Length of the residual vector, from one evaluation: a criterion knows it only once it has seen its data.
+    fn count_residuals(&self) -> usize {
+        if self.shape.objective != Objective::Sum {
+            return 0;
+        }
+        self.evaluate(&self.start()).residuals.len()
+    }
+
+    /// The study.
+    pub fn study(&self) -> &Arc<Study> {
+        &self.study
+    }
+
+    /// Sizes and kinds.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Active tuners, as indices into the study's.
+    pub fn active(&self) -> &[usize] {
+        &self.active
+    }
+
+    /// The start values as a point of the unit box.
+    pub fn start(&self) -> Vec<f64> {
+        self.point_of(&self.base)
+    }
+
+    /// The point of the unit box at which the active tuners have the given values.
+    pub fn point_of(&self, tuners: &[f64]) -> Vec<f64> {
+        self.active.iter().map(|&i| self.study.tuners[i].position_of(tuners[i])).collect()
+    }
+
+    /// Values of all tuners at a point of the unit box.
+    pub fn tuners_at(&self, point: &[f64]) -> Vec<f64> {
+        let mut values = self.base.clone();
+        for (&i, &u) in self.active.iter().zip(point) {
+            values[i] = self.study.tuners[i].value_at(u);
+        }
+        self.study.apply_ties(&mut values);
+        values
+    }
+
+    /// Evaluates a point of the unit box; its simulations run in parallel.
+    pub fn evaluate(&self, point: &[f64]) -> Evaluation {
+        self.evaluate_tuners(point.to_vec(), self.tuners_at(point))
+    }
+
+    /// Evaluates given values of all tuners, which need not lie within their bounds.
+    pub fn evaluate_at(&self, tuners: &[f64]) -> Evaluation {
+        self.evaluate_tuners(self.point_of(tuners), tuners.to_vec())
+    }
+
+    /// Number of simulations that one evaluation takes.
+    pub fn simulations(&self) -> usize {
+        self.jobs.len()
+    }
+
+    /// The analysis of one job with every signal, to look at; `horizon` in s where another is wanted.
+    ///
+    /// # Errors
+    /// The failure of the simulation.
+    pub fn analyse_all(&self, job: usize, tuners: &[f64], horizon: Option<f64>) -> Result<Analysis, Failure> {
+        let plan = &self.study.jobs[job];
+        let model = &self.study.models[plan.model].1;
+        let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
+        model.analyse(&Job {
+            case: &self.study.cases[plan.case],
+            parameters: &self.study.parameters(plan, tuners),
+            signals: &signals,
+            horizon: horizon.unwrap_or(plan.horizon),
+        })
+    }
+
+    fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>) -> Evaluation {
+        let study = &self.study;
+        let values: Vec<Result<Vec<(usize, Value)>, Failure>> =
+            self.jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
+        let mut readings = vec![None; study.rows.len()];
+        let mut residuals = vec![Vec::new(); study.rows.len()];
+        let mut failures = Vec::new();
+        for (&job, result) in self.jobs.iter().zip(values) {
+            match result {
+                Ok(values) => {
+                    for (row, value) in values {
+                        let scaled = study.rows[row].demand.scale(value.number);
+                        readings[row] = Some(Reading { value: value.number, scaled, note: value.note });
+                        residuals[row] = value.residuals;
+                    }
+                }
+                Err(failure) => failures.push((job, failure)),
+            }
+        }
+        let scaled = self.scaled(&readings);
+        let merit = scaled.as_ref().map_or(Merit::FAILED, |scaled| self.merit(scaled));
+        let residuals = if scaled.is_some() { self.residuals(residuals) } else { Vec::new() };
+        Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
+    }
+
+    /// The values of all rows that read one job.
+    fn run_job(&self, job: usize, tuners: &[f64]) -> Result<Vec<(usize, Value)>, Failure> {
+        let study = &self.study;
+        let plan = &study.jobs[job];
+        let case = &study.cases[plan.case];
+        let parameters = study.parameters(plan, tuners);
+        let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
+        let analysis = study.models[plan.model].1.analyse(&request)?;
+        let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
+        rows.map(|(index, row)| {
+            let value = row.criterion.value(case, &analysis);
+            let value = value.map_err(|why| Failure::Criterion(format!("{}: {why}", row.name)))?;
+            if value.number.is_finite() {
+                Ok((index, value))
+            } else {
+                Err(Failure::Criterion(format!("{} is not finite", row.name)))
+            }
+        })
+        .collect()
+    }
+
+    fn scaled(&self, readings: &[Option<Reading>]) -> Option<Vec<f64>> {
+        self.shape
+            .rows
+            .iter()
+            .zip(readings)
+            .map(|((usage, _), reading)| match (usage, reading) {
+                (Usage::Monitor, _) => Some(0.0),
+                (_, reading) => reading.map(|r| r.scaled),
+            })
+            .collect()
+    }
+
+    fn merit(&self, scaled: &[f64]) -> Merit {
+        let shape = &self.shape;
+        let objectives = shape.objectives(scaled);
+        let objective = match shape.objective {
+            Objective::Max => objectives.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            Objective::Sum => objectives.iter().sum(),
+        };
+        // A study with constraints alone asks for any feasible point.
+        let objective = if objectives.is_empty() { 0.0 } else { objective };
+        let inequality = shape.inequalities(scaled).into_iter().fold(0.0, f64::max);
+        let equality = shape.equalities(scaled).into_iter().map(f64::abs).fold(0.0, f64::max);
+        Merit { violation: inequality.max(equality), objective }
+    }
+
+    /// Residuals of all rows to be minimised, weighted so that their squares sum to the objective; empty if one of the
+    /// rows is no sum of squares.
+    fn residuals(&self, of_rows: Vec<Vec<f64>>) -> Vec<f64> {
+        let mut all = Vec::new();
+        if self.shape.objective != Objective::Sum {
+            return all;
+        }
+        for ((row, (usage, weight)), residuals) in self.study.rows.iter().zip(&self.shape.rows).zip(of_rows) {
+            if *usage != Usage::Minimise {
+                continue;
+            }
+            if residuals.is_empty() || row.demand.good != 0.0 {
+                return Vec::new();
+            }
+            let factor = (weight / row.demand.bad).sqrt();
+            all.extend(residuals.into_iter().map(|r| factor * r));
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn feasible_points_come_first_then_small_violations_then_failures() {
+        let merit = |violation, objective| Merit { violation, objective };
+        assert!(merit(0.0, 5.0).is_better_than(&merit(0.1, 1.0)));
+        assert!(merit(0.0, 1.0).is_better_than(&merit(1e-7, 2.0)));
+        assert!(merit(0.1, 9.0).is_better_than(&merit(0.2, 1.0)));
+        assert!(merit(9.0, 9.0).is_better_than(&Merit::FAILED));
+        assert!(!Merit::FAILED.is_better_than(&Merit::FAILED));
+    }
+}

@@ -1,0 +1,194 @@
+//! A run: owns the budget, the cache, the archive and the random streams, and keeps the best point.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use crate::differences;
+use crate::problem::{Evaluation, Merit, Problem};
+use crate::random::{Stream, stream};
+use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
+
+/// What a run may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Budget {
+    /// Largest number of points evaluated.
+    pub evaluations: usize,
+}
+
+/// Looks on while a run goes, and may end it. Only this sees the clock, so that time changes no number.
+pub trait Watch: Sync {
+    /// Whether the run must end now.
+    fn wants_stop(&self) -> bool {
+        false
+    }
+
+    /// New points were evaluated.
+    fn evaluated(&self, _state: &State) {}
+}
+
+/// Nobody looks on.
+impl Watch for () {}
+
+/// Where a run stands.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    /// Points evaluated.
+    pub evaluations: usize,
+    /// Largest number of points.
+    pub budget: usize,
+    /// Points that failed.
+    pub failed: usize,
+    /// The best so far.
+    pub best: Merit,
+}
+
+/// One evaluated point, as it is kept for the report.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Values of all tuners.
+    pub tuners: Vec<f64>,
+    /// Values of all rows; NaN where there is none.
+    pub values: Vec<f64>,
+    /// What the point is worth.
+    pub merit: Merit,
+}
+
+/// A run of a solver on a problem.
+pub struct Run<'a> {
+    problem: &'a Problem,
+    budget: Budget,
+    watch: &'a dyn Watch,
+    cache: HashMap<Vec<u64>, Evaluation>,
+    archive: Vec<Record>,
+    best: Option<Evaluation>,
+    failures: Vec<(usize, &'static str, usize)>,
+}
+
+impl<'a> Run<'a> {
+    /// A run that has not begun.
+    pub fn new(problem: &'a Problem, budget: Budget, watch: &'a dyn Watch) -> Self {
+        Self { problem, budget, watch, cache: HashMap::new(), archive: Vec::new(), best: None, failures: Vec::new() }
+    }
+
+    /// Runs the solver from `start`, a point of the unit box, to its end.
+    pub fn solve(&mut self, solver: &mut dyn Solver, start: &[f64]) -> Stop {
+        let mut iterate = || -> Result<Stop, Halt> {
+            // The start is evaluated before all else: whatever happens, there is a point to report.
+            self.evaluate(&[start.to_vec()])?;
+            solver.begin(self, start)?;
+            loop {
+                match solver.step(self)? {
+                    Progress::Continue => {}
+                    Progress::Converged => return Ok(Stop::Converged),
+                    Progress::Stalled => return Ok(Stop::Stalled),
+                }
+            }
+        };
+        iterate().unwrap_or_else(|halt| match halt {
+            Halt::Budget => Stop::Budget,
+            Halt::Interrupted => Stop::Interrupted,
+        })
+    }
+
+    /// The best point so far.
+    pub fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref()
+    }
+
+    /// All points, in the order of their evaluation.
+    pub fn archive(&self) -> &[Record] {
+        &self.archive
+    }
+
+    /// Failed simulations: job, kind of failure, how often.
+    pub fn failures(&self) -> &[(usize, &'static str, usize)] {
+        &self.failures
+    }
+
+    /// The problem.
+    pub fn problem(&self) -> &'a Problem {
+        self.problem
+    }
+
+    fn record(&mut self, evaluation: &Evaluation) {
+        for (job, failure) in &evaluation.failures {
+            match self.failures.iter_mut().find(|(j, kind, _)| j == job && *kind == failure.kind()) {
+                Some((_, _, count)) => *count += 1,
+                None => self.failures.push((*job, failure.kind(), 1)),
+            }
+        }
+        self.archive.push(Record {
+            tuners: evaluation.tuners.clone(),
+            values: evaluation.readings.iter().map(|r| r.map_or(f64::NAN, |r| r.value)).collect(),
+            merit: evaluation.merit,
+        });
+        if self.best.as_ref().is_none_or(|best| evaluation.merit.is_better_than(&best.merit)) {
+            self.best = Some(evaluation.clone());
+        }
+    }
+
+    fn state(&self) -> State {
+        State {
+            evaluations: self.archive.len(),
+            budget: self.budget.evaluations,
+            failed: self.archive.iter().filter(|r| r.merit.objective.is_infinite()).count(),
+            best: self.best.as_ref().map_or(Merit::FAILED, |b| b.merit),
+        }
+    }
+}
+
+/// Bits of the values a point stands for: points that round to the same tuners are one.
+fn key(problem: &Problem, point: &[f64]) -> Vec<u64> {
+    problem.tuners_at(point).into_iter().map(f64::to_bits).collect()
+}
+
+impl Oracle for Run<'_> {
+    fn shape(&self) -> &Shape {
+        self.problem.shape()
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        debug_assert!(points.iter().flatten().all(|u| (0.0..=1.0).contains(u)), "solvers stay inside the unit box");
+        let keys: Vec<Vec<u64>> = points.iter().map(|point| key(self.problem, point)).collect();
+        let mut new: Vec<usize> = Vec::new();
+        for (i, k) in keys.iter().enumerate() {
+            if !self.cache.contains_key(k) && !new.iter().any(|&j| keys[j] == *k) {
+                new.push(i);
+            }
+        }
+        let left = self.budget.evaluations.saturating_sub(self.archive.len());
+        let within_budget = new.len() <= left;
+        new.truncate(left);
+        // A small batch at a time, so that an interrupt is heard soon; the results are folded in order, so that
+        // neither the batches nor the number of threads change a bit.
+        for batch in new.chunks(4 * rayon::current_num_threads().max(1)) {
+            if self.watch.wants_stop() {
+                return Err(Halt::Interrupted);
+            }
+            let problem = self.problem;
+            let evaluated: Vec<Evaluation> = batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect();
+            for (&i, evaluation) in batch.iter().zip(evaluated) {
+                self.record(&evaluation);
+                self.cache.insert(keys[i].clone(), evaluation);
+            }
+            self.watch.evaluated(&self.state());
+        }
+        if !within_budget {
+            return Err(Halt::Budget);
+        }
+        Ok(points
+            .iter()
+            .zip(&keys)
+            .map(|(point, key)| Evaluation { point: point.clone(), ..self.cache[key].clone() })
+            .collect())
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        differences::linearise(self, point, reach)
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        stream(self.problem.study().seed, label)
+    }
+}

@@ -1,0 +1,235 @@
+//! A study as it is written down, in a file or in Rust: nothing checked yet.
+
+use super::{Objective, Study, Task};
+use crate::criterion::{CriterionSpec, Usage};
+use crate::experiment::{Input, Role};
+use crate::model::Model;
+use crate::tuner::Scale;
+use crate::unit::{Quantity, Unit};
+
+/// A mistake in a study, with the keys that lead to its place: `criteria`, `overshoot`, `overshoot`, `signal`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mistake {
+    /// Keys from the study down.
+    pub path: Vec<String>,
+    /// The fact.
+    pub message: String,
+    /// The way out.
+    pub help: Option<String>,
+}
+
+impl Mistake {
+    /// A mistake at a key.
+    pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { path: vec![key.into()], message: message.into(), help: None }
+    }
+
+    /// A mistake in the thing itself rather than under one of its keys.
+    pub fn here(message: impl Into<String>) -> Self {
+        Self { path: Vec::new(), message: message.into(), help: None }
+    }
+
+    /// Adds the way out.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Puts the mistake under one more key.
+    #[must_use]
+    pub fn within(mut self, key: &str) -> Self {
+        self.path.insert(0, key.to_owned());
+        self
+    }
+}
+
+impl std::fmt::Display for Mistake {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.path.join("."), self.message)?;
+        self.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
+    }
+}
+
+impl std::error::Error for Mistake {}
+
+/// A study as it is written down. [`Draft::build`] checks it.
+#[derive(Default)]
+pub struct Draft {
+    /// Name.
+    pub name: String,
+    /// What it is for.
+    pub task: Task,
+    /// How scaled values are combined; by the task where absent.
+    pub objective: Option<Objective>,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Models, by name.
+    pub models: Vec<(String, ModelDraft)>,
+    /// Tuners, by name.
+    pub tuners: Vec<(String, TunerDraft)>,
+    /// Cases and experiments.
+    pub cases: Vec<CaseDraft>,
+    /// Criteria, by name.
+    pub criteria: Vec<(String, CriterionDraft)>,
+}
+
+impl Draft {
+    /// Checks every name, size, bound and unit.
+    ///
+    /// # Errors
+    /// The first mistake, with the keys that lead to it.
+    pub fn build(self) -> Result<Study, Mistake> {
+        super::build::build(self)
+    }
+}
+
+/// A model with values for some of its parameters.
+pub struct ModelDraft {
+    /// The model.
+    pub model: Box<dyn Model>,
+    /// Values that hold unless a tuner or a case sets the parameter.
+    pub parameters: Vec<(String, Quantity)>,
+}
+
+impl<M: Model + 'static> From<M> for ModelDraft {
+    fn from(model: M) -> Self {
+        Self { model: Box::new(model), parameters: Vec::new() }
+    }
+}
+
+/// A tuner as it is written down.
+#[derive(Debug, Clone, Default)]
+pub struct TunerDraft {
+    /// Value at the start.
+    pub start: Option<Quantity>,
+    /// Smallest value.
+    pub min: Option<Quantity>,
+    /// Largest value.
+    pub max: Option<Quantity>,
+    /// Unit; the parameter's where absent.
+    pub unit: Option<Unit>,
+    /// How the range is spread.
+    pub scale: Scale,
+    /// Whole numbers only.
+    pub integer: bool,
+    /// These values only.
+    pub values: Option<Vec<Quantity>>,
+    /// Kept at its start value.
+    pub inactive: bool,
+    /// Follows from other tuners.
+    pub tie: Option<String>,
+    /// One of its own for every case.
+    pub per_case: bool,
+}
+
+impl TunerDraft {
+    /// A tuner that starts at `start` and stays between `min` and `max`.
+    pub fn new(start: f64, min: f64, max: f64) -> Self {
+        Self { start: Some(start.into()), min: Some(min.into()), max: Some(max.into()), ..Self::default() }
+    }
+
+    /// Spreads the range evenly in the logarithm.
+    #[must_use]
+    pub fn log(mut self) -> Self {
+        self.scale = Scale::Log;
+        self
+    }
+}
+
+/// A case or an experiment as it is written down.
+#[derive(Debug, Clone, Default)]
+pub struct CaseDraft {
+    /// Name.
+    pub name: String,
+    /// Parameter values that hold in it.
+    pub parameters: Vec<(String, Quantity)>,
+    /// Inputs, with the unit of their values where one is given.
+    pub inputs: Vec<(String, Input, Option<Unit>)>,
+    /// End of the simulation, s.
+    pub horizon: Option<f64>,
+    /// What was measured; this makes it an experiment.
+    pub measured: Option<Measured>,
+}
+
+/// What an experiment brings.
+#[derive(Debug, Clone, Default)]
+pub struct Measured {
+    /// Measured signals.
+    pub channels: Vec<ChannelDraft>,
+    /// What it is used for.
+    pub role: Role,
+    /// States whose start values are estimated.
+    pub free: Vec<Free>,
+}
+
+/// A state whose start value is estimated; what is absent is read off the data.
+#[derive(Debug, Clone, Default)]
+pub struct Free {
+    /// Name of the state.
+    pub state: String,
+    /// First guess.
+    pub start: Option<Quantity>,
+    /// Smallest value.
+    pub min: Option<Quantity>,
+    /// Largest value.
+    pub max: Option<Quantity>,
+}
+
+/// A measured signal as it is written down.
+#[derive(Debug, Clone, Default)]
+pub struct ChannelDraft {
+    /// The model's signal.
+    pub signal: String,
+    /// Times, s, increasing.
+    pub times: Vec<f64>,
+    /// Samples; NaN is a gap.
+    pub values: Vec<f64>,
+    /// Unit of the samples; the signal's where absent.
+    pub unit: Option<Unit>,
+    /// Standard deviation of the noise.
+    pub noise: Option<Quantity>,
+}
+
+/// A criterion with what the study does with it.
+pub struct CriterionDraft {
+    /// What computes the value.
+    pub criterion: Box<dyn CriterionSpec>,
+    /// The model it reads; the only one where absent.
+    pub model: Option<String>,
+    /// The cases it is evaluated in; all where absent.
+    pub cases: Option<Vec<String>>,
+    /// What the study does with it.
+    pub usage: Usage,
+    /// The value to reach.
+    pub demand: Option<Quantity>,
+    /// Value that scales to 0.
+    pub good: Option<Quantity>,
+    /// Value that scales to 1.
+    pub bad: Option<Quantity>,
+    /// Weight in the objective.
+    pub weight: f64,
+}
+
+impl CriterionDraft {
+    /// A criterion to be minimised, with a demand in its own unit.
+    pub fn minimise(criterion: impl CriterionSpec + 'static, demand: f64) -> Self {
+        Self {
+            criterion: Box::new(criterion),
+            model: None,
+            cases: None,
+            usage: Usage::Minimise,
+            demand: Some(demand.into()),
+            good: None,
+            bad: None,
+            weight: 1.0,
+        }
+    }
+
+    /// Gives it another usage.
+    #[must_use]
+    pub fn used_as(mut self, usage: Usage) -> Self {
+        self.usage = usage;
+        self
+    }
+}

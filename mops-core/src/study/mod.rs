@@ -1,0 +1,152 @@
+//! A study: models, cases, tuners and criteria that belong together. Once built, it is valid.
+
+mod build;
+mod draft;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
+
+use crate::case::Case;
+use crate::criterion::{Criterion, Demand, Usage};
+use crate::model::Model;
+use crate::tuner::Tuner;
+use crate::unit::Unit;
+
+/// What a study is for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Task {
+    /// Choose the tuners so that the worst scaled criterion is as small as it can be.
+    #[default]
+    Design,
+    /// Estimate the tuners from measurements.
+    Calibration,
+}
+
+/// How the scaled values become one number to minimise.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Objective {
+    /// The largest weighted scaled value.
+    #[default]
+    Max,
+    /// The sum of the weighted scaled values.
+    Sum,
+}
+
+/// A study whose every name, size, bound and unit has been checked.
+#[derive(Clone)]
+pub struct Study {
+    /// Name.
+    pub name: String,
+    /// What it is for.
+    pub task: Task,
+    /// How scaled values are combined.
+    pub objective: Objective,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Models, by name.
+    pub models: Vec<(String, Arc<dyn Model>)>,
+    /// Cases.
+    pub cases: Vec<Case>,
+    /// Tuners: of the study first, then of single cases.
+    pub tuners: Vec<Tuner>,
+    /// One row per criterion and case.
+    pub rows: Vec<Row>,
+    /// One job per model and case that has a row.
+    pub jobs: Vec<JobPlan>,
+    /// What deserves a word before a run, such as a first sample that looks wrong.
+    pub warnings: Vec<String>,
+}
+
+/// A criterion in one case.
+#[derive(Clone)]
+pub struct Row {
+    /// Name of the criterion.
+    pub name: String,
+    /// The job whose analysis it reads, by index into [`Study::jobs`].
+    pub job: usize,
+    /// What computes the value.
+    pub criterion: Arc<dyn Criterion>,
+    /// What the study does with it.
+    pub usage: Usage,
+    /// How it is scaled.
+    pub demand: Demand,
+    /// Weight of its scaled value in the objective.
+    pub weight: f64,
+    /// Unit of the value.
+    pub unit: Unit,
+}
+
+/// A model in a case: what to analyse, and where its parameters come from.
+#[derive(Debug, Clone)]
+pub struct JobPlan {
+    /// Index into [`Study::models`].
+    pub model: usize,
+    /// Index into [`Study::cases`].
+    pub case: usize,
+    /// Where each of the model's parameters comes from.
+    pub parameters: Vec<ParameterSource>,
+    /// Signals that criteria read, as indices into the model's.
+    pub signals: Vec<usize>,
+    /// End of the simulation, s.
+    pub horizon: f64,
+}
+
+/// Where the value of a model's parameter comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParameterSource {
+    /// A number of the study, in the parameter's unit.
+    Constant(f64),
+    /// A tuner, times a factor that turns its unit into the parameter's.
+    Tuner {
+        /// Index into [`Study::tuners`].
+        tuner: usize,
+        /// Factor.
+        factor: f64,
+    },
+}
+
+impl Study {
+    /// The key of a row in reports: `case/criterion`.
+    pub fn key(&self, row: &Row) -> String {
+        format!("{}/{}", self.case_of(row).name, row.name)
+    }
+
+    /// The case of a row.
+    pub fn case_of(&self, row: &Row) -> &Case {
+        &self.cases[self.jobs[row.job].case]
+    }
+
+    /// Start values of all tuners, ties applied.
+    pub fn start(&self) -> Vec<f64> {
+        let mut values: Vec<f64> = self.tuners.iter().map(|t| t.start).collect();
+        self.apply_ties(&mut values);
+        values
+    }
+
+    /// Sets every tied tuner from the ones it follows.
+    pub fn apply_ties(&self, values: &mut [f64]) {
+        for (i, tuner) in self.tuners.iter().enumerate() {
+            if let Some((expression, of)) = &tuner.tie {
+                let arguments: Vec<f64> = of.iter().map(|&j| values[j]).collect();
+                values[i] = expression.evaluate(&arguments);
+            }
+        }
+    }
+
+    /// Values of a job's parameters for given values of all tuners.
+    pub fn parameters(&self, job: &JobPlan, tuners: &[f64]) -> Vec<f64> {
+        job.parameters
+            .iter()
+            .map(|source| match *source {
+                ParameterSource::Constant(value) => value,
+                ParameterSource::Tuner { tuner, factor } => tuners[tuner] * factor,
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,378 @@
+//! A signal over time as it was simulated: a polynomial per step of the integrator.
+//!
+//! Criteria read traces, never samples, so that a peak or a settling time does not depend on the step size.
+
+/// A signal as a piecewise quartic over consecutive segments, with jumps allowed between them.
+///
+/// On segment `i`, from `knots[i]` to `knots[i + 1]`, the value at `t = knots[i] + s (knots[i + 1] - knots[i])`, `s` in
+/// [0, 1], is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order Runge-Kutta step.
+/// At a jump the trace has the later value, at its end the last one.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trace {
+    knots: Vec<f64>,
+    segments: Vec<[f64; 5]>,
+}
+
+/// A part of a trace on which it is monotone: times and values at both ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// Time at the start and the end, s.
+    pub time: [f64; 2],
+    /// Value at the start and the end.
+    pub value: [f64; 2],
+    segment: usize,
+    within: [f64; 2],
+}
+
+impl Trace {
+    /// Number of points at which [`Trace::push`] wants the signal, at `s = 0, 1/4, 1/2, 3/4, 1`.
+    pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+
+    /// An empty trace that begins at `start`, with room for `segments`.
+    pub fn starting_at(start: f64, segments: usize) -> Self {
+        let mut knots = Vec::with_capacity(segments + 1);
+        knots.push(start);
+        Self { knots, segments: Vec::with_capacity(segments) }
+    }
+
+    /// Adds the segment from the last knot to `end` that passes through `samples` at [`Trace::NODES`].
+    pub fn push(&mut self, end: f64, samples: [f64; 5]) {
+        let [f0, f1, f2, f3, f4] = samples;
+        // Newton's forward differences on the nodes k/4, expanded in powers of s.
+        let (a, b, c, d) = (f1 - f0, f2 - f0, f3 - f0, f4 - f0);
+        self.push_polynomial(
+            end,
+            [
+                f0,
+                16.0 * a - 12.0 * b + 16.0 / 3.0 * c - d,
+                (-208.0 * a + 228.0 * b - 112.0 * c + 22.0 * d) / 3.0,
+                96.0 * a - 128.0 * b + 224.0 / 3.0 * c - 16.0 * d,
+                (-128.0 * a + 192.0 * b - 128.0 * c + 32.0 * d) / 3.0,
+            ],
+        );
+    }
+
+    /// Adds the segment from the last knot to `end` with the given coefficients of `s^0 ... s^4`.
+    pub fn push_polynomial(&mut self, end: f64, coefficients: [f64; 5]) {
+        if self.knots.last().is_some_and(|&last| end > last) {
+            self.knots.push(end);
+            self.segments.push(coefficients);
+        }
+    }
+
+    /// Time at which the trace begins, s.
+    pub fn start(&self) -> f64 {
+        self.knots.first().copied().unwrap_or(0.0)
+    }
+
+    /// Time at which the trace ends, s.
+    pub fn end(&self) -> f64 {
+        self.knots.last().copied().unwrap_or(0.0)
+    }
+
+    /// Whether the trace has no segment.
+    pub fn is_empty(&self) -> bool {
+        self.segments.is_empty()
+    }
+
+    /// The value at time `t`; outside the trace, the value at the nearer end.
+    pub fn at(&self, t: f64) -> f64 {
+        let segment = self.segment_at(t);
+        self.value_on(segment, t)
+    }
+
+    /// The values at increasing times, in one pass.
+    pub fn sample(&self, times: &[f64]) -> Vec<f64> {
+        let mut segment = 0;
+        times
+            .iter()
+            .map(|&t| {
+                while segment + 1 < self.segments.len() && self.knots[segment + 1] <= t {
+                    segment += 1;
+                }
+                self.value_on(segment, t)
+            })
+            .collect()
+    }
+
+    /// The value at the start.
+    pub fn first(&self) -> f64 {
+        self.segments.first().map_or(f64::NAN, |c| c[0])
+    }
+
+    /// The value at the end.
+    pub fn last(&self) -> f64 {
+        self.segments.last().map_or(f64::NAN, |c| c.iter().sum())
+    }
+
+    /// The monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
+    pub fn pieces(&self) -> Vec<Piece> {
+        let mut pieces = Vec::with_capacity(self.segments.len());
+        for (segment, c) in self.segments.iter().enumerate() {
+            let (t0, h) = (self.knots[segment], self.knots[segment + 1] - self.knots[segment]);
+            let mut add = |from: f64, to: f64| {
+                pieces.push(Piece {
+                    time: [t0 + from * h, if to == 1.0 { self.knots[segment + 1] } else { t0 + to * h }],
+                    value: [polynomial(c, from), polynomial(c, to)],
+                    segment,
+                    within: [from, to],
+                });
+            };
+            let mut from = 0.0;
+            for extremum in cubic_roots([c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4]]) {
+                if extremum > from {
+                    add(from, extremum);
+                    from = extremum;
+                }
+            }
+            add(from, 1.0);
+        }
+        pieces
+    }
+
+    /// The time within a monotone piece at which the trace crosses `level`; `None` if it does not.
+    pub fn crossing(&self, piece: &Piece, level: f64) -> Option<f64> {
+        let [low, high] = piece.value;
+        if (low - level) * (high - level) > 0.0 || low == high {
+            return None;
+        }
+        let c = &self.segments[piece.segment];
+        let s = bisect(piece.within[0], piece.within[1], |s| polynomial(c, s) - level);
+        let (t0, t1) = (self.knots[piece.segment], self.knots[piece.segment + 1]);
+        Some(t0 + s * (t1 - t0))
+    }
+
+    /// The largest value, and the first time it is reached.
+    pub fn maximum(&self) -> (f64, f64) {
+        self.extremum(|new, old| new > old)
+    }
+
+    /// The smallest value, and the first time it is reached.
+    pub fn minimum(&self) -> (f64, f64) {
+        self.extremum(|new, old| new < old)
+    }
+
+    fn extremum(&self, better: impl Fn(f64, f64) -> bool) -> (f64, f64) {
+        let mut best = (self.first(), self.start());
+        for piece in self.pieces() {
+            for end in 0..2 {
+                if better(piece.value[end], best.0) {
+                    best = (piece.value[end], piece.time[end]);
+                }
+            }
+        }
+        best
+    }
+
+    /// The first time at which the trace is at or beyond `level` in the direction `rising`.
+    pub fn first_reaching(&self, level: f64, rising: bool) -> Option<f64> {
+        let reached = |value: f64| if rising { value >= level } else { value <= level };
+        for piece in self.pieces() {
+            if reached(piece.value[0]) {
+                return Some(piece.time[0]);
+            }
+            if reached(piece.value[1]) {
+                return Some(self.crossing(&piece, level).unwrap_or(piece.time[1]));
+            }
+        }
+        None
+    }
+
+    /// The integral of `f(t, y)` over the trace, by five-point Gauss-Legendre quadrature on each monotone piece: exact
+    /// for polynomials in `y` up to the second degree, and for `|y - r|` when `r` is split at its crossing by the caller.
+    pub fn integral(&self, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for (segment, c) in self.segments.iter().enumerate() {
+            let (t0, h) = (self.knots[segment], self.knots[segment + 1] - self.knots[segment]);
+            sum += gauss(0.0, 1.0, |s| f(t0 + s * h, polynomial(c, s))) * h;
+        }
+        sum
+    }
+
+    /// The integral of `f(t, |y - level|)`: as [`Trace::integral`], with each segment split where the trace crosses
+    /// `level`, so that the kink of the absolute value costs no accuracy.
+    pub fn integral_of_deviation(&self, level: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for piece in self.pieces() {
+            let c = &self.segments[piece.segment];
+            let (t0, h) = (self.knots[piece.segment], self.knots[piece.segment + 1] - self.knots[piece.segment]);
+            let middle = self.crossing(&piece, level).map_or(piece.within[1], |t| ((t - t0) / h).clamp(0.0, 1.0));
+            for (from, to) in [(piece.within[0], middle), (middle, piece.within[1])] {
+                sum += gauss(from, to, |s| f(t0 + s * h, (polynomial(c, s) - level).abs())) * h;
+            }
+        }
+        sum
+    }
+
+    /// The derivative with respect to time, as a trace.
+    #[must_use]
+    pub fn derivative(&self) -> Self {
+        let segments = self
+            .segments
+            .iter()
+            .zip(self.knots.windows(2))
+            .map(|(c, knot)| {
+                let h = knot[1] - knot[0];
+                [c[1] / h, 2.0 * c[2] / h, 3.0 * c[3] / h, 4.0 * c[4] / h, 0.0]
+            })
+            .collect();
+        Self { knots: self.knots.clone(), segments }
+    }
+
+    /// The largest jump between consecutive segments, in absolute value.
+    pub fn largest_jump(&self) -> f64 {
+        self.segments.windows(2).map(|s| (s[1][0] - s[0].iter().sum::<f64>()).abs()).fold(0.0, f64::max)
+    }
+
+    fn segment_at(&self, t: f64) -> usize {
+        self.knots.partition_point(|&knot| knot <= t).saturating_sub(1).min(self.segments.len().saturating_sub(1))
+    }
+
+    fn value_on(&self, segment: usize, t: f64) -> f64 {
+        let Some(c) = self.segments.get(segment) else { return f64::NAN };
+        let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
+        polynomial(c, ((t - t0) / (t1 - t0)).clamp(0.0, 1.0))
+    }
+}
+
+fn polynomial(c: &[f64; 5], s: f64) -> f64 {
+    (((c[4] * s + c[3]) * s + c[2]) * s + c[1]) * s + c[0]
+}
+
+/// The integral of `f` from `a` to `b` by the five-point Gauss-Legendre rule (degree 9).
+/// Source: M. Abramowitz, I. Stegun, Handbook of Mathematical Functions (1964), table 25.4.
+fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    const NODES: [(f64, f64); 3] = [
+        (0.0, 0.568_888_888_888_888_9),
+        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    ];
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let mut sum = NODES[0].1 * f(middle);
+    for (x, w) in &NODES[1..] {
+        sum += w * (f(middle - half * x) + f(middle + half * x));
+    }
+    sum * half
+}
+
+/// The roots of `c0 + c1 s + c2 s^2 + c3 s^3` strictly inside (0, 1), increasing.
+///
+/// Between the roots of its derivative a cubic is monotone, so that bisection there finds every sign change and needs
+/// no special case for vanishing leading coefficients.
+fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
+    let f = |s: f64| ((c[3] * s + c[2]) * s + c[1]) * s + c[0];
+    // Roots of c1 + 2 c2 s + 3 c3 s^2, in the form that does not cancel.
+    let (qa, qb, qc) = (3.0 * c[3], c[2], c[1]);
+    let discriminant = qb * qb - qa * qc;
+    let mut turning = [1.0, 1.0];
+    if discriminant > 0.0 {
+        let q = -(qb + discriminant.sqrt().copysign(qb));
+        turning = [q / qa, qc / q].map(|s| if s > 0.0 && s < 1.0 { s } else { 1.0 });
+        turning.sort_by(f64::total_cmp);
+    }
+    let ends = [0.0, turning[0], turning[1], 1.0];
+    let mut roots = [f64::NAN; 3];
+    for i in 0..3 {
+        let (from, to) = (ends[i], ends[i + 1]);
+        if from < to && f(from) * f(to) < 0.0 {
+            roots[i] = bisect(from, to, f);
+        }
+    }
+    roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0)
+}
+
+/// A zero of `f` between `a` and `b`, where `f` has opposite signs or is zero: the Illinois variant of false position,
+/// to the last bits. Source: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let (mut fa, mut fb) = (f(a), f(b));
+    if fa == 0.0 {
+        return a;
+    }
+    if fb == 0.0 {
+        return b;
+    }
+    for _ in 0..100 {
+        let c = (a * fb - b * fa) / (fb - fa);
+        let c = if c > a.min(b) && c < a.max(b) { c } else { 0.5 * (a + b) };
+        let fc = f(c);
+        if fc == 0.0 || (b - a).abs() <= 1e-15 {
+            return c;
+        }
+        if fc * fb < 0.0 {
+            (a, fa) = (b, fb);
+        } else {
+            fa *= 0.5;
+        }
+        (b, fb) = (c, fc);
+    }
+    b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `sin t` over [0, 10] in 200 segments.
+    fn sine() -> Trace {
+        let mut trace = Trace::starting_at(0.0, 200);
+        for i in 0..200 {
+            let (from, h) = (f64::from(i) * 0.05, 0.05);
+            trace.push(from + h, Trace::NODES.map(|s| (from + s * h).sin()));
+        }
+        trace
+    }
+
+    #[test]
+    fn a_quartic_is_reproduced_to_rounding() {
+        let f = |t: f64| 1.0 - 2.0 * t + 3.0 * t * t - 4.0 * t.powi(3) + 5.0 * t.powi(4);
+        let mut trace = Trace::starting_at(0.0, 1);
+        trace.push(2.0, Trace::NODES.map(|s| f(2.0 * s)));
+        for i in 0..=20 {
+            let t = 0.1 * f64::from(i);
+            assert!((trace.at(t) - f(t)).abs() < 1e-12, "{t}");
+        }
+    }
+
+    #[test]
+    fn extrema_and_crossings_are_those_of_the_curve_not_of_the_samples() {
+        let trace = sine();
+        let (peak, time) = trace.maximum();
+        // The two maxima within [0, 10] are equal up to rounding.
+        let phase = time % std::f64::consts::TAU;
+        assert!((peak - 1.0).abs() < 1e-10 && (phase - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{peak} {time}");
+        let time = trace.first_reaching(0.5, true).unwrap();
+        assert!((time - std::f64::consts::FRAC_PI_6).abs() < 1e-9, "{time}");
+        assert_eq!(trace.first_reaching(1.5, true), None);
+    }
+
+    #[test]
+    fn integrals_agree_with_closed_forms() {
+        let trace = sine();
+        assert!((trace.integral(|_, y| y) - (1.0 - 10f64.cos())).abs() < 1e-9);
+        assert!((trace.integral(|_, y| y * y) - (5.0 - 20f64.sin() / 4.0)).abs() < 1e-9);
+        // |sin| over [0, 10]: three half waves of area 2 and the rest.
+        let exact = 6.0 + (1.0 - (10.0 - 3.0 * std::f64::consts::PI).cos());
+        assert!((trace.integral_of_deviation(0.0, |_, e| e) - exact).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_derivative_and_jumps_are_seen() {
+        let trace = sine();
+        assert!((trace.derivative().at(1.0) - 1f64.cos()).abs() < 1e-5);
+        let mut step = Trace::starting_at(0.0, 2);
+        step.push(1.0, [0.0; 5]);
+        step.push(2.0, [3.0; 5]);
+        assert_eq!((step.largest_jump(), step.at(0.999), step.at(1.0), step.at(9.0)), (3.0, 0.0, 3.0, 3.0));
+    }
+
+    #[test]
+    fn roots_of_cubics_inside_the_unit_interval_are_found_in_order() {
+        // (s - 0.2)(s - 0.5)(s - 0.9)
+        let roots: Vec<f64> = cubic_roots([-0.09, 0.73, -1.6, 1.0]).collect();
+        assert_eq!(roots.len(), 3);
+        for (root, exact) in roots.iter().zip([0.2, 0.5, 0.9]) {
+            assert!((root - exact).abs() < 1e-12, "{roots:?}");
+        }
+        assert_eq!(cubic_roots([1.0, 0.0, 0.0, 0.0]).count(), 0);
+    }
+}

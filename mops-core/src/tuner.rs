@@ -1,0 +1,159 @@
+//! Tuners: the quantities a study may change, and the unit box that solvers see of them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::expression::Expression;
+use crate::unit::Unit;
+
+/// How the range of a tuner is spread over [0, 1].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Evenly.
+    #[default]
+    Linear,
+    /// Evenly in the logarithm; the range must be positive.
+    Log,
+}
+
+/// Values a tuner may take between its bounds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grid {
+    /// Any.
+    Continuous,
+    /// Whole numbers.
+    Integer,
+    /// The values listed, increasing.
+    List(Vec<f64>),
+}
+
+/// A quantity that the study may change.
+#[derive(Debug, Clone)]
+pub struct Tuner {
+    /// Name in reports; `case/name` for a tuner of one case.
+    pub name: String,
+    /// Name of the models' parameter it sets.
+    pub parameter: String,
+    /// Value at the start.
+    pub start: f64,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+    /// How the range is spread.
+    pub scale: Scale,
+    /// Values between the bounds.
+    pub grid: Grid,
+    /// Unit of all of these.
+    pub unit: Unit,
+    /// The case it belongs to, by index; `None` for the whole study.
+    pub case: Option<usize>,
+    /// Whether a solver may change it.
+    pub active: bool,
+    /// Where it follows from other tuners: the expression, and the indices of the tuners it names.
+    pub tie: Option<(Expression, Vec<usize>)>,
+}
+
+impl Tuner {
+    /// The value at `u` in [0, 1].
+    pub fn value_at(&self, u: f64) -> f64 {
+        let [min, max] = self.bounds;
+        let u = u.clamp(0.0, 1.0);
+        match &self.grid {
+            // The ends are met to the bit, whatever the rounding between them.
+            _ if u == 0.0 => min,
+            _ if u == 1.0 => max,
+            Grid::Continuous => match self.scale {
+                Scale::Linear => min + u * (max - min),
+                Scale::Log => (min.ln() + u * (max / min).ln()).exp(),
+            },
+            Grid::Integer => (min + u * (max - min)).round(),
+            Grid::List(values) => values[self.index_at(u, values.len())],
+        }
+    }
+
+    /// Where `value` lies in [0, 1]; outside the bounds, the nearer end.
+    pub fn position_of(&self, value: f64) -> f64 {
+        let [min, max] = self.bounds;
+        let u = match (&self.grid, self.scale) {
+            (Grid::List(values), _) => {
+                let nearest = (0..values.len())
+                    .min_by(|&i, &j| (values[i] - value).abs().total_cmp(&(values[j] - value).abs()))
+                    .expect("a list has at least two values");
+                #[allow(clippy::cast_precision_loss)]
+                return nearest as f64 / (values.len() - 1) as f64;
+            }
+            (_, Scale::Linear) => (value - min) / (max - min),
+            (_, Scale::Log) => (value / min).ln() / (max / min).ln(),
+        };
+        u.clamp(0.0, 1.0)
+    }
+
+    /// Distance between neighbouring values in the unit box; 0 for a continuous tuner.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn spacing(&self) -> f64 {
+        match &self.grid {
+            Grid::Continuous => 0.0,
+            Grid::Integer => 1.0 / (self.bounds[1] - self.bounds[0]),
+            Grid::List(values) => 1.0 / (values.len() - 1) as f64,
+        }
+    }
+
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn index_at(&self, u: f64, count: usize) -> usize {
+        (u * (count - 1) as f64).round() as usize
+    }
+
+    /// `lower` or `upper` where `value` is at that bound to within 1e-6 of the range.
+    pub fn at_bound(&self, value: f64) -> Option<&'static str> {
+        match self.position_of(value) {
+            u if u <= 1e-6 => Some("lower"),
+            u if u >= 1.0 - 1e-6 => Some("upper"),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tuner(scale: Scale, grid: Grid) -> Tuner {
+        Tuner {
+            name: "k".into(),
+            parameter: "k".into(),
+            start: 4.0,
+            bounds: [0.1, 50.0],
+            scale,
+            grid,
+            unit: Unit::one(),
+            case: None,
+            active: true,
+            tie: None,
+        }
+    }
+
+    #[test]
+    fn value_and_position_are_inverse() {
+        for scale in [Scale::Linear, Scale::Log] {
+            let t = tuner(scale, Grid::Continuous);
+            for value in [0.1, 0.2, 4.0, 49.0, 50.0] {
+                assert!((t.value_at(t.position_of(value)) - value).abs() < 1e-12 * value.max(1.0));
+            }
+            assert_eq!((t.value_at(0.0), t.value_at(1.0)), (0.1, 50.0));
+        }
+    }
+
+    #[test]
+    fn grids_are_kept() {
+        let whole = Tuner { bounds: [1.0, 5.0], ..tuner(Scale::Linear, Grid::Integer) };
+        assert_eq!((whole.value_at(0.3), whole.spacing()), (2.0, 0.25));
+        let list = Tuner { bounds: [1.0, 47.0], ..tuner(Scale::Linear, Grid::List(vec![1.0, 10.0, 22.0, 47.0])) };
+        assert_eq!((list.value_at(0.4), list.position_of(20.0)), (10.0, 2.0 / 3.0));
+    }
+
+    #[test]
+    fn a_value_at_its_bound_is_told() {
+        let t = tuner(Scale::Linear, Grid::Continuous);
+        assert_eq!((t.at_bound(0.1), t.at_bound(25.0), t.at_bound(50.0)), (Some("lower"), None, Some("upper")));
+    }
+}

@@ -1,0 +1,194 @@
+//! The Levenberg-Marquardt method for sums of squares, with bounds and several starts.
+
+use mops_core::{Halt, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
+use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::multistart::Multistart;
+use crate::start::usable_start;
+
+/// The Levenberg-Marquardt method: for calibrations, whose objective is a sum of squares of residuals `r`.
+/// ```text
+/// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
+/// ```
+/// Bounds are kept by an active set: tuners at a bound that the step would leave are held, and the rest solved again.
+/// Runs from the study's start, then from the best points of a sample of the box.
+///
+/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by
+/// H. B. Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct LevenbergMarquardtOptions {
+    /// Stop when a step promises, and brings, less than this part of the sum of squares.
+    pub tolerance: f64,
+    /// Number of starts, the study's own included.
+    pub starts: usize,
+    /// Largest number of iterations from each start.
+    pub max_iterations: usize,
+}
+
+impl Default for LevenbergMarquardtOptions {
+    fn default() -> Self {
+        Self { tolerance: 1e-9, starts: 4, max_iterations: 200 }
+    }
+}
+
+impl SolverOptions for LevenbergMarquardtOptions {
+    const KIND: &'static str = "levenberg-marquardt";
+
+    fn build(&self) -> Box<dyn Solver> {
+        let local = Local { options: self.clone(), state: None };
+        Box::new(LevenbergMarquardt { starts: Multistart::new(Box::new(local), self.starts) })
+    }
+}
+
+/// The solver of the kind `levenberg-marquardt`.
+struct LevenbergMarquardt {
+    starts: Multistart,
+}
+
+impl Solver for LevenbergMarquardt {
+    fn accepts(&self, shape: &Shape) -> Result<(), String> {
+        accepts(shape)
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.starts.begin(oracle, start)
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        self.starts.step(oracle)
+    }
+}
+
+fn accepts(shape: &Shape) -> Result<(), String> {
+    if shape.residuals == 0 {
+        return Err("`levenberg-marquardt` needs a sum of squares: objective = \"sum\" with `fit` or `normalised-error` criteria and simulations that succeed at the start; take `sqp`".into());
+    }
+    if shape.has_constraints() {
+        return Err("`levenberg-marquardt` treats bounds, but no other constraints; take `sqp`".into());
+    }
+    if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
+        return Err(
+            "`levenberg-marquardt` follows slopes and cannot treat whole numbers or lists; take `pattern-search`"
+                .into(),
+        );
+    }
+    Ok(())
+}
+
+/// The method from one start.
+struct Local {
+    options: LevenbergMarquardtOptions,
+    state: Option<State>,
+}
+
+struct State {
+    at: Linearisation,
+    jacobian: DMatrix<f64>,
+    residuals: DVector<f64>,
+    /// Squares of the scale of every coordinate.
+    scale: DVector<f64>,
+    damping: f64,
+    growth: f64,
+    iterations: usize,
+    /// Steps in a row that brought almost nothing.
+    idle: usize,
+}
+
+impl Solver for Local {
+    fn accepts(&self, shape: &Shape) -> Result<(), String> {
+        accepts(shape)
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
+        let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
+        let (jacobian, residuals) = matrices(&at);
+        let scale = DVector::from_iterator(start.len(), jacobian.column_iter().map(|c| c.norm_squared().max(1e-30)));
+        self.state = Some(State { at, jacobian, residuals, scale, damping: 1e-3, growth: 2.0, iterations: 0, idle: 0 });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        state.iterations += 1;
+        if state.at.at.point.is_empty() {
+            return Ok(Progress::Converged);
+        }
+        if state.iterations > self.options.max_iterations {
+            return Ok(Progress::Stalled);
+        }
+        let sum = state.residuals.norm_squared();
+        let Some(step) = state.bounded_step() else { return Ok(Progress::Stalled) };
+        let promised = sum - (&state.residuals + &state.jacobian * &step).norm_squared();
+        if promised <= self.options.tolerance * sum {
+            return Ok(Progress::Converged);
+        }
+        let point: Vec<f64> = state.at.at.point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
+        let answer = oracle.evaluate(std::slice::from_ref(&point))?.pop().expect("one point, one answer");
+        let achieved = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
+        let ratio = achieved / promised;
+        if ratio <= 1e-4 {
+            state.damping *= state.growth;
+            state.growth *= 2.0;
+            return Ok(if state.damping > 1e12 { Progress::Stalled } else { Progress::Continue });
+        }
+        let Some(at) = oracle.linearise(&point, 1.0)? else { return Ok(Progress::Stalled) };
+        (state.jacobian, state.residuals) = matrices(&at);
+        state.at = at;
+        for (scale, column) in state.scale.iter_mut().zip(state.jacobian.column_iter()) {
+            *scale = scale.max(column.norm_squared());
+        }
+        state.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+        state.growth = 2.0;
+        state.idle = if achieved <= 100.0 * self.options.tolerance * sum { state.idle + 1 } else { 0 };
+        Ok(if state.idle >= 3 { Progress::Converged } else { Progress::Continue })
+    }
+}
+
+fn matrices(at: &Linearisation) -> (DMatrix<f64>, DVector<f64>) {
+    let columns: Vec<DVector<f64>> = at.residuals.iter().map(|c| DVector::from_column_slice(c)).collect();
+    let residuals = DVector::from_column_slice(&at.at.residuals);
+    let jacobian =
+        if columns.is_empty() { DMatrix::zeros(residuals.len(), 0) } else { DMatrix::from_columns(&columns) };
+    (jacobian, residuals)
+}
+
+impl State {
+    /// The damped step inside the box: coordinates that would leave it are held at their bound, one more at a time.
+    fn bounded_step(&self) -> Option<DVector<f64>> {
+        let point = &self.at.at.point;
+        let n = point.len();
+        let mut held = DVector::<f64>::zeros(n);
+        let mut free = vec![true; n];
+        for _ in 0..=n {
+            let indices: Vec<usize> = (0..n).filter(|&j| free[j]).collect();
+            let mut step = held.clone();
+            if !indices.is_empty() {
+                let part = self.jacobian.select_columns(&indices);
+                let target = &self.residuals + &self.jacobian * &held;
+                let mut normal = part.transpose() * &part;
+                for (i, &j) in indices.iter().enumerate() {
+                    normal[(i, i)] += self.damping * self.scale[j];
+                }
+                let solved = normal.cholesky()?.solve(&(-(part.transpose() * target)));
+                for (i, &j) in indices.iter().enumerate() {
+                    step[j] = solved[i];
+                }
+            }
+            let outside = |j: usize| (point[j] + step[j] - 1.0).max(-(point[j] + step[j]));
+            let worst = indices.iter().copied().max_by(|&i, &j| outside(i).total_cmp(&outside(j)));
+            match worst.filter(|&j| outside(j) > 0.0) {
+                None => return Some(step),
+                Some(j) => {
+                    free[j] = false;
+                    held[j] = if step[j] > 0.0 { 1.0 - point[j] } else { -point[j] };
+                }
+            }
+        }
+        None
+    }
+}

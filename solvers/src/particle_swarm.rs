@@ -1,0 +1,68 @@
+//! The particle swarm of argmin.
+
+use argmin::core::Executor;
+use argmin::solver::particleswarm::ParticleSwarm;
+use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::argmin_adapter::Cost;
+
+/// Particle swarm optimisation, by argmin: a global search without slopes. It sees one number per point, the penalised
+/// maximum. Ends after a number of iterations.
+///
+/// Source: M. Zambrano-Bigiarini, M. Clerc, R. Rojas, Standard Particle Swarm Optimisation 2011, IEEE CEC (2013).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct ParticleSwarmOptions {
+    /// Number of particles.
+    pub particles: usize,
+    /// Number of iterations.
+    pub max_iterations: u64,
+}
+
+impl Default for ParticleSwarmOptions {
+    fn default() -> Self {
+        Self { particles: 40, max_iterations: 100 }
+    }
+}
+
+impl SolverOptions for ParticleSwarmOptions {
+    const KIND: &'static str = "particle-swarm";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(Swarm { options: self.clone() })
+    }
+}
+
+struct Swarm {
+    options: ParticleSwarmOptions,
+}
+
+impl Solver for Swarm {
+    fn accepts(&self, _: &Shape) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn begin(&mut self, _: &mut dyn Oracle, _: &[f64]) -> Result<(), Halt> {
+        Ok(())
+    }
+
+    /// argmin runs to its end in one step.
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let n = oracle.shape().dimension();
+        if n == 0 {
+            return Ok(Progress::Converged);
+        }
+        let random = oracle.stream("particle-swarm");
+        let method =
+            ParticleSwarm::new((vec![0.0; n], vec![1.0; n]), self.options.particles).with_rng_generator(random);
+        let cost = Cost::new(oracle);
+        let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
+        match (cost.halt(), run) {
+            (Some(halt), _) => Err(halt),
+            // A swarm has no test of an optimum.
+            _ => Ok(Progress::Stalled),
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! `mops data`: what is in a data file.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::data::DataFile;
+
+use super::tables::{number, table};
+use super::{Trouble, print};
+
+/// What is shown.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// A CSV file, or a MATLAB file of level 4 or 5.
+    file: PathBuf,
+}
+
+pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let file = DataFile::read(&arguments.file)?;
+    let names = file.column_names();
+    let mut rows = Vec::new();
+    let mut sampling = String::new();
+    for name in &names {
+        let column = file.column(name)?;
+        let finite: Vec<f64> = column.values.iter().copied().filter(|v| v.is_finite()).collect();
+        let low = finite.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = finite.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if matches!(name.to_lowercase().as_str(), "t" | "time") {
+            sampling = sample_time(name, &finite);
+        }
+        rows.push(vec![
+            name.clone(),
+            column.unit.unwrap_or("").to_owned(),
+            column.values.len().to_string(),
+            (column.values.len() - finite.len()).to_string(),
+            number(low),
+            number(high),
+            finite.first().copied().map_or_else(String::new, number),
+            finite.last().copied().map_or_else(String::new, number),
+            noise(&finite).map_or_else(String::new, number),
+        ]);
+    }
+    let header = ["column", "unit", "rows", "gaps", "min", "max", "first", "last", "noise (est.)"];
+    let mut text =
+        format!("{}: {}\n\n{}", arguments.file.display(), file.format, table(&header, &[2, 3, 4, 5, 6, 7, 8], rows));
+    if !sampling.is_empty() {
+        text += &format!("\n{sampling}\n");
+    }
+    for skipped in &file.skipped {
+        text += &format!("skipped: {skipped}\n");
+    }
+    print(&text);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn sample_time(name: &str, times: &[f64]) -> String {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let (Some(least), Some(most)) = (steps.first(), steps.last()) else { return String::new() };
+    let median = steps[steps.len() / 2];
+    let order = if *least > 0.0 { "" } else { "; it does not always increase" };
+    format!(
+        "`{name}` runs from {} to {}, steps {} (median) from {} to {}{order}",
+        number(times[0]),
+        number(times[times.len() - 1]),
+        number(median),
+        number(*least),
+        number(*most)
+    )
+}
+
+/// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
+fn noise(values: &[f64]) -> Option<f64> {
+    if values.len() < 20 {
+        return None;
+    }
+    let squares = values.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2));
+    #[allow(clippy::cast_precision_loss)]
+    let mean = squares.sum::<f64>() / (values.len() - 3) as f64;
+    Some((mean / 20.0).sqrt())
+}

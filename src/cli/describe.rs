@@ -1,0 +1,37 @@
+//! `mops describe`: the manual page of a kind or of a shipped study.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::{Catalogue, Diagnostic, suggestion};
+
+use super::{Trouble, print};
+
+/// What is described.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// A kind of model, criterion or solver, or a shipped study.
+    name: String,
+}
+
+pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let name = arguments.name.as_str();
+    let models = catalogue.models.iter().map(|k| (k.name, k.schema));
+    let criteria = catalogue.criteria.iter().map(|k| (k.name, k.schema));
+    let solvers = catalogue.solvers.iter().map(|k| (k.name, k.schema));
+    let mut kinds = models.chain(criteria).chain(solvers);
+    if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
+        print(&mops_core::file::describe(name, &schema()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
+        let file = |path| study.file(path).map(String::from_utf8_lossy).unwrap_or_default();
+        print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let known: Vec<&str> =
+        kinds.by_ref().map(|(name, _)| name).chain(catalogue.studies.iter().map(|s| s.name)).collect();
+    Err(Diagnostic::new(format!("nothing is called `{name}`"))
+        .with_help(suggestion(name, known.iter().copied()))
+        .into())
+}

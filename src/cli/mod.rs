@@ -1,0 +1,123 @@
+//! The command line: what can be typed, and which file does it.
+
+mod check;
+mod data;
+mod describe;
+mod list;
+mod new;
+mod progress;
+mod run;
+mod schema;
+mod simulate;
+mod study;
+mod tables;
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use mops_core::{Catalogue, Diagnostic};
+
+/// Multi-objective parameter synthesis: design controllers and identify models from measurements.
+///
+/// A study (a TOML file, or the name of a shipped one) names models, cases, tuners and criteria with their demands; mops
+/// chooses the tuners so that the worst scaled criterion is as small as it can be.
+#[derive(Parser)]
+#[command(
+    name = "mops",
+    version,
+    max_term_width = 100,
+    after_help = "\
+Begin with:
+  mops list                      what is there
+  mops run pid-design            run a shipped study; open results/pid-design/report.html
+  mops new my-loop               write a commented study to start from
+  mops describe settling-time    what a kind computes, and its options
+
+Exit status: 0 done; 1 done, but a constraint is violated; 2 the study, its data or the command line is wrong; 3 the run failed."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve a study and write result.json, report.html, plots and evaluations.
+    Run(run::Arguments),
+    /// Check a study and its data without running anything.
+    Check(check::Arguments),
+    /// List the kinds of model, criterion and solver, and the shipped studies.
+    List,
+    /// Describe a kind, a shipped study, or a signal list of a model: formula, options, units, source.
+    Describe(describe::Arguments),
+    /// Write a commented study to start from, or a copy of a shipped one.
+    New(new::Arguments),
+    /// Simulate a study once at given values: table of criteria, CSV and plots.
+    Simulate(simulate::Arguments),
+    /// Show what is in a data file: columns, units, ranges, gaps, sample time, noise.
+    Data(data::Arguments),
+    /// Print the JSON schema of study files, for completion in an editor.
+    Schema,
+    /// Print a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Why a command ends without its result.
+enum Trouble {
+    /// The user's mistake: status 2.
+    Mistake(Box<Diagnostic>),
+    /// The run or the machine: status 3.
+    Failure(String),
+}
+
+impl From<Diagnostic> for Trouble {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Mistake(Box::new(diagnostic))
+    }
+}
+
+/// A file that cannot be written.
+fn cannot_write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Trouble {
+    let path: PathBuf = path.to_owned();
+    move |error| Trouble::Failure(format!("{} cannot be written: {error}", path.display()))
+}
+
+/// Writes to standard output; a reader that closed its end early is no error.
+fn print(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(catalogue, &arguments),
+        Command::Check(arguments) => check::check(catalogue, &arguments),
+        Command::List => list::list(catalogue),
+        Command::Describe(arguments) => describe::describe(catalogue, &arguments),
+        Command::New(arguments) => new::new(catalogue, &arguments),
+        Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),
+        Command::Data(arguments) => data::data(&arguments),
+        Command::Schema => schema::schema(catalogue),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "mops", &mut script);
+            print(&String::from_utf8_lossy(&script));
+            Ok(ExitCode::SUCCESS)
+        }
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(Trouble::Mistake(diagnostic)) => {
+            study::show(&diagnostic);
+            ExitCode::from(2)
+        }
+        Err(Trouble::Failure(message)) => {
+            let _ = writeln!(std::io::stderr(), "error: {message}");
+            ExitCode::from(3)
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `mops new`: a study to start from.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::{Catalogue, Diagnostic, suggestion};
+
+use super::{Trouble, cannot_write, print, schema};
+
+/// What is written.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Folder to make; its name becomes the study's.
+    folder: PathBuf,
+    /// Copy this shipped study, with its data, instead of the commented template.
+    #[arg(long, value_name = "STUDY")]
+    from: Option<String>,
+}
+
+/// The commented study; `{name}` is replaced.
+const TEMPLATE: &str = include_str!("new.toml");
+
+pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let Arguments { folder, from } = arguments;
+    if folder.exists() {
+        return Err(Diagnostic::new(format!("`{}` is already there", folder.display()))
+            .with_help("give a folder that does not exist; nothing was written")
+            .into());
+    }
+    let files: Vec<(&str, Vec<u8>)> = match from {
+        Some(name) => {
+            let names = catalogue.studies.iter().map(|study| study.name);
+            let study = catalogue.studies.iter().find(|study| study.name == name).ok_or_else(|| {
+                Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names))
+            })?;
+            study.files.iter().map(|(path, bytes)| (*path, bytes.to_vec())).collect()
+        }
+        None => {
+            let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "study".into());
+            vec![("study.toml", TEMPLATE.replace("{name}", &name.replace(['"', '\\'], "-")).into_bytes())]
+        }
+    };
+    let schema = ("study.schema.json", schema::text(catalogue).into_bytes());
+    for (path, bytes) in files.into_iter().chain([schema]) {
+        let path = folder.join(path);
+        let parent = path.parent().expect("it lies in the folder");
+        std::fs::create_dir_all(parent).map_err(cannot_write(parent))?;
+        std::fs::write(&path, bytes).map_err(cannot_write(&path))?;
+    }
+    let study = folder.join("study.toml");
+    print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()));
+    Ok(ExitCode::SUCCESS)
+}

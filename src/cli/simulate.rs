@@ -1,0 +1,167 @@
+//! `mops simulate`: runs a study's models once at given values.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use mops_core::{Analysis, Catalogue, Diagnostic, Problem, Quantity, Response, Study, suggestion};
+
+use super::study::{StudyArguments, open};
+use super::tables::{criteria, number, table};
+use super::{Trouble, cannot_write, print};
+use crate::report::{Curve, Plot, file_name, points};
+
+/// What is simulated.
+#[derive(Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Value of a tuner instead of its start value: --at k=5.48 --at "Ti=4.67 s".
+    #[arg(long = "at", value_name = "TUNER=VALUE")]
+    at: Vec<String>,
+    /// Only this case.
+    #[arg(long)]
+    case: Option<String>,
+    /// Number of evenly spaced times in the CSV file.
+    #[arg(long, default_value_t = 1001, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    samples: u32,
+    /// Folder for CSV files and plots; nothing is written where absent.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let study = open(catalogue, &arguments.study)?.study;
+    let tuners = values(&study, &arguments.at)?;
+    if let Some(case) = &arguments.case {
+        let names = study.cases.iter().map(|c| c.name.as_str());
+        if !names.clone().any(|name| name == case) {
+            return Err(Diagnostic::new(format!("the study has no case `{case}`"))
+                .with_help(suggestion(case, names))
+                .into());
+        }
+    }
+    let problem = Problem::new(Arc::new(study));
+    let study = problem.study();
+    let start = problem.evaluate_at(&study.start());
+    let here = problem.evaluate_at(&tuners);
+    let wanted = |case: &str| arguments.case.as_ref().is_none_or(|only| only == case);
+    let pick = |evaluation| {
+        let mut reports = mops_core::criterion_reports(study, evaluation);
+        reports.retain(|report| wanted(&report.case));
+        reports
+    };
+    print(&criteria(&pick(&start), &pick(&here)).replace("optimum", "here   "));
+    let mut failed = false;
+    for (job, plan) in study.jobs.iter().enumerate() {
+        let (model, case) = (&study.models[plan.model].0, &study.cases[plan.case].name);
+        if !wanted(case) {
+            continue;
+        }
+        match problem.analyse_all(job, &tuners, None) {
+            Err(failure) => {
+                failed = true;
+                print(&format!("\n{model} in case {case}: {failure}\n"));
+            }
+            Ok(Analysis::Time(response)) => {
+                print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)));
+                if let Some(folder) = &arguments.out {
+                    write(folder, &format!("{model}-{case}"), study, plan.model, &response, arguments.samples)?;
+                }
+            }
+        }
+    }
+    if let Some(folder) = &arguments.out {
+        print(&format!("\nCSV files and plots are in {}\n", folder.display()));
+    }
+    if failed { Err(Trouble::Failure("a simulation failed".into())) } else { Ok(ExitCode::SUCCESS) }
+}
+
+/// Values of all tuners: the start values, and what the command line puts over them.
+fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Diagnostic> {
+    let mut values = study.start();
+    for text in given {
+        let (name, value) = text.split_once('=').ok_or_else(|| {
+            Diagnostic::new(format!("`--at {text}` names no value")).with_help("write it as --at k=5.48")
+        })?;
+        let names = study.tuners.iter().map(|t| t.name.as_str());
+        let index = study.tuners.iter().position(|t| t.name == name.trim()).ok_or_else(|| {
+            Diagnostic::new(format!("the study has no tuner `{}`", name.trim()))
+                .with_help(suggestion(name.trim(), names))
+        })?;
+        let quantity = Quantity::parse(value).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
+        values[index] =
+            quantity.to(&study.tuners[index].unit).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
+    }
+    study.apply_ties(&mut values);
+    Ok(values)
+}
+
+fn summary(study: &Study, model: usize, response: &Response) -> String {
+    let units = &study.models[model].1.interface().signals;
+    let rows = response.traces.iter().zip(units).map(|((name, trace), signal)| {
+        let ((high, high_at), (low, low_at)) = (trace.maximum(), trace.minimum());
+        vec![
+            name.clone(),
+            signal.unit.to_string(),
+            number(trace.first()),
+            number(low),
+            number(low_at),
+            number(high),
+            number(high_at),
+            number(trace.last()),
+        ]
+    });
+    let header = ["signal", "unit", "start", "min", "at s", "max", "at s", "end"];
+    let mut text = table(&header, &[2, 3, 4, 5, 6, 7], rows.collect());
+    let work = response.work;
+    text += &format!("\n{} steps, {} rejected, {} derivatives\n", work.steps, work.rejected, work.derivatives);
+    for event in response.events.iter().take(20) {
+        text += &format!("{:>12} s  {}\n", number(event.time), event.what);
+    }
+    if response.events.len() > 20 {
+        text += &format!("and {} more events\n", response.events.len() - 20);
+    }
+    text
+}
+
+fn write(
+    folder: &Path,
+    name: &str,
+    study: &Study,
+    model: usize,
+    response: &Response,
+    samples: u32,
+) -> Result<(), Trouble> {
+    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+    let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
+    let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
+    let units = &study.models[model].1.interface().signals;
+    let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
+    let path = folder.join(file_name(name) + ".csv");
+    let csv = || -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_path(&path)?;
+        let names = response.traces.iter().zip(units).map(|((name, _), s)| format!("{name}[{}]", s.unit));
+        writer.write_record(["t[s]".to_owned()].into_iter().chain(names))?;
+        for (i, t) in times.iter().enumerate() {
+            writer.write_record([t].into_iter().chain(columns.iter().map(|c| &c[i])).map(f64::to_string))?;
+        }
+        writer.flush()?;
+        Ok(())
+    };
+    csv().map_err(|error| cannot_write(&path)(std::io::Error::other(error)))?;
+    for ((signal, trace), variable) in response.traces.iter().zip(units) {
+        let plot = Plot {
+            title: format!("{signal}: {}", variable.about),
+            x_label: "time (s)".into(),
+            y_label: format!("{signal} ({})", variable.unit),
+            curves: vec![Curve { name: signal.clone(), points: points(trace), ..Curve::default() }],
+            ..Plot::default()
+        };
+        let path = folder.join(file_name(&format!("{name}-{signal}")));
+        std::fs::write(path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
+        plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
+    }
+    Ok(())
+}

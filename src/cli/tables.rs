@@ -1,0 +1,148 @@
+//! Tables on the terminal: aligned, with units.
+
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
+use mops_core::{CriterionReport, Outcome, Usage};
+
+/// A number with about six significant digits, short.
+pub(super) fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "-".into();
+    }
+    let size = value.abs();
+    if value == 0.0 || (1e-3..1e6).contains(&size) {
+        #[allow(clippy::cast_possible_truncation)]
+        let before = if size >= 1.0 { size.log10().floor() as i32 + 1 } else { 1 };
+        let digits = usize::try_from((6 - before).clamp(0, 6)).unwrap_or(0);
+        let text = format!("{value:.digits$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
+/// A table with a header, columns of numbers to the right.
+pub(super) fn table(header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(header.iter().map(Cell::new));
+    for row in rows {
+        table.add_row(row);
+    }
+    for &column in numeric {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+}
+
+/// The criteria at the start and at the optimum, side by side.
+pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport]) -> String {
+    let usage = |usage| match usage {
+        Usage::Minimise => "minimise",
+        Usage::Inequality => "inequality",
+        Usage::Equality => "equality",
+        Usage::Monitor => "monitor",
+    };
+    let rows = start.iter().zip(best).map(|(start, best)| {
+        let demand = match (best.demand, best.good, best.bad) {
+            _ if best.usage == Usage::Monitor => String::new(),
+            (Some(demand), ..) => number(demand),
+            (None, Some(good), Some(bad)) => format!("{} .. {}", number(good), number(bad)),
+            _ => String::new(),
+        };
+        let met = if best.usage == Usage::Monitor {
+            ""
+        } else if best.met {
+            "yes"
+        } else {
+            "no"
+        };
+        let scaled =
+            |report: &CriterionReport| if best.usage == Usage::Monitor { String::new() } else { number(report.scaled) };
+        vec![
+            best.case.clone(),
+            best.name.clone(),
+            usage(best.usage).to_owned(),
+            demand,
+            number(start.value),
+            number(best.value),
+            best.unit.clone(),
+            scaled(start),
+            scaled(best),
+            met.to_owned(),
+            best.note.unwrap_or_default().to_owned(),
+        ]
+    });
+    let header =
+        ["case", "criterion", "usage", "demand", "start", "optimum", "unit", "scaled start", "scaled", "met", ""];
+    table(&header, &[3, 4, 5, 7, 8], rows.collect())
+}
+
+/// Everything worth a line after a run.
+pub(super) fn outcome(outcome: &Outcome) -> String {
+    let mut text = format!("\n{}", criteria(&outcome.start.criteria, &outcome.criteria));
+    let tuners = outcome.tuners.iter().map(|t| {
+        let bound = t.at_bound.map_or_else(String::new, |side| format!("at its {side} bound"));
+        let [low, high] = t.bounds.map(number);
+        vec![t.name.clone(), number(t.start), number(t.value), t.unit.clone(), low, high, bound]
+    });
+    let header = ["tuner", "start", "optimum", "unit", "min", "max", ""];
+    text += &format!("\n{}", table(&header, &[1, 2, 4, 5], tuners.collect()));
+    if let Some(calibration) = &outcome.calibration {
+        let channels = calibration.experiments.iter().flat_map(|e| e.channels.iter().map(move |c| (e, c)));
+        let rows = channels.map(|(e, c)| {
+            let role = format!("{:?}", e.role).to_lowercase();
+            let noise = c.noise.map_or_else(String::new, number);
+            vec![
+                e.name.clone(),
+                role,
+                c.name.clone(),
+                number(c.rmse),
+                noise,
+                c.unit.clone(),
+                format!("{:.2}", c.fit_percent),
+            ]
+        });
+        let header = ["experiment", "role", "channel", "rmse", "noise", "unit", "fit %"];
+        text += &format!("\n{}", table(&header, &[3, 4, 6], rows.collect()));
+    }
+    for failure in &outcome.failures {
+        text += &format!(
+            "\n{} of model {} in case {}: {} times",
+            failure.failure, failure.model, failure.case, failure.count
+        );
+    }
+    for warning in &outcome.warnings {
+        text += &format!("\nwarning: {warning}");
+    }
+    let stop = format!("{:?}", outcome.stop).to_lowercase();
+    let feasible = if outcome.feasible {
+        "feasible".to_owned()
+    } else {
+        format!("infeasible, a constraint is violated by {} of its demand", number(outcome.violation))
+    };
+    text += &format!(
+        "\n{feasible}; worst scaled value {} (start {}); {stop} after {} evaluations, {} simulations, {:.2} s\n",
+        number(outcome.worst_scaled),
+        number(outcome.start.worst_scaled),
+        outcome.evaluations,
+        outcome.simulations,
+        outcome.seconds
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_have_six_digits_and_no_idle_zeros() {
+        for (value, text) in
+            [(0.0, "0"), (0.863_070_4, "0.86307"), (12.953_760_5, "12.9538"), (1.5e-7, "1.5000e-7"), (20.0, "20")]
+        {
+            assert_eq!(number(value), text);
+        }
+    }
+}

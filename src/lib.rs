@@ -1,0 +1,66 @@
+//! Multi-objective parameter synthesis: design and identification as weighted min-max problems.
+//!
+//! A study brings models, cases, tuners and criteria together. [`solve`] turns it into a min-max problem over the unit
+//! box, runs a solver on it and reports the outcome:
+//!
+//! ```
+//! use mops::{CaseDraft, CriterionDraft, Draft, ModelDraft, Options, TunerDraft, criteria::overshoot::Overshoot};
+//! # use mops::{Analysis, Failure, Interface, Job, Model, Parameter, Response, Trace, Variable};
+//! # struct Lag(Interface);
+//! # impl Model for Lag {
+//! #     fn interface(&self) -> &Interface { &self.0 }
+//! #     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+//! #         let mut y = Trace::starting_at(0.0, 1);
+//! #         y.push(1.0, Trace::NODES.map(|s| s + job.parameters[0].powi(2) * s * (1.0 - s)));
+//! #         Ok(Analysis::Time(Response { traces: vec![("y".into(), y)], ..Response::default() }))
+//! #     }
+//! # }
+//! # let model = Lag(Interface {
+//! #     signals: vec![Variable::new("y", "1", "output")],
+//! #     parameters: vec![Parameter::new("k", "1", "gain")],
+//! #     horizon: Some(1.0),
+//! #     ..Interface::default()
+//! # });
+//! let study = Draft {
+//!     name: "example".into(),
+//!     models: vec![("loop".into(), model.into())],
+//!     tuners: vec![("k".into(), TunerDraft::new(3.0, 0.5, 5.0))],
+//!     criteria: vec![(
+//!         "overshoot".into(),
+//!         CriterionDraft::minimise(Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() }, 0.1),
+//!     )],
+//!     ..Draft::default()
+//! }
+//! .build()?;
+//! let solved = mops::solve(study, &Options::default(), &())?;
+//! assert!(solved.outcome.worst_scaled < 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod cli;
+mod report;
+mod solve;
+
+use std::process::ExitCode;
+
+pub use mops_core::*;
+pub use mops_criteria as criteria;
+pub use mops_models as models;
+pub use mops_solvers as solvers;
+pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report};
+pub use solve::{Options, Solved, Unsuitable, solve};
+
+/// Everything that comes with mops: models, criteria, solvers and studies.
+pub fn catalogue() -> Catalogue {
+    Catalogue {
+        models: mops_models::kinds(),
+        criteria: mops_criteria::kinds(),
+        solvers: mops_solvers::kinds(),
+        studies: mops_studies::shipped(),
+    }
+}
+
+/// The command line over a catalogue; a crate with kinds of its own calls it from its `main`.
+pub fn main(catalogue: Catalogue) -> ExitCode {
+    cli::main(&catalogue)
+}

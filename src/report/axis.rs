@@ -1,0 +1,130 @@
+//! Axes: round ticks within a range, and their labels.
+
+use super::range::drawable;
+
+/// An axis that is ready to be drawn.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    /// Shown range; of a logarithmic axis, in decades.
+    range: [f64; 2],
+    log: bool,
+    /// Positions between 0 and 1, and what stands there.
+    pub(super) ticks: Vec<(f64, String)>,
+    /// Factor that all labels leave out, such as `x 10^-6`.
+    pub(super) factor: Option<String>,
+}
+
+impl Axis {
+    /// An axis over `range`, of which `log` says whether it is the range of the logarithms; about `count` ticks.
+    pub(super) fn new(range: [f64; 2], log: bool, count: f64) -> Self {
+        if log {
+            return Self { range, log, ticks: decades(range), factor: None };
+        }
+        let [low, high] = range;
+        let step = round_step((high - low) / count);
+        let power = low.abs().max(high.abs()).log10().floor();
+        // Powers that engineers have a prefix for, and only where the plain number is hard to read.
+        let power = if (-3.0..5.0).contains(&power) { 0.0 } else { (power / 3.0).floor() * 3.0 };
+        let factor = 10f64.powf(power);
+        let decimals = (-(step / factor).log10().floor()).clamp(0.0, 12.0) as usize;
+        let ticks = (0..=(2.0 * count) as usize)
+            .map(|i| ((low / step - 1e-9).ceil() + i as f64) * step)
+            .filter(|&value| value <= high + 1e-9 * step)
+            // Adding zero turns -0 into 0.
+            .map(|value| ((value - low) / (high - low), format!("{:.decimals$}", value / factor + 0.0)))
+            .collect();
+        let factor = (power != 0.0).then(|| format!("\u{d7}\u{2009}10{}", superscript(power as i32)));
+        Self { range, log, ticks, factor }
+    }
+
+    /// Where a value stands: 0 at the start of the axis, 1 at its end; `None` where it cannot be drawn.
+    pub(super) fn position(&self, value: f64) -> Option<f64> {
+        let value = drawable(value, self.log)?;
+        Some((value - self.range[0]) / (self.range[1] - self.range[0]))
+    }
+}
+
+/// The next of 1, 2, 5 times a power of ten.
+fn round_step(step: f64) -> f64 {
+    let power = 10f64.powf(step.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| step <= f * power * (1.0 + 1e-9)).unwrap_or(10.0);
+    factor * power
+}
+
+/// Ticks of a logarithmic axis: powers of ten, and 2 and 5 between them where there are few.
+fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
+    let every = ((high - low) / 7.0).ceil().max(1.0) as i32;
+    let steps: &[f64] = if high - low <= 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let mut ticks = Vec::new();
+    for power in low.floor() as i32..=high.ceil() as i32 {
+        if power.rem_euclid(every) != 0 {
+            continue;
+        }
+        for step in steps {
+            let at = f64::from(power) + step.log10();
+            if at >= low - 1e-9 && at <= high + 1e-9 {
+                let label = match power {
+                    -3..=3 => super::numbers::significant(step * 10f64.powi(power), 1),
+                    _ if *step == 1.0 => format!("10{}", superscript(power)),
+                    _ => format!("{step}\u{b7}10{}", superscript(power)),
+                };
+                ticks.push(((at - low) / (high - low), label));
+            }
+        }
+    }
+    ticks
+}
+
+fn superscript(number: i32) -> String {
+    let raised = |c| match c {
+        '-' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        c => char::from_u32(0x2070 + c as u32 - '0' as u32).unwrap_or(c),
+    };
+    number.to_string().chars().map(raised).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::range::range_of;
+    use super::*;
+
+    fn labels(axis: &Axis) -> Vec<&str> {
+        axis.ticks.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_labelled_alike() {
+        assert_eq!(labels(&Axis::new([0.0, 1.1], false, 6.0)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        let small = Axis::new([-2e-6, 2e-6], false, 5.0);
+        assert_eq!(
+            (labels(&small), small.factor.as_deref()),
+            (vec!["-2", "-1", "0", "1", "2"], Some("\u{d7}\u{2009}10\u{207b}\u{2076}"))
+        );
+        assert_eq!(labels(&Axis::new([-1.0, 2.0], true, 5.0)), ["0.1", "1", "10", "100"]);
+    }
+
+    #[test]
+    fn ticks_of_a_constant_are_finite() {
+        for value in [0.0, 1.0, -3e-200, 1e16, 1e149, 1e-99] {
+            let axis = Axis::new(range_of([value, value].into_iter()).unwrap(), false, 6.0);
+            assert!(
+                axis.ticks.len() >= 2 && axis.ticks.iter().all(|(at, _)| (-0.01..=1.01).contains(at)),
+                "{value} {axis:?}"
+            );
+        }
+        assert_eq!(range_of(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn values_that_cannot_be_drawn_have_no_position() {
+        let (linear, log) = (Axis::new([0.0, 1.0], false, 5.0), Axis::new([0.0, 1.0], true, 5.0));
+        assert_eq!(
+            (linear.position(f64::NAN), linear.position(f64::INFINITY), linear.position(0.5)),
+            (None, None, Some(0.5))
+        );
+        assert_eq!((log.position(0.0), log.position(-1.0), log.position(10.0)), (None, None, Some(1.0)));
+    }
+}

@@ -1,0 +1,134 @@
+//! The tables of a calibration: estimates with their errors, and how well every channel is met.
+
+use maud::{Markup, html};
+use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
+
+use super::figures::role_name;
+use super::numbers::{number, percent, significant};
+use super::page::scrolling;
+
+/// Parameters, then experiments.
+pub(super) fn section(calibration: &CalibrationReport) -> Markup {
+    html! {
+        @if !calibration.parameters.is_empty() {
+            h3 { "Parameters" }
+            p {
+                "Standard errors are to first order and for white residuals; where residuals are correlated, or the model is "
+                "wrong, they are too small."
+            }
+            (scrolling("Parameters", parameters(&calibration.parameters)))
+        }
+        @if !calibration.experiments.is_empty() {
+            h3 { "Experiments" }
+            p {
+                "RMSE is the root mean square of measured - simulated; beside the noise it tells what the model leaves "
+                "unexplained (1 is all that can be had). A fit of 100 % is exact, 0 % no better than the mean."
+            }
+            (scrolling("Experiments", experiments(calibration)))
+        }
+    }
+}
+
+fn parameters(parameters: &[ParameterReport]) -> Markup {
+    html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "parameter" }
+                    th scope="col" class="number" { "estimate" }
+                    th scope="col" class="number" { "standard error" }
+                    th scope="col" class="number" { "relative" }
+                    th scope="col" class="number" { "95 % from" }
+                    th scope="col" class="number" { "to" }
+                    th scope="col" { "unit" }
+                }
+            }
+            tbody {
+                @for parameter in parameters {
+                    @let known = parameter.std_error.is_finite();
+                    tr {
+                        th scope="row" { (parameter.name) }
+                        td class="number" { strong { (number(parameter.value)) } }
+                        @if known {
+                            td class="number" { (significant(parameter.std_error, 3)) }
+                            td class="number" { (percent((parameter.std_error / parameter.value).abs())) }
+                            td class="number" { (number(parameter.interval95[0])) }
+                            td class="number" { (number(parameter.interval95[1])) }
+                        } @else {
+                            td colspan="4" class="missed" { "the data do not determine it" }
+                        }
+                        td { (parameter.unit) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn experiments(calibration: &CalibrationReport) -> Markup {
+    html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "experiment" }
+                    th scope="col" { "role" }
+                    th scope="col" { "channel" }
+                    th scope="col" class="number" { "RMSE" }
+                    th scope="col" class="number" { "noise" }
+                    th scope="col" { "unit" }
+                    th scope="col" class="number" { "RMSE / noise" }
+                    th scope="col" class="number" { "fit" }
+                }
+            }
+            tbody {
+                @for experiment in &calibration.experiments {
+                    @for channel in &experiment.channels {
+                        tr {
+                            th scope="row" { (experiment.name) }
+                            td { (role_name(experiment.role)) }
+                            (channel_cells(channel))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn channel_cells(channel: &ChannelReport) -> Markup {
+    html! {
+        td { (channel.name) }
+        td class="number" { (number(channel.rmse)) }
+        td class="number" { @if let Some(noise) = channel.noise { (number(noise)) } @else { "not known" } }
+        td { (channel.unit) }
+        td class="number" { @if let Some(noise) = channel.noise { (significant(channel.rmse / noise, 3)) } }
+        td class="number" { @if channel.fit_percent.is_finite() { (format!("{:.1} %", channel.fit_percent)) } @else { "n/a" } }
+    }
+}
+
+/// Simulations that failed on the way.
+pub(super) fn failures(failures: &[FailureReport]) -> Markup {
+    let table = html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "case" }
+                    th scope="col" { "model" }
+                    th scope="col" { "failure" }
+                    th scope="col" class="number" { "how often" }
+                }
+            }
+            tbody {
+                @for failure in failures {
+                    tr {
+                        th scope="row" { (failure.case) }
+                        td { (failure.model) }
+                        td { (failure.failure) }
+                        td class="number" { (failure.count) }
+                    }
+                }
+            }
+        }
+    };
+    scrolling("Failures", table)
+}

@@ -1,0 +1,97 @@
+//! Start and reported point beside each other: a signal in both, and measurements with them.
+
+use mops_core::{Analysis, Channel, Failure, Trace, Variable};
+
+use super::numbers::{labelled, with_unit};
+use super::plot::{Band, Curve, CurveStyle, Ink, Plot};
+use super::sampling;
+
+/// The two analyses that are compared.
+pub(super) struct Both {
+    pub(super) start: Result<Analysis, Failure>,
+    pub(super) best: Result<Analysis, Failure>,
+    pub(super) best_name: &'static str,
+}
+
+impl Both {
+    /// Sentences for the simulations that failed.
+    pub(super) fn failures(&self) -> Vec<String> {
+        let told = |at: &str, analysis: &Result<Analysis, Failure>| {
+            analysis
+                .as_ref()
+                .err()
+                .map(|failure| format!("No response at the {at}: the simulation failed ({failure})."))
+        };
+        told("start values", &self.start).into_iter().chain(told(self.best_name, &self.best)).collect()
+    }
+
+    fn curves(&self, signal: &str) -> Vec<Curve> {
+        let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, ink| {
+            let points = sampling::points(trace(analysis, signal)?);
+            Some(Curve { name: name.to_owned(), points, style, ink, may_leave: ink == Ink::Start })
+        };
+        let start = curve("start", &self.start, CurveStyle::Dashed, Ink::Start);
+        start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Ink::Result)).collect()
+    }
+
+    /// A signal at both points.
+    pub(super) fn response(&self, signal: &Variable, case: &str) -> Plot {
+        Plot {
+            title: format!("{} in case {case}", signal.name),
+            curves: self.curves(&signal.name),
+            ..over_time(signal)
+        }
+    }
+
+    /// A measured signal at both points, and the measurement.
+    pub(super) fn fit(&self, channel: &Channel, signal: &Variable, case: &str) -> Plot {
+        let points = channel.times.iter().copied().zip(channel.values.iter().copied()).collect();
+        let mut curves = vec![Curve {
+            name: "measured".to_owned(),
+            points,
+            style: CurveStyle::Dots,
+            ink: Ink::Measured,
+            may_leave: false,
+        }];
+        curves.extend(self.curves(&signal.name));
+        Plot { title: format!("{} in experiment {case}", signal.name), curves, ..over_time(signal) }
+    }
+
+    /// Measured - simulated at the reported point; `None` where that failed.
+    pub(super) fn residual(&self, channel: &Channel, signal: &Variable, case: &str) -> Option<Plot> {
+        let trace = trace(&self.best, &signal.name)?;
+        let simulated = trace.sample(&channel.times);
+        let residuals = channel.values.iter().zip(simulated).map(|(measured, simulated)| measured - simulated);
+        let curve = Curve {
+            name: format!("measured - simulated, {}", self.best_name),
+            points: channel.times.iter().copied().zip(residuals).collect(),
+            style: CurveStyle::Dots,
+            ..Curve::default()
+        };
+        let ends = [trace.start(), trace.end()];
+        let zero = Curve { points: ends.map(|t| (t, 0.0)).to_vec(), ink: Ink::Faint, ..Curve::default() };
+        let band = |noise: f64| Band {
+            name: format!("\u{b1}2 noise, {}", with_unit(2.0 * noise, &signal.unit.to_string())),
+            range: [-2.0 * noise, 2.0 * noise],
+        };
+        Some(Plot {
+            title: format!("residual of {} in experiment {case}", signal.name),
+            curves: vec![zero, curve],
+            // Over the whole simulation, as the plot above.
+            x_range: Some(ends),
+            bands: channel.noise.map(band).into_iter().collect(),
+            ..over_time(signal)
+        })
+    }
+}
+
+fn trace<'a>(analysis: &'a Result<Analysis, Failure>, signal: &str) -> Option<&'a Trace> {
+    match analysis {
+        Ok(Analysis::Time(response)) => response.trace(signal),
+        Err(_) => None,
+    }
+}
+
+fn over_time(signal: &Variable) -> Plot {
+    Plot { x_label: "time (s)".into(), y_label: labelled(&signal.name, &signal.unit.to_string()), ..Plot::default() }
+}

@@ -1,0 +1,146 @@
+//! How the best point improved from evaluation to evaluation.
+
+use mops_core::{FEASIBLE, Merit, Objective, Record, Study, Task, Usage};
+
+use super::figures::{Figure, Group};
+use super::numbers::counted;
+use super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+
+/// The plots of objective and violation over evaluations.
+pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
+    let failed = archive.iter().filter(|r| r.merit.objective.is_infinite()).count();
+    let mut about = Vec::new();
+    if failed > 0 {
+        about.push(format!(
+            "{} of {} had no value, because a simulation or a criterion failed.",
+            failed,
+            counted(archive.len(), "point")
+        ));
+    }
+    let best = improvements(archive);
+    let feasible = Merit::is_feasible;
+    let first_feasible = best.iter().find(|(_, merit)| feasible(merit));
+    let constrained = study.rows.iter().any(|row| matches!(row.usage, Usage::Inequality | Usage::Equality));
+    if constrained {
+        about.push(match first_feasible {
+            Some((1, _)) => "The start already satisfies every constraint.".to_owned(),
+            Some((at, _)) => format!("The first point that satisfies every constraint is number {at}."),
+            None => "No point satisfies every constraint.".to_owned(),
+        });
+    }
+    let mut plots = vec![("convergence".to_owned(), objective(study, archive, &best))];
+    if best.iter().any(|(_, merit)| merit.violation.is_finite() && !feasible(merit)) {
+        plots.push(("convergence-violation".to_owned(), violation(&best, archive.len())));
+    }
+    let figures = plots.into_iter().map(|plot| Figure { plots: vec![plot], caption: Vec::new() }).collect();
+    Group { title: String::new(), about, figures }
+}
+
+/// The evaluations, counted from 1, at which the best point changed, and what it was worth from then on.
+fn improvements(archive: &[Record]) -> Vec<(usize, Merit)> {
+    let mut best: Vec<(usize, Merit)> = Vec::new();
+    for (i, record) in archive.iter().enumerate() {
+        if best.last().is_none_or(|(_, merit)| record.merit.is_better_than(merit)) {
+            best.push((i + 1, record.merit));
+        }
+    }
+    best
+}
+
+fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot {
+    let name = match study.objective {
+        Objective::Max => "worst scaled criterion",
+        Objective::Sum => "sum of weighted scaled criteria",
+    };
+    // The objective of an infeasible point can be low for the wrong reason: it is drawn in another colour.
+    let split = best.iter().position(|(_, merit)| merit.is_feasible()).unwrap_or(best.len());
+    let end = best.get(split).map_or(archive.len(), |(at, _)| *at);
+    let before = steps(&best[..split], end, |m| m.objective);
+    let after = steps(&best[split..], archive.len(), |m| m.objective);
+    let all = archive.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.merit.objective)).collect();
+    let curves = vec![
+        Curve { name: "every point".into(), points: all, style: CurveStyle::Dots, ink: Ink::Start, may_leave: true },
+        Curve {
+            name: "best so far, a constraint violated".into(),
+            points: before,
+            ink: Ink::Measured,
+            ..Curve::default()
+        },
+        Curve { name: "best so far".into(), points: after, ..Curve::default() },
+    ];
+    // Only without weights is a worst scaled value of 1 the demand itself.
+    let weighted = study.rows.iter().any(|row| row.usage == Usage::Minimise && row.weight != 1.0);
+    let demanded = study.task == Task::Design && study.objective == Objective::Max && !weighted;
+    let levels = if demanded { vec![Level { name: "demand".into(), value: 1.0 }] } else { Vec::new() };
+    Plot {
+        title: "Objective of the best point".into(),
+        x_label: "evaluations".into(),
+        x_range: Some([1.0, archive.len() as f64]),
+        y_label: name.into(),
+        log_y: spans_decades(best.iter().map(|(_, merit)| merit.objective)),
+        curves,
+        levels,
+        ..Plot::default()
+    }
+}
+
+fn violation(best: &[(usize, Merit)], evaluations: usize) -> Plot {
+    // Where the constraints hold the violation is zero, which a logarithmic axis cannot show: the line ends there.
+    let split = best.iter().position(|(_, merit)| merit.is_feasible());
+    let end = split.map_or(evaluations, |at| best[at].0);
+    let infeasible = &best[..split.unwrap_or(best.len())];
+    let points = steps(infeasible, end, |m| m.violation);
+    let values = infeasible.iter().map(|(_, merit)| merit.violation).filter(|v| *v > FEASIBLE);
+    Plot {
+        title: "Largest violation of a constraint at the best point".into(),
+        x_label: "evaluations".into(),
+        x_range: Some([1.0, evaluations as f64]),
+        y_label: "scaled violation".into(),
+        log_y: spans_decades(values),
+        curves: vec![Curve {
+            name: "best so far, a constraint violated".into(),
+            points,
+            ink: Ink::Measured,
+            ..Curve::default()
+        }],
+        ..Plot::default()
+    }
+}
+
+/// A line that keeps each value until the next improvement.
+fn steps(best: &[(usize, Merit)], end: usize, value: impl Fn(&Merit) -> f64) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    for (i, (at, merit)) in best.iter().enumerate() {
+        let until = best.get(i + 1).map_or(end, |(next, _)| *next);
+        points.extend([(*at as f64, value(merit)), (until as f64, value(merit))]);
+    }
+    points
+}
+
+/// Whether the finite values are positive and their largest is more than a hundred times their smallest.
+fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
+    let range = values.filter(|v| v.is_finite()).map(|v| [v, v]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+    range.is_some_and(|[low, high]| low > 0.0 && high > 100.0 * low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_point_is_kept_until_a_better_one_comes() {
+        let record =
+            |violation, objective| Record { tuners: vec![], values: vec![], merit: Merit { violation, objective } };
+        let archive = [
+            record(0.5, 1.0),
+            record(f64::INFINITY, f64::INFINITY),
+            record(0.0, 3.0),
+            record(0.0, 4.0),
+            record(0.0, 2.0),
+        ];
+        let best = improvements(&archive);
+        assert_eq!(best.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [1, 3, 5]);
+        assert_eq!(steps(&best[1..], 5, |m| m.objective), [(3.0, 3.0), (5.0, 3.0), (5.0, 2.0), (5.0, 2.0)]);
+        assert!(spans_decades([1.0, 1e3, f64::INFINITY].into_iter()) && !spans_decades([-1.0, 1e3].into_iter()));
+    }
+}

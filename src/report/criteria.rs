@@ -1,0 +1,125 @@
+//! The table of criteria, with bars on which the demand is marked.
+
+use maud::{Markup, html};
+use mops_core::{CriterionReport, Task, Usage};
+
+use super::Report;
+use super::numbers::{number, significant, with_unit};
+use super::page::scrolling;
+
+/// What a criterion is asked for, with its unit; `None` where it is only watched and nothing was asked.
+pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
+    match (criterion.demand, criterion.good, criterion.bad) {
+        // A criterion that is only watched is scaled by 1 where the study gives it no demand.
+        (Some(1.0), _, _) if criterion.usage == Usage::Monitor => None,
+        (Some(demand), _, _) => Some(with_unit(demand, &criterion.unit)),
+        (None, Some(good), Some(bad)) => {
+            let side = if good > bad { "at least" } else { "at most" };
+            Some(format!("{side} {}, good {}", with_unit(bad, &criterion.unit), number(good)))
+        }
+        _ => None,
+    }
+}
+
+/// All criteria in all cases, at the start and at the reported point.
+pub(super) fn table(report: &Report<'_>) -> Markup {
+    let (outcome, best) = (report.outcome, report.best_name());
+    let models = report.problem.study().models.len() > 1;
+    let shape = report.problem.shape();
+    let rows = outcome.criteria.iter().zip(&outcome.start.criteria).zip(&shape.rows);
+    let rows_and_head = html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "criterion" }
+                    th scope="col" { "case" }
+                    @if models { th scope="col" { "model" } }
+                    th scope="col" { "usage" }
+                    th scope="col" class="number" { "demand" }
+                    th scope="col" class="number" { "at start" }
+                    th scope="col" class="number" { "at " (best) }
+                    th scope="col" { "unit" }
+                    th scope="col" class="number" { "scaled at start" }
+                    th scope="col" { "scaled at " (best) }
+                    th scope="col" { "met" }
+                }
+            }
+            tbody {
+                @for ((now, start), (usage, weight)) in rows {
+                    @let asked = demand(now);
+                    tr {
+                        th scope="row" { (now.name) @if let Some(note) = now.note { small { (note) } } }
+                        td { (now.case) }
+                        @if models { td { (now.model) } }
+                        td { (usage_name(now.usage, *usage)) @if *weight != 1.0 { small { "weight " (number(*weight)) } } }
+                        td class="number" { @if asked.is_some() { (limit(now)) } @else { "none" } }
+                        td class="number" { (number(start.value)) }
+                        td class="number" { strong { (number(now.value)) } }
+                        td { (now.unit) }
+                        td class="number" { @if asked.is_some() { (scaled_number(start.scaled)) } }
+                        td { @if asked.is_some() { (scaled(now)) } }
+                        td { @if asked.is_some() { (met(now)) } }
+                    }
+                }
+            }
+        }
+    };
+    html! {
+        p {
+            "A scaled value is the value by its demand: 0 is ideal, up to 1 the demand is met. "
+            @if outcome.task == Task::Design { "The design lowers the largest scaled value of the criteria that are minimised." }
+        }
+        (scrolling("Criteria", rows_and_head))
+    }
+}
+
+/// What is asked for, without the unit: it has a column of its own.
+fn limit(criterion: &CriterionReport) -> Markup {
+    match (criterion.demand, criterion.good, criterion.bad) {
+        (None, Some(good), Some(bad)) => html! { (number(bad)) small { "good: " (number(good)) } },
+        (demand, _, _) => html! { (number(demand.unwrap_or(f64::NAN))) },
+    }
+}
+
+/// What the study does with a criterion; data that move no parameter only report.
+fn usage_name(asked: Usage, effective: Usage) -> &'static str {
+    match (asked, effective) {
+        (Usage::Monitor, _) => "report only",
+        (_, Usage::Monitor) => "report only: no calibration data",
+        (Usage::Minimise, _) => "minimise",
+        (Usage::Inequality, _) => "constraint",
+        (Usage::Equality, _) => "equality",
+    }
+}
+
+/// The scaled value beside a bar from 0 to 2 on which the demand is marked.
+fn scaled(criterion: &CriterionReport) -> Markup {
+    let share = if criterion.scaled.is_nan() { 0.0 } else { 50.0 * criterion.scaled.clamp(0.0, 2.0) };
+    html! {
+        span class="scaled" {
+            span class="number" { (scaled_number(criterion.scaled)) }
+            span class={ "bar " (tone(criterion)) } aria-hidden="true" { span style={ "width:" (format!("{share:.1}")) "%" } {} }
+        }
+    }
+}
+
+fn met(criterion: &CriterionReport) -> Markup {
+    match (criterion.scaled.is_nan(), criterion.met) {
+        (true, _) => html! { span class="missed" { "no value" } },
+        (_, met) => html! { span class=(tone(criterion)) { @if met { "met" } @else { "not met" } } },
+    }
+}
+
+/// A scaled value to four digits; rounding errors around 0 are none.
+fn scaled_number(scaled: f64) -> String {
+    if scaled.abs() < 1e-9 { "0".to_owned() } else { significant(scaled, 4) }
+}
+
+/// Class of a criterion: what is not met decides only if it is a constraint.
+fn tone(criterion: &CriterionReport) -> &'static str {
+    match (criterion.met, criterion.usage) {
+        (true, _) => "met",
+        (_, Usage::Inequality | Usage::Equality) => "missed",
+        _ => "above",
+    }
+}

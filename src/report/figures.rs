@@ -1,0 +1,118 @@
+//! The pictures of a run: every job's signals at the start and at the reported point, and measurements beside them.
+
+use mops_core::{Role, Row, Variable};
+
+use super::Report;
+use super::comparison::Both;
+use super::numbers::{counted, with_unit};
+use super::plot::Plot;
+
+/// More jobs than this are not shown, but only those that come closest to their demands or miss them most.
+const MOST_JOBS: usize = 30;
+
+/// Plots that belong together, with a heading.
+#[derive(Debug, Default)]
+pub(super) struct Group {
+    pub(super) title: String,
+    /// Sentences to know before the plots.
+    pub(super) about: Vec<String>,
+    pub(super) figures: Vec<Figure>,
+}
+
+/// Plots one above the other, each with its file name, and lines to stand below them.
+#[derive(Debug)]
+pub(super) struct Figure {
+    pub(super) plots: Vec<(String, Plot)>,
+    pub(super) caption: Vec<String>,
+}
+
+/// The role of an experiment in words.
+pub(super) fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Calibration => "calibration",
+        Role::Selection => "selection",
+        Role::Validation => "validation",
+    }
+}
+
+/// A group for every job, or for the most interesting ones where there are many; and a sentence if some are left out.
+pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
+    let study = report.problem.study();
+    let mut jobs: Vec<usize> = (0..study.jobs.len()).collect();
+    let all = jobs.len();
+    if all > MOST_JOBS {
+        let worst = |job: usize| {
+            let of_job = study.rows.iter().zip(&report.best.readings).filter(|(row, _)| row.job == job);
+            of_job.map(|(_, reading)| reading.map_or(f64::INFINITY, |r| r.scaled)).fold(f64::NEG_INFINITY, f64::max)
+        };
+        jobs.sort_by(|&a, &b| worst(b).total_cmp(&worst(a)));
+        jobs.truncate(MOST_JOBS);
+        jobs.sort_unstable();
+    }
+    let left_out = (all > MOST_JOBS).then(|| {
+        format!("Of {}, the {MOST_JOBS} with the largest scaled values are shown.", counted(all, "simulation"))
+    });
+    (jobs.into_iter().map(|job| of_job(report, job)).collect(), left_out)
+}
+
+fn of_job(report: &Report<'_>, job: usize) -> Group {
+    let study = report.problem.study();
+    let plan = &study.jobs[job];
+    let (case, (model_name, model)) = (&study.cases[plan.case], &study.models[plan.model]);
+    let mut title = match &case.experiment {
+        Some(experiment) => format!("Experiment `{}` ({})", case.name, role_name(experiment.role)),
+        None => format!("Case `{}`", case.name),
+    };
+    // Names of models are told apart only where there is more than one.
+    let place = if study.models.len() > 1 {
+        title.push_str(&format!(", model `{model_name}`"));
+        format!("{}-{model_name}", case.name)
+    } else {
+        case.name.clone()
+    };
+    let both = Both {
+        start: report.problem.analyse_all(job, &study.start(), None),
+        best: report.problem.analyse_all(job, &report.best.tuners, None),
+        best_name: report.best_name(),
+    };
+    let about = both.failures();
+    let mut group = Group { title, about, figures: Vec::new() };
+    if both.start.is_err() && both.best.is_err() && case.experiment.is_none() {
+        return group;
+    }
+    let signals = &model.interface().signals;
+    let captions = |signal: &str| -> Vec<String> {
+        let of_job = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
+        of_job
+            .filter(|(_, row)| row.criterion.signals().iter().any(|s| s == signal))
+            .map(|(i, row)| caption(report, i, row))
+            .collect()
+    };
+    for channel in case.experiment.iter().flat_map(|e| &e.channels) {
+        if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
+            let mut plots = vec![(format!("fit-{place}-{}", signal.name), both.fit(channel, signal, &case.name))];
+            plots.extend(
+                both.residual(channel, signal, &case.name)
+                    .map(|plot| (format!("residual-{place}-{}", signal.name), plot)),
+            );
+            group.figures.push(Figure { plots, caption: captions(&signal.name) });
+        }
+    }
+    let measured = |signal: &Variable| case.experiment.as_ref().is_some_and(|e| e.channel(&signal.name).is_some());
+    for signal in plan.signals.iter().map(|&i| &signals[i]).filter(|s| !measured(s)) {
+        let plot = both.response(signal, &case.name);
+        let plots = vec![(format!("response-{place}-{}", signal.name), plot)];
+        group.figures.push(Figure { plots, caption: captions(&signal.name) });
+    }
+    group
+}
+
+/// What a criterion says of the signal that is shown.
+fn caption(report: &Report<'_>, index: usize, row: &Row) -> String {
+    let criterion = &report.outcome.criteria[index];
+    let mut text = format!("`{}`: {}", row.name, with_unit(criterion.value, &criterion.unit));
+    if let Some(demand) = super::criteria::demand(criterion) {
+        text.push_str(&format!(" (demand {demand})"));
+    }
+    text
+}

@@ -1,0 +1,73 @@
+//! The report of a run: one HTML page, and its plots as SVG and PNG.
+
+mod axis;
+mod calibration;
+mod clip;
+mod comparison;
+mod convergence;
+mod criteria;
+mod figures;
+mod legend;
+mod numbers;
+mod page;
+mod plot;
+mod png;
+mod range;
+mod sampling;
+mod scene;
+mod svg;
+#[cfg(test)]
+mod tests;
+mod tuners;
+mod verdict;
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use mops_core::{Evaluation, Outcome, Problem, Record, Stop};
+
+pub use numbers::file_name;
+pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+pub use sampling::points;
+
+/// Everything a report shows.
+pub struct Report<'a> {
+    /// The result.
+    pub outcome: &'a Outcome,
+    /// The problem that was solved.
+    pub problem: &'a Problem,
+    /// The evaluation that the outcome reports.
+    pub best: &'a Evaluation,
+    /// All points, in the order of their evaluation; the first is the start.
+    pub archive: &'a [Record],
+    /// The study file with its settings.
+    pub text: &'a str,
+}
+
+impl Report<'_> {
+    /// Writes `report.html`, `plots/*.svg` and `plots/*.png` into the folder, which is made if it is not there.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> io::Result<()> {
+        let plots = folder.join("plots");
+        fs::create_dir_all(&plots)?;
+        let (responses, left_out) = figures::responses(self);
+        let convergence = convergence::group(self.problem.study(), self.archive);
+        let pictures = page::Pictures { responses, left_out, convergence };
+        let groups = pictures.responses.iter().chain([&pictures.convergence]);
+        let mut names = numbers::FileNames::default();
+        for (name, plot) in groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots) {
+            let name = names.unique(name);
+            fs::write(plots.join(format!("{name}.svg")), plot.svg())?;
+            plot.write_png(&plots.join(format!("{name}.png")))?;
+        }
+        fs::write(folder.join("report.html"), page::page(self, &pictures).into_string())
+    }
+
+    /// What the reported point is called: an optimum only if the solver showed one.
+    fn best_name(&self) -> &'static str {
+        if self.outcome.stop == Stop::Converged && self.outcome.feasible { "optimum" } else { "best point" }
+    }
+}

@@ -1,0 +1,122 @@
+//! Numbers and names as a reader wants them: significant digits, units, percent, and names that every file system takes.
+
+/// A number to five significant digits without trailing zeros: `0.86341`, `12`, `1.2e-7`.
+pub(super) fn number(value: f64) -> String {
+    significant(value, 5)
+}
+
+/// A number to so many significant digits, without trailing zeros.
+pub(super) fn significant(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "n/a".to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "infinite".to_owned() } else { "-infinite".to_owned() };
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // The exponent after rounding: 9.9999999 has 1, not 0.
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let (mantissa, exponent) = scientific.split_once('e').expect("`{:e}` writes an exponent");
+    let exponent: i32 = exponent.parse().expect("an exponent is a whole number");
+    if !(-4..6).contains(&exponent) {
+        return format!("{}e{exponent}", trimmed(mantissa));
+    }
+    let decimals = usize::try_from(digits as i64 - 1 - i64::from(exponent)).unwrap_or(0);
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+fn trimmed(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+/// A number with its unit; a pure number alone.
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { number(value) } else { format!("{} {unit}", number(value)) }
+}
+
+/// A quantity with its unit in brackets, for an axis; a pure number alone.
+pub(super) fn labelled(name: &str, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
+}
+
+/// A share as percent, to two significant digits: `3.1 %`.
+pub(super) fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share, 2))
+}
+
+/// A count with its noun: `1 case`, `3 cases`.
+pub(super) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// A name that every file system takes: ASCII letters, digits, `_` and `.` stay, all else becomes one `-`.
+pub fn file_name(name: &str) -> String {
+    let mut safe = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() || c == '_' || c == '.' {
+            safe.push(c);
+        } else if !safe.ends_with('-') {
+            safe.push('-');
+        }
+        if safe.len() >= 100 {
+            break;
+        }
+    }
+    let safe = safe.trim_matches(['-', '.']);
+    if safe.is_empty() { "unnamed".to_owned() } else { safe.to_owned() }
+}
+
+/// Hands out file names, each only once, also where the file system ignores case.
+#[derive(Debug, Default)]
+pub(super) struct FileNames {
+    taken: Vec<String>,
+}
+
+impl FileNames {
+    /// A safe file name for `name` that was not handed out before.
+    pub(super) fn unique(&mut self, name: &str) -> String {
+        let safe = file_name(name);
+        let candidates = (1..).map(|i| if i == 1 { safe.clone() } else { format!("{safe}-{i}") });
+        let free = |candidate: &String| !self.taken.contains(&candidate.to_lowercase());
+        let chosen = candidates.into_iter().find(free).expect("there is always a next number");
+        self.taken.push(chosen.to_lowercase());
+        chosen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_five_digits_and_no_more() {
+        let cases = [
+            (0.0, "0"),
+            (0.863_412_7, "0.86341"),
+            (12.0, "12"),
+            (-9.999_999, "-10"),
+            (123_456.7, "123457"),
+            (1.25e-7, "1.25e-7"),
+            (5.4321e9, "5.4321e9"),
+            (f64::NAN, "n/a"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+        assert_eq!(
+            (percent(0.0312), with_unit(15.0, "s"), with_unit(0.1, "1")),
+            ("3.1 %".into(), "15 s".into(), "0.1".into())
+        );
+    }
+
+    #[test]
+    fn file_names_are_safe_and_unique() {
+        assert_eq!(file_name("../../etc/passwd"), "etc-passwd");
+        assert_eq!(file_name("fit-d\u{e9}part:1-\u{3c6}\\x"), "fit-d-part-1-x");
+        assert_eq!(file_name("///"), "unnamed");
+        let mut names = FileNames::default();
+        assert_eq!([names.unique("a/b"), names.unique("A-b"), names.unique("a b")], ["a-b", "A-b-2", "a-b-3"]);
+    }
+}

@@ -1,0 +1,138 @@
+//! The page: one HTML file that needs no network and no script.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use mops_core::Task;
+
+use super::Report;
+use super::figures::{Figure, Group};
+use super::numbers::significant;
+use super::verdict::{self, Tone};
+use super::{calibration, criteria, tuners};
+
+/// What the page shows beside the tables.
+pub(super) struct Pictures {
+    pub(super) responses: Vec<Group>,
+    /// A sentence where responses are left out.
+    pub(super) left_out: Option<String>,
+    pub(super) convergence: Group,
+}
+
+/// The whole page.
+pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
+    let outcome = report.outcome;
+    let warnings = verdict::warnings(report);
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="generator" content={ "mops " (outcome.mops) };
+                title { (outcome.study) ": " (task(outcome.task)) }
+                style { (PreEscaped(include_str!("style.css"))) }
+            }
+            body {
+                (header(report))
+                main {
+                    @if !warnings.is_empty() {
+                        (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
+                    }
+                    (section("Criteria", criteria::table(report)))
+                    (section("Tuners", tuners::table(report)))
+                    (section("Responses", html! {
+                        @if let Some(text) = &pictures.left_out { p { (text) } }
+                        @for group in &pictures.responses { (figures(group)) }
+                    }))
+                    (section("Convergence", figures(&pictures.convergence)))
+                    @if let Some(results) = &outcome.calibration { (section("Calibration", calibration::section(results))) }
+                    @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
+                    (section("Study", html! {
+                        details {
+                            summary { "The study file this page belongs to" }
+                            pre tabindex="0" { code { (report.text) } }
+                        }
+                    }))
+                }
+                footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
+            }
+        }
+    }
+}
+
+/// A table that can be scrolled sideways where the screen is narrow.
+pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
+    html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
+}
+
+fn section(title: &str, content: Markup) -> Markup {
+    let id = title.to_lowercase();
+    html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (content) } }
+}
+
+fn header(report: &Report<'_>) -> Markup {
+    let outcome = report.outcome;
+    let (tone, sentence) = verdict::verdict(report);
+    let class = match tone {
+        Tone::Good => "verdict good",
+        Tone::Mixed => "verdict mixed",
+        Tone::Bad => "verdict bad",
+    };
+    html! {
+        header {
+            p class="task" { (task(outcome.task)) }
+            h1 { (outcome.study) }
+            p class=(class) { (rich(&sentence)) }
+            dl {
+                (fact("Solver", &outcome.solver))
+                (fact("Evaluations", &outcome.evaluations.to_string()))
+                (fact("Simulations", &outcome.simulations.to_string()))
+                (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
+                (fact("Seed", &outcome.seed.to_string()))
+            }
+            dl class="long" {
+                (fact("Stopped", verdict::stop(outcome.stop)))
+                @if outcome.task == Task::Design { (fact("Pareto", verdict::pareto(outcome.pareto))) }
+            }
+        }
+    }
+}
+
+fn fact(name: &str, value: &str) -> Markup {
+    html! { div { dt { (name) } dd { (value) } } }
+}
+
+fn task(task: Task) -> &'static str {
+    match task {
+        Task::Design => "Design",
+        Task::Calibration => "Calibration",
+    }
+}
+
+fn figures(group: &Group) -> Markup {
+    html! {
+        @if !group.title.is_empty() { h3 { (rich(&group.title)) } }
+        @for sentence in &group.about { p { (rich(sentence)) } }
+        @if !group.figures.is_empty() { div class="figures" { @for one in &group.figures { (figure(one)) } } }
+    }
+}
+
+fn figure(figure: &Figure) -> Markup {
+    html! {
+        figure {
+            @for (_, plot) in &figure.plots { div class="wide" { (PreEscaped(plot.svg())) } }
+            @if !figure.caption.is_empty() {
+                figcaption { @for (i, line) in figure.caption.iter().enumerate() { @if i > 0 { "; " } (rich(line)) } }
+            }
+        }
+    }
+}
+
+/// A text in which names stand between backticks.
+fn rich(text: &str) -> Markup {
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len().is_multiple_of(2) {
+        return html! { (text) };
+    }
+    html! { @for (i, part) in parts.iter().enumerate() { @if i % 2 == 1 { code { (part) } } @else { (part) } } }
+}

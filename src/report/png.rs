@@ -1,0 +1,137 @@
+//! A scene as a PNG: strokes by their distance from every pixel, letters by the bundled font, so that it needs no system font.
+
+use std::io;
+use std::path::Path;
+use std::sync::Once;
+
+use plotters::backend::{BitMapBackend, DrawingBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, FontStyle, FontTransform, IntoFont, RGBColor, TextStyle, WHITE, register_font};
+
+use super::clip::{Point, distance};
+use super::plot::Ink;
+use super::scene::{Anchor, Mark, SIZE, Scene};
+use super::svg::rgb;
+
+/// Pixels per unit of the scene.
+const SCALE: f64 = 2.0;
+const FONT: &str = "DejaVu Sans";
+/// Height of a line of DejaVu Sans (ascender to descender), which plotters calls the size of a font, by its em.
+const LINE: f64 = 1.164;
+
+/// Draws the scene into a file.
+pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
+    static FONT_ONCE: Once = Once::new();
+    FONT_ONCE.call_once(|| {
+        // Fails only for bytes that are no font.
+        let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
+    });
+    let size = SIZE.map(|length| (SCALE * length) as u32);
+    let mut paper = BitMapBackend::new(path, (size[0], size[1]));
+    paper.draw_rect((0, 0), (size[0] as i32, size[1] as i32), &WHITE, true).map_err(failed)?;
+    for mark in &scene.marks {
+        draw(&mut paper, mark)?;
+    }
+    paper.present().map_err(failed)
+}
+
+fn failed(error: impl std::error::Error) -> io::Error {
+    io::Error::other(error.to_string())
+}
+
+fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
+    match mark {
+        Mark::Line { points, ink, width, dashed } => {
+            let parts = if *dashed { dashes(points, 6.0, 4.0) } else { vec![points.clone()] };
+            let segments: Vec<[Point; 2]> =
+                parts.iter().flat_map(|part| part.windows(2).map(|w| [w[0], w[1]])).collect();
+            stroke(paper, &segments, 0.5 * width, *ink)
+        }
+        Mark::Dots { centres, ink, radius } => {
+            let segments: Vec<[Point; 2]> = centres.iter().map(|&c| [c, c]).collect();
+            stroke(paper, &segments, *radius, *ink)
+        }
+        Mark::Box { frame, ink } => {
+            let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
+            paper.draw_rect(pixel(frame.from), pixel(frame.to), &colour(*ink), true).map_err(failed)
+        }
+        Mark::Text { text, at, anchor, size, ink, upwards } => {
+            let h_pos = match anchor {
+                Anchor::Start => HPos::Left,
+                Anchor::Middle => HPos::Center,
+                Anchor::End => HPos::Right,
+            };
+            let font = (FONT, LINE * SCALE * size).into_font();
+            let font = if *upwards { font.transform(FontTransform::Rotate270) } else { font };
+            let colour = colour(*ink);
+            let style = TextStyle::from(font).color(&colour).pos(Pos::new(h_pos, VPos::Top));
+            // plotters puts the line on which letters stand half a font size below the top; ours lies 0.35 em below the middle.
+            let lift = SCALE * size * (0.35 - 0.5 * LINE);
+            let [x, y] = at.map(|v| SCALE * v);
+            let [x, y] = if *upwards { [x + lift, y] } else { [x, y + lift] };
+            paper.draw_text(text, &style, (x.round() as i32, y.round() as i32)).map_err(failed)
+        }
+    }
+}
+
+fn colour(ink: Ink) -> RGBColor {
+    let [r, g, b] = rgb(ink);
+    RGBColor(r, g, b)
+}
+
+/// Paints every pixel within `half` of one of the segments, those at the edge in part.
+fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, ink: Ink) -> io::Result<()> {
+    let half = SCALE * half;
+    // Corners of pixels to their middles.
+    let segments: Vec<[Point; 2]> = segments.iter().map(|s| s.map(|p| p.map(|v| SCALE * v - 0.5))).collect();
+    let reach = |points: &[Point], i: usize| {
+        let (low, high) = points.iter().fold((f64::MAX, 0.0f64), |(low, high), p| (low.min(p[i]), high.max(p[i])));
+        let end = (high + half + 2.0).min(SCALE * SIZE[i]) as usize;
+        ((low - half - 1.0).max(0.0) as usize).min(end)..end
+    };
+    let ends = segments.as_flattened();
+    let (columns, rows) = (reach(ends, 0), reach(ends, 1));
+    let mut cover = vec![0.0f64; columns.len() * rows.len()];
+    for [a, b] in &segments {
+        for y in reach(&[*a, *b], 1) {
+            let row = &mut cover[(y - rows.start) * columns.len()..];
+            for x in reach(&[*a, *b], 0) {
+                let inside = (half + 0.5 - distance([x as f64, y as f64], *a, *b)).clamp(0.0, 1.0);
+                let cell = &mut row[x - columns.start];
+                *cell = cell.max(inside);
+            }
+        }
+    }
+    for (i, &part) in cover.iter().enumerate().filter(|(_, part)| **part > 0.0) {
+        let at = ((columns.start + i % columns.len()) as i32, (rows.start + i / columns.len()) as i32);
+        paper.draw_pixel(at, colour(ink).mix(part).to_backend_color()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// The parts of a line that a dashed pen draws.
+fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
+    let mut parts: Vec<Vec<Point>> = points.first().map(|p| vec![*p]).into_iter().collect();
+    let (mut drawing, mut left) = (true, on);
+    for pair in points.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let mut at = 0.0;
+        while length - at > left {
+            at += left;
+            let p = [a[0] + at / length * (b[0] - a[0]), a[1] + at / length * (b[1] - a[1])];
+            if drawing {
+                parts.last_mut().expect("a line that is drawn has a part").push(p);
+            } else {
+                parts.push(vec![p]);
+            }
+            drawing = !drawing;
+            left = if drawing { on } else { off };
+        }
+        left -= length - at;
+        if drawing {
+            parts.last_mut().expect("a line that is drawn has a part").push(b);
+        }
+    }
+    parts
+}

@@ -1,0 +1,66 @@
+//! Ranges of values: what of a plot is shown.
+
+use super::plot::Plot;
+
+/// A value, or its logarithm, if it is one that can be drawn.
+pub(super) fn drawable(value: f64, log: bool) -> Option<f64> {
+    let value = if log { value.log10() } else { value };
+    // Beyond this, differences of two values would overflow.
+    (value.abs() < 1e150).then_some(value)
+}
+
+/// The smallest range that holds all values, widened where they are as good as equal; `None` without a value.
+pub(super) fn range_of(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let [low, high] = values.map(|v| [v, v]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+    let size = low.abs().max(high.abs());
+    if high - low > 1e-9 * size {
+        return Some([low, high]);
+    }
+    let margin = if size > 1e-100 { 0.1 * size } else { 1.0 };
+    Some([low - margin, high + margin])
+}
+
+/// The shown range of y: all of the curves that must be seen, the others and the levels as far as there is room.
+pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
+    let values = |may_leave: bool| {
+        let curves = plot.curves.iter().filter(move |c| c.may_leave == may_leave).flat_map(|c| &c.points);
+        curves.filter(|p| p.0.is_finite()).filter_map(|p| drawable(p.1, plot.log_y))
+    };
+    let bands = plot.bands.iter().flat_map(|b| b.range).filter_map(|v| drawable(v, plot.log_y));
+    let [low, high] = range_of(values(false).chain(bands)).or_else(|| range_of(values(true)))?;
+    let room = high - low;
+    let mut range = [low, high];
+    for value in values(true) {
+        range = [range[0].min(value.max(low - room)), range[1].max(value.min(high + room))];
+    }
+    for value in plot.levels.iter().filter_map(|level| drawable(level.value, plot.log_y)) {
+        if value >= low - room && value <= high + room {
+            range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+    let margin = 0.05 * (range[1] - range[0]);
+    Some([range[0] - margin, range[1] + margin])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plot::{Curve, Level};
+    use super::*;
+
+    #[test]
+    fn a_curve_that_may_leave_and_a_far_level_do_not_crush_the_others() {
+        let curve = |values: [f64; 2], may_leave| Curve {
+            points: values.map(|v| (v, v)).to_vec(),
+            may_leave,
+            ..Curve::default()
+        };
+        let level = |value| Level { name: String::new(), value };
+        let plot = Plot {
+            curves: vec![curve([0.0, 1.0], false), curve([-50.0, 1e6], true)],
+            levels: vec![level(1.5), level(90.0)],
+            ..Plot::default()
+        };
+        let [low, high] = y_range(&plot).unwrap();
+        assert!((low + 1.15).abs() < 1e-12 && (high - 2.15).abs() < 1e-12, "{low} {high}");
+    }
+}

@@ -1,0 +1,71 @@
+//! Traces as points to draw: every extremum and every jump, and enough between them to look smooth.
+
+use mops_core::Trace;
+
+/// Points per trace between its extrema.
+const GRID: usize = 1500;
+/// Columns of a plot within which only the first, lowest, highest and last point can be seen.
+const COLUMNS: f64 = 1000.0;
+
+/// Points of a trace to draw.
+pub fn points(trace: &Trace) -> Vec<(f64, f64)> {
+    let (start, step) = (trace.start(), (trace.end() - trace.start()) / GRID as f64);
+    let mut points = Vec::new();
+    let mut next = 1;
+    for piece in trace.pieces() {
+        points.push((piece.time[0], piece.value[0]));
+        while next < GRID && start + next as f64 * step < piece.time[1] {
+            let time = start + next as f64 * step;
+            if time > piece.time[0] {
+                points.push((time, trace.at(time)));
+            }
+            next += 1;
+        }
+        points.push((piece.time[1], piece.value[1]));
+    }
+    thinned(points)
+}
+
+/// Of points with increasing x, those that can be seen. Source (M4): U. Jugel et al., PVLDB 7 (2014) 797-808.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
+    let (start, width) = (first.0, (last.0 - first.0) / COLUMNS);
+    if points.len() as f64 <= 4.0 * COLUMNS || width <= 0.0 {
+        return points;
+    }
+    let column = |p: &(f64, f64)| ((p.0 - start) / width) as i64;
+    let mut kept = Vec::new();
+    for group in points.chunk_by(|a, b| column(a) == column(b)) {
+        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let (low, high) = (group.iter().min_by(by_value), group.iter().max_by(by_value));
+        let mut seen: Vec<(f64, f64)> =
+            [group.first(), low, high, group.last()].into_iter().flatten().copied().collect();
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        kept.extend(seen);
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_between_the_grid_points_and_a_jump_are_kept() {
+        let mut trace = Trace::starting_at(0.0, 3);
+        trace.push(1.0, Trace::NODES.map(|s| 4.0 * s * (1.0 - s)));
+        trace.push(1.0 + 1e-9, [7.0; 5]);
+        trace.push(2.0, [3.0; 5]);
+        let points = points(&trace);
+        assert!(points.iter().any(|p| (p.1 - 1.0).abs() < 1e-12) && points.iter().any(|p| p.1 == 7.0));
+        assert_eq!(points.last(), Some(&(2.0, 3.0)));
+        assert!(super::points(&Trace::default()).is_empty());
+    }
+
+    #[test]
+    fn many_points_are_thinned_without_losing_a_spike() {
+        let many: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), if i == 54_321 { 9.0 } else { 0.0 })).collect();
+        let kept = thinned(many);
+        assert!(kept.len() <= 4100 && kept.contains(&(54_321.0, 9.0)));
+    }
+}

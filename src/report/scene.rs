@@ -1,0 +1,172 @@
+//! A plot laid out on paper: lines, dots, rectangles and texts at their places, the same for SVG and PNG.
+
+use super::axis::Axis;
+use super::clip::{Frame, Point, visible};
+use super::plot::{CurveStyle, Ink, Plot};
+use super::range::{drawable, range_of, y_range};
+
+/// Size of every plot; one unit is a pixel of a page at its natural size.
+pub(super) const SIZE: Point = [560.0, 300.0];
+/// Size of the letters, and how wide one is on average.
+const LETTER: f64 = 12.0;
+pub(super) const ADVANCE: f64 = 0.6 * LETTER;
+
+/// Something drawn.
+#[derive(Debug, Clone)]
+pub(super) enum Mark {
+    Line {
+        points: Vec<Point>,
+        ink: Ink,
+        width: f64,
+        dashed: bool,
+    },
+    Dots {
+        centres: Vec<Point>,
+        ink: Ink,
+        radius: f64,
+    },
+    Box {
+        frame: Frame,
+        ink: Ink,
+    },
+    /// `at` is the middle of the height, and the left end, the middle or the right end by `anchor`.
+    Text {
+        text: String,
+        at: Point,
+        anchor: Anchor,
+        size: f64,
+        ink: Ink,
+        upwards: bool,
+    },
+}
+
+/// Which end of a text stands at its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// All that is drawn, from back to front.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scene {
+    pub(super) marks: Vec<Mark>,
+}
+
+impl Scene {
+    /// Lays out a plot.
+    pub(super) fn of(plot: &Plot) -> Self {
+        let mut scene = Self::default();
+        let xs = plot.curves.iter().flat_map(|c| &c.points).filter_map(|p| drawable(p.0, false));
+        let x_range = range_of(xs.chain(plot.x_range.into_iter().flatten()));
+        let x = time_axis(x_range.unwrap_or([0.0, 1.0]));
+        let y_range = y_range(plot);
+        let y = Axis::new(y_range.unwrap_or([0.0, 1.0]), plot.log_y, 7.0);
+        let levels: Vec<(f64, &str)> = plot
+            .levels
+            .iter()
+            .filter_map(|level| Some((y.position(level.value)?, level.name.as_str())))
+            .filter(|(at, _)| (0.0..=1.0).contains(at))
+            .collect();
+
+        scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Ink::Text);
+        let top = scene.legend(plot, 38.0) + 12.0;
+        let left = 38.0 + ADVANCE * longest(y.ticks.iter().map(|(_, label)| label.as_str()));
+        let right = SIZE[0] - 16.0 - ADVANCE * longest(levels.iter().map(|(_, name)| *name));
+        let frame = Frame { from: [left, top], to: [right.max(left + 100.0), SIZE[1] - 46.0] };
+        let place = |p: &(f64, f64)| {
+            let (px, py) = (x.position(p.0)?, y.position(p.1)?);
+            Some([left + px * (frame.to[0] - left), frame.to[1] - py * (frame.to[1] - top)])
+        };
+        let height = |at: f64| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - top);
+
+        for band in &plot.bands {
+            if let [Some(low), Some(high)] = band.range.map(|v| y.position(v)) {
+                let (from, to) = ([left, height(low.max(high))], [frame.to[0], height(low.min(high))]);
+                scene.marks.push(Mark::Box { frame: Frame { from, to }, ink: Ink::Band });
+            }
+        }
+        scene.axes(plot, &x, &y, frame);
+        for curve in &plot.curves {
+            let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
+            if curve.style == CurveStyle::Dots {
+                scene.dots(points.into_iter().flatten().filter(|p| frame.contains(*p)), curve.ink);
+                continue;
+            }
+            let dashed = curve.style == CurveStyle::Dashed;
+            let width = if curve.ink == Ink::Start { 1.3 } else { 1.8 };
+            for points in visible(&points, frame, 0.1) {
+                scene.marks.push(Mark::Line { points, ink: curve.ink, width, dashed });
+            }
+        }
+        let mut lowest = f64::INFINITY;
+        for (at, name) in descending(levels) {
+            let line = vec![[left, height(at)], [frame.to[0], height(at)]];
+            scene.marks.push(Mark::Line { points: line, ink: Ink::Demand, width: 1.2, dashed: true });
+            // Labels of neighbouring levels are pushed apart.
+            lowest = if lowest.is_finite() { height(at).max(lowest + 14.0) } else { height(at) };
+            scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Ink::Demand);
+        }
+        if y_range.is_none() {
+            let middle = [0.5 * (left + frame.to[0]), 0.5 * (top + frame.to[1])];
+            scene.text("nothing to show", middle, Anchor::Middle, Ink::Faint);
+        }
+        scene
+    }
+
+    pub(super) fn text(&mut self, text: &str, at: Point, anchor: Anchor, ink: Ink) {
+        if !text.is_empty() {
+            let size = if ink == Ink::Text { LETTER + 1.0 } else { LETTER };
+            self.marks.push(Mark::Text { text: text.to_owned(), at, anchor, size, ink, upwards: false });
+        }
+    }
+
+    /// Grid, frame, ticks and labels of both axes.
+    fn axes(&mut self, plot: &Plot, x: &Axis, y: &Axis, Frame { from, to }: Frame) {
+        let line = |a: Point, b: Point, width| Mark::Line { points: vec![a, b], ink: Ink::Grid, width, dashed: false };
+        for (at, label) in &x.ticks {
+            let px = from[0] + at * (to[0] - from[0]);
+            self.marks.push(line([px, from[1]], [px, to[1]], 0.7));
+            self.text(label, [px, to[1] + 13.0], Anchor::Middle, Ink::Faint);
+        }
+        for (at, label) in &y.ticks {
+            let py = to[1] - at * (to[1] - from[1]);
+            self.marks.push(line([from[0], py], [to[0], py], 0.7));
+            self.text(label, [from[0] - 6.0, py], Anchor::End, Ink::Faint);
+        }
+        let corners = vec![from, [from[0], to[1]], to];
+        self.marks.push(Mark::Line { points: corners, ink: Ink::Faint, width: 1.0, dashed: false });
+        let with_factor = |label: &str, axis: &Axis| match &axis.factor {
+            Some(factor) => format!("{label} {factor}"),
+            None => label.to_owned(),
+        };
+        self.text(
+            &with_factor(&plot.x_label, x),
+            [0.5 * (from[0] + to[0]), SIZE[1] - 12.0],
+            Anchor::Middle,
+            Ink::Faint,
+        );
+        let at = [12.0, 0.5 * (from[1] + to[1])];
+        let text = with_factor(&plot.y_label, y);
+        self.marks.push(Mark::Text { text, at, anchor: Anchor::Middle, size: LETTER, ink: Ink::Faint, upwards: true });
+    }
+}
+
+/// The axis along x: fewer ticks where their labels would touch.
+fn time_axis(range: [f64; 2]) -> Axis {
+    let labels = |axis: &Axis| {
+        ADVANCE * (longest(axis.ticks.iter().map(|(_, label)| label.as_str())) + 1.5) * axis.ticks.len() as f64
+    };
+    let axis = Axis::new(range, false, 8.0);
+    if labels(&axis) > 0.75 * SIZE[0] { Axis::new(range, false, 4.0) } else { axis }
+}
+
+fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
+    labels.map(|label| label.chars().count()).max().unwrap_or(0) as f64
+}
+
+fn descending(mut levels: Vec<(f64, &str)>) -> Vec<(f64, &str)> {
+    levels.sort_by(|a, b| b.0.total_cmp(&a.0));
+    levels
+}

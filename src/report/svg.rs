@@ -1,0 +1,118 @@
+//! A scene as an SVG document: light colours as attributes, so that it stands alone, and classes for the page's colours.
+
+use std::fmt::Write as _;
+
+use maud::{Markup, html};
+
+use super::clip::Point;
+use super::plot::Ink;
+use super::scene::{Anchor, Mark, SIZE, Scene};
+
+/// The document, with a title and a description for readers that cannot see it.
+pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
+    let [width, height] = SIZE;
+    let markup = html! {
+        svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox={ "0 0 " (width) " " (height) } width=(width)
+            height=(height) role="img" aria-label=(title) font-family="DejaVu Sans, Verdana, Arial, sans-serif"
+            stroke-linecap="round" stroke-linejoin="round" {
+            title { (title) }
+            desc { (description) }
+            rect class="paper" width=(width) height=(height) fill="#ffffff" {}
+            @for mark in &scene.marks { (element(mark)) }
+        }
+    };
+    markup.into_string()
+}
+
+fn element(mark: &Mark) -> Markup {
+    match mark {
+        Mark::Line { points, ink, width, dashed } => html! {
+            path class=(class(*ink)) d=(line(points)) fill="none" stroke=(colour(*ink)) stroke-width=(width)
+                stroke-dasharray=[dashed.then_some("6 4")] {}
+        },
+        // A line of no length with round ends is a dot, and the shortest way to write one.
+        Mark::Dots { centres, ink, radius } => html! {
+            path class=(class(*ink)) d=(dots(centres)) fill="none" stroke=(colour(*ink)) stroke-width=(2.0 * radius) {}
+        },
+        Mark::Box { frame, ink } => html! {
+            rect class=(class(*ink)) x=(short(frame.from[0])) y=(short(frame.from[1]))
+                width=(short(frame.to[0] - frame.from[0])) height=(short(frame.to[1] - frame.from[1])) fill=(colour(*ink)) {}
+        },
+        Mark::Text { text, at: [x, y], anchor, size, ink, upwards } => {
+            // The middle of the letters lies about a third of their size above the line they stand on.
+            let place = if *upwards {
+                format!("translate({} {}) rotate(-90)", short(x + 0.35 * size), short(*y))
+            } else {
+                format!("translate({} {})", short(*x), short(y + 0.35 * size))
+            };
+            let anchor = match anchor {
+                Anchor::Start => "start",
+                Anchor::Middle => "middle",
+                Anchor::End => "end",
+            };
+            html! {
+                text class=(class(*ink)) transform=(place) text-anchor=(anchor) font-size=(size) fill=(colour(*ink)) { (text) }
+            }
+        }
+    }
+}
+
+fn line(points: &[Point]) -> String {
+    let mut path = String::new();
+    for (i, p) in points.iter().enumerate() {
+        let _ = write!(path, "{}{} {}", if i == 0 { 'M' } else { 'L' }, short(p[0]), short(p[1]));
+    }
+    path
+}
+
+fn dots(centres: &[Point]) -> String {
+    let mut path = String::new();
+    for p in centres {
+        let _ = write!(path, "M{} {}h0", short(p[0]), short(p[1]));
+    }
+    path
+}
+
+/// A coordinate to a tenth of a unit.
+fn short(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+/// Class of an ink in the page's style sheet.
+fn class(ink: Ink) -> String {
+    match ink {
+        Ink::Text => "text".to_owned(),
+        Ink::Faint => "faint".to_owned(),
+        Ink::Grid => "grid".to_owned(),
+        Ink::Result => "result".to_owned(),
+        Ink::Start => "start".to_owned(),
+        Ink::Measured => "measured".to_owned(),
+        Ink::Demand => "demand".to_owned(),
+        Ink::Band => "band".to_owned(),
+        Ink::Series(i) => format!("series{}", i % SERIES.len()),
+    }
+}
+
+/// Colours of curves of equal rank, told apart by readers with any colour vision.
+/// Source: M. Okabe, K. Ito, Color Universal Design (2008), darkened for lines on white.
+const SERIES: [[u8; 3]; 6] = [[0, 92, 170], [200, 80, 0], [0, 125, 90], [165, 70, 130], [60, 140, 190], [140, 110, 0]];
+
+/// Red, green and blue of an ink on white paper.
+pub(super) fn rgb(ink: Ink) -> [u8; 3] {
+    match ink {
+        Ink::Text => [27, 31, 36],
+        Ink::Faint => [80, 88, 98],
+        Ink::Grid => [222, 226, 231],
+        Ink::Result => SERIES[0],
+        Ink::Start => [130, 136, 144],
+        Ink::Measured => [200, 90, 20],
+        Ink::Demand => [170, 25, 45],
+        Ink::Band => [226, 236, 246],
+        Ink::Series(i) => SERIES[i % SERIES.len()],
+    }
+}
+
+fn colour(ink: Ink) -> String {
+    let [r, g, b] = rgb(ink);
+    format!("#{r:02x}{g:02x}{b:02x}")
+}

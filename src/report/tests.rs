@@ -1,0 +1,246 @@
+//! The whole report of a tiny study: a first-order lag with a step and an experiment.
+
+use std::sync::Arc;
+
+use mops_core::{
+    Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
+    CriterionSpec, Draft, Evaluation, Failure, Interface, Job, Measured, Mistake, Model, Outcome, Parameter, Pareto,
+    Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage, Value,
+    Variable,
+};
+
+use super::plot::{Curve, CurveStyle, Plot};
+use super::{Level, Report, numbers};
+
+/// `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
+struct Lag(Interface);
+
+impl Lag {
+    fn new() -> Self {
+        Self(Interface {
+            signals: vec![Variable::new("y", "V", "output")],
+            parameters: vec![Parameter::new("T", "s", "time constant")],
+            horizon: Some(5.0),
+            ..Interface::default()
+        })
+    }
+}
+
+impl Model for Lag {
+    fn interface(&self) -> &Interface {
+        &self.0
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        let lag = job.parameters[0];
+        if lag > 10.0 {
+            return Err(Failure::Diverged(0.1));
+        }
+        let mut trace = Trace::starting_at(0.0, 50);
+        let h = job.horizon / 50.0;
+        for i in 0..50 {
+            trace.push(f64::from(i + 1) * h, Trace::NODES.map(|s| 1.0 - (-(f64::from(i) + s) * h / lag).exp()));
+        }
+        Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
+    }
+}
+
+/// The value at the end; with a measurement, the sum of squared differences.
+#[derive(Clone, Copy)]
+struct End;
+
+impl CriterionSpec for End {
+    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(*self))
+    }
+}
+
+impl Criterion for End {
+    fn unit(&self) -> Unit {
+        Unit::known("V")
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec!["y".into()]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        Ok(Value::noted(analysis.trace("y").last(), "not settled at the end"))
+    }
+}
+
+/// A study with a case and an experiment, and the outcome that a run would write.
+fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome, Vec<Record>) {
+    let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
+    let values = times.iter().map(|t| 1.0 - (-t / 1.3f64).exp() + 0.01 * (40.0 * t).sin()).collect();
+    let channel =
+        ChannelDraft { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelDraft::default() };
+    let measured = Measured { channels: vec![channel], role: Role::Calibration, free: Vec::new() };
+    let draft = Draft {
+        name: name.into(),
+        models: vec![("lag".into(), Lag::new().into())],
+        tuners: vec![("T".into(), TunerDraft::new(start, 0.1, 20.0))],
+        cases: vec![
+            CaseDraft { name: "nominal & more".into(), ..CaseDraft::default() },
+            CaseDraft { name: "step/1".into(), measured: Some(measured), ..CaseDraft::default() },
+        ],
+        criteria: vec![("end".into(), CriterionDraft::minimise(End, 0.5).used_as(usage))],
+        ..Draft::default()
+    };
+    let problem = Problem::new(Arc::new(draft.build().unwrap()));
+    let best = problem.evaluate_at(&[2.0]);
+    let first = problem.evaluate_at(&[start]);
+    let record = |e: &Evaluation| Record { tuners: e.tuners.clone(), values: Vec::new(), merit: e.merit };
+    let archive = vec![record(&first), record(&best)];
+    let criteria = |e: &Evaluation| criteria(&problem, e);
+    let outcome = Outcome {
+        format: 1,
+        mops: "0.1.0",
+        study: name.into(),
+        task: Task::Design,
+        seed: 1,
+        solver: "by-hand".into(),
+        stop: Stop::Converged,
+        evaluations: 2,
+        simulations: 4,
+        seconds: 0.1,
+        feasible: best.merit.is_feasible(),
+        worst_scaled: best.merit.objective,
+        objective: best.merit.objective,
+        violation: best.merit.violation,
+        pareto: Pareto::NotShown,
+        tuners: vec![TunerReport {
+            name: "T".into(),
+            value: 2.0,
+            start,
+            bounds: [0.1, 20.0],
+            unit: "s".into(),
+            at_bound: None,
+            active: true,
+        }],
+        criteria: criteria(&best),
+        start: StartReport { feasible: true, worst_scaled: first.merit.objective, criteria: criteria(&first) },
+        front: Vec::new(),
+        calibration: Some(CalibrationReport { parameters: Vec::new(), experiments: Vec::new() }),
+        failures: Vec::new(),
+        warnings: vec!["mind the `gap`".into()],
+    };
+    (problem, best, outcome, archive)
+}
+
+fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
+    let study = problem.study();
+    let report = |(row, reading): (&mops_core::Row, &Option<mops_core::Reading>)| {
+        let scaled = reading.map_or(f64::NAN, |r| r.scaled);
+        CriterionReport {
+            name: row.name.clone(),
+            model: "lag".into(),
+            case: study.case_of(row).name.clone(),
+            usage: row.usage,
+            demand: Some(row.demand.bad),
+            good: None,
+            bad: None,
+            value: reading.map_or(f64::NAN, |r| r.value),
+            scaled,
+            unit: row.unit.to_string(),
+            met: scaled <= 1.0,
+            note: reading.and_then(|r| r.note),
+        }
+    };
+    study.rows.iter().zip(&at.readings).map(report).collect()
+}
+
+/// Writes the report into a folder that lives as long as the answer.
+fn written(name: &str, start: f64, usage: Usage) -> (tempfile::TempDir, String) {
+    let (problem, best, outcome, archive) = study(name, start, usage);
+    let folder = tempfile::tempdir().unwrap();
+    let report = Report { outcome: &outcome, problem: &problem, best: &best, archive: &archive, text: "a < b" };
+    report.write(folder.path()).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    (folder, page)
+}
+
+#[test]
+fn the_page_shows_every_criterion_and_escapes_what_users_write() {
+    let (_folder, page) = written("<script>alert(1)</script>", 5.0, Usage::Minimise);
+    assert!(!page.contains("<script") && page.contains("&lt;script&gt;alert(1)"));
+    assert_eq!(page.matches("<th scope=\"row\">end<small>not settled at the end").count(), 2);
+    for text in [
+        "nominal &amp; more",
+        "mind the <code>gap</code>",
+        "a &lt; b",
+        "exceeds its demand by 84 %",
+        "\u{b1}2 noise, 0.02 V",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(
+        !page.contains("http://")
+            || page.matches("http://").count() == page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count()
+    );
+}
+
+#[test]
+fn an_infeasible_result_names_the_constraint_and_a_failed_start_is_told() {
+    let (_folder, page) = written("lag", 15.0, Usage::Inequality);
+    assert!(page.contains("Infeasible: <code>end</code> in case <code>"));
+    assert!(page.contains("No response at the start values: the simulation failed (diverged at 0.1000 s)."));
+    assert!(page.contains("1 of 2 points had no value"));
+}
+
+#[test]
+fn a_run_without_a_single_value_still_has_a_page() {
+    let (problem, _, mut outcome, mut archive) = study("lag", 15.0, Usage::Minimise);
+    archive.truncate(1);
+    let best = problem.evaluate_at(&[15.0]);
+    (outcome.objective, outcome.violation, outcome.feasible) = (f64::INFINITY, f64::INFINITY, false);
+    outcome.criteria = criteria(&problem, &best);
+    let folder = tempfile::tempdir().unwrap();
+    let report = Report { outcome: &outcome, problem: &problem, best: &best, archive: &archive, text: "" };
+    report.write(folder.path()).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Failed. No point could be evaluated") && page.contains("nothing to show"));
+}
+
+#[test]
+fn every_plot_is_written_twice_under_a_safe_name() {
+    let (folder, _page) = written("lag", 5.0, Usage::Minimise);
+    let mut names: Vec<String> = std::fs::read_dir(folder.path().join("plots"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".png"))
+        .collect();
+    names.sort();
+    assert_eq!(names, ["convergence.png", "fit-step-1-y.png", "residual-step-1-y.png", "response-nominal-more-y.png"]);
+    assert!(folder.path().join("plots/fit-step-1-y.svg").exists());
+}
+
+#[test]
+fn a_plot_escapes_names_and_skips_what_is_not_finite() {
+    let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, f64::INFINITY), (3.0, 2.0), (f64::NAN, 0.0), (4.0, 1e300)];
+    let curve = |style| Curve { name: "a<b & \"c\"".into(), points: points.clone(), style, ..Curve::default() };
+    let curves = [CurveStyle::Line, CurveStyle::Dashed, CurveStyle::Dots].map(curve).to_vec();
+    let svg = Plot { title: "<script>".into(), curves, ..Plot::default() }.svg();
+    assert!(svg.contains("a&lt;b &amp; &quot;c&quot;") && svg.contains("&lt;script&gt;") && !svg.contains("<script"));
+    assert!(!svg.contains("NaN") && !svg.contains("inf "));
+}
+
+#[test]
+fn empty_and_constant_plots_are_drawn() {
+    let level = Level { name: "demand".into(), value: 7.0 };
+    for values in [vec![], vec![2.0], vec![3.0; 4], vec![0.0; 4], vec![1e-300; 3], vec![f64::NAN; 2]] {
+        for log_y in [false, true] {
+            let points = values.iter().enumerate().map(|(i, v)| (i as f64, *v)).collect();
+            let curves = vec![Curve { points, ..Curve::default() }];
+            let plot = Plot { curves, log_y, levels: vec![level.clone()], ..Plot::default() };
+            let svg = plot.svg();
+            assert!(
+                svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf\""),
+                "{values:?} {log_y} {svg}"
+            );
+            let folder = tempfile::tempdir().unwrap();
+            plot.write_png(&folder.path().join("plot.png")).unwrap();
+        }
+    }
+    assert_eq!(numbers::labelled("y", "1"), "y");
+}

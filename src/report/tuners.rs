@@ -1,0 +1,72 @@
+//! The table of tuners, with bars that show where each stands within its bounds.
+
+use maud::{Markup, html};
+use mops_core::{Scale, Tuner};
+
+use super::Report;
+use super::numbers::number;
+use super::page::scrolling;
+
+/// All tuners, and where they stand within their bounds.
+pub(super) fn table(report: &Report<'_>) -> Markup {
+    let study = report.problem.study();
+    let log = study.tuners.iter().any(|t| t.scale == Scale::Log);
+    let rows_and_head = html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "tuner" }
+                    th scope="col" class="number" { "at start" }
+                    th scope="col" class="number" { "at " (report.best_name()) }
+                    th scope="col" { "unit" }
+                    th scope="col" class="number" { "from" }
+                    th scope="col" { "position" }
+                    th scope="col" class="number" { "to" }
+                    th scope="col" { "remark" }
+                }
+            }
+            tbody {
+                @for (now, tuner) in report.outcome.tuners.iter().zip(&study.tuners) {
+                    tr {
+                        th scope="row" { (now.name) }
+                        td class="number" { (number(now.start)) }
+                        td class="number" { strong { (number(now.value)) } }
+                        td { (now.unit) }
+                        td class="number" { @if now.bounds[0].is_finite() { (number(now.bounds[0])) } }
+                        td { @if now.active { (position(tuner, now.start, now.value)) } }
+                        td class="number" { @if now.bounds[1].is_finite() { (number(now.bounds[1])) } }
+                        td { (remark(tuner, now.at_bound, |i| &study.tuners[i].name)) }
+                    }
+                }
+            }
+        }
+    };
+    html! {
+        p { "The filled mark is the value, the hollow one the start" @if log { "; logarithmic ranges are drawn as such" } "." }
+        (scrolling("Tuners", rows_and_head))
+    }
+}
+
+fn position(tuner: &Tuner, start: f64, value: f64) -> Markup {
+    let left = |value: f64| format!("left:{:.1}%", 100.0 * tuner.position_of(value));
+    html! {
+        span class="range" aria-hidden="true" {
+            span class="from" style=(left(start)) {}
+            span class="at" style=(left(value)) {}
+        }
+    }
+}
+
+fn remark<'a>(tuner: &Tuner, at_bound: Option<&str>, name: impl Fn(usize) -> &'a String) -> Markup {
+    html! {
+        @if let Some((_, of)) = &tuner.tie {
+            "follows " (of.iter().map(|&i| name(i).as_str()).collect::<Vec<_>>().join(", "))
+        } @else if !tuner.active {
+            "kept"
+        } @else if let Some(side) = at_bound {
+            span class="missed" { "at its " (side) " bound" }
+        } @else if tuner.scale == Scale::Log {
+            span class="quiet" { "logarithmic" }
+        }
+    }
+}

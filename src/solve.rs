@@ -1,0 +1,96 @@
+//! Solves a study: problem, run, solver, conclusion.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use mops_core::{
+    Budget, Ending, Evaluation, Objective, Outcome, Pareto, Problem, Record, Run, SolverChoice, Stop, Study, Watch,
+    conclude,
+};
+
+/// How a study is solved.
+#[derive(Clone)]
+pub struct Options {
+    /// The solver.
+    pub solver: SolverChoice,
+    /// Largest number of points evaluated.
+    pub max_evaluations: usize,
+    /// Number of threads; all cores where absent. It changes no bit of the result.
+    pub jobs: Option<usize>,
+}
+
+/// Points a run may evaluate where nothing else is said.
+pub const DEFAULT_EVALUATIONS: usize = 20_000;
+
+impl Default for Options {
+    fn default() -> Self {
+        let solver = mops_solvers::kinds().first().expect("there are solvers").default_choice();
+        Self { solver, max_evaluations: DEFAULT_EVALUATIONS, jobs: None }
+    }
+}
+
+/// A solved study.
+pub struct Solved {
+    /// What `result.json` holds.
+    pub outcome: Outcome,
+    /// The problem.
+    pub problem: Problem,
+    /// The evaluation that is reported.
+    pub best: Evaluation,
+    /// Every point, in the order of evaluation.
+    pub archive: Vec<Record>,
+}
+
+/// The solver cannot treat the problem: why, and what would.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unsuitable(pub String);
+
+impl std::fmt::Display for Unsuitable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Unsuitable {}
+
+/// Solves a study; `watch` looks on and may end the run.
+///
+/// # Errors
+/// The solver cannot treat the problem.
+///
+/// # Panics
+/// If the threads cannot be started.
+pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs.unwrap_or(0)).build();
+    threads.expect("threads can be started").install(|| solve_here(study, options, watch))
+}
+
+fn solve_here(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let begun = Instant::now();
+    let problem = Problem::new(Arc::new(study));
+    let mut solver = options.solver.make();
+    solver.accepts(problem.shape()).map_err(Unsuitable)?;
+    let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch);
+    let stop = run.solve(solver.as_mut(), &problem.start());
+    let pareto = pareto(&run, stop);
+    let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
+    let (mut outcome, best) = conclude(&run, &options.solver, ending);
+    outcome.seconds = begun.elapsed().as_secs_f64();
+    let archive = run.archive().to_vec();
+    drop(run);
+    Ok(Solved { outcome, problem, best, archive })
+}
+
+/// Whether the best point is Pareto-optimal, as far as it can be told.
+fn pareto(run: &Run<'_>, stop: Stop) -> Pareto {
+    let problem = run.problem();
+    match run.best().filter(|best| best.merit.is_feasible()) {
+        None => Pareto::NotShown,
+        // A minimum of a sum with positive weights is Pareto-optimal.
+        Some(_) if problem.shape().objective == Objective::Sum && stop == Stop::Converged => Pareto::CertifiedLocal,
+        Some(best) => {
+            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
+            mops_solvers::certify(&mut probe, &best.point)
+        }
+    }
+}

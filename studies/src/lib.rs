@@ -1,0 +1,27 @@
+//! The studies that mops ships.
+
+use mops_core::Shipped;
+
+/// The files of a study, by their names in its folder under `studies/`.
+macro_rules! study {
+    ($name:literal $(, $file:literal)*) => {
+        Shipped {
+            name: $name,
+            files: &[
+                ("study.toml", include_bytes!(concat!("../", $name, "/study.toml"))),
+                ("README.md", include_bytes!(concat!("../", $name, "/README.md"))),
+                $(($file, include_bytes!(concat!("../", $name, "/", $file))),)*
+            ],
+        }
+    };
+}
+
+/// Every shipped study. A new one is a folder, and a line here.
+pub fn shipped() -> Vec<Shipped> {
+    vec![
+        study!("pid-design"),
+        study!("pid-design-constrained"),
+        study!("pid-design-multi-case"),
+        study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),
+    ]
+}
