@@ -1,6 +1,8 @@
 //! Overshoot of a step response.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -67,6 +69,12 @@ impl Criterion for Bound {
         let beyond = answer.farthest_ahead() - answer.target;
         let overshoot = if self.absolute { answer.upwards(beyond) } else { beyond / answer.height()? };
         Ok(overshoot.max(0.0).into())
+    }
+
+    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
+        let (Some(limit), Ok(answer)) = (limit, self.step.answer(analysis)) else { return Vec::new() };
+        let beyond = if self.absolute { answer.upwards(limit) } else { limit * (answer.target - answer.from) };
+        self.step.mark("overshoot", answer.target + beyond)
     }
 }
 

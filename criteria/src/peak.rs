@@ -1,6 +1,6 @@
 //! Largest or smallest value of a signal.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Unit, Value, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -67,6 +67,15 @@ impl Criterion for Bound {
             Extremum::Absolute => trace.maximum().0.max(-trace.minimum().0),
         };
         Ok(peak.into())
+    }
+
+    fn marks(&self, limit: Option<f64>, _: &Analysis) -> Vec<Mark> {
+        let mark = |level| Mark { signal: self.signal.name.clone(), label: "peak".into(), level };
+        match (limit, self.of) {
+            (None, _) => Vec::new(),
+            (Some(limit), Extremum::Absolute) => vec![mark(limit), mark(-limit)],
+            (Some(limit), _) => vec![mark(limit)],
+        }
     }
 }
 

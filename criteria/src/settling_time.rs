@@ -1,7 +1,7 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Trace, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Trace, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -96,6 +96,16 @@ impl Criterion for Bound {
         } else {
             Ok(Value::noted(answer.length(), "not settled at the end"))
         }
+    }
+
+    fn marks(&self, _: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
+        let Ok(answer) = self.step.answer(analysis) else { return Vec::new() };
+        let band = match self.band {
+            Band::Absolute(band) => band,
+            Band::Relative(fraction) => fraction * (answer.target - answer.from).abs(),
+        };
+        let edges = [("band", answer.target + band), ("", answer.target - band)];
+        edges.into_iter().flat_map(|(label, level)| self.step.mark(label, level)).collect()
     }
 }
 

@@ -1,6 +1,8 @@
 //! Undershoot of a step response: how far it first goes the wrong way.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -66,6 +68,12 @@ impl Criterion for Bound {
         let behind = answer.from - answer.farthest_behind();
         let undershoot = if self.absolute { answer.upwards(behind) } else { behind / answer.height()? };
         Ok(undershoot.max(0.0).into())
+    }
+
+    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
+        let (Some(limit), Ok(answer)) = (limit, self.step.answer(analysis)) else { return Vec::new() };
+        let behind = if self.absolute { answer.upwards(limit) } else { limit * (answer.target - answer.from) };
+        self.step.mark("undershoot", answer.from - behind)
     }
 }
 

@@ -35,6 +35,11 @@ pub trait Criterion: Send + Sync {
     /// # Errors
     /// A response for which the criterion is not defined: one sentence.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
+
+    /// Levels to draw beside the signals, where the criterion has some; `limit` is the value that scales to 1.
+    fn marks(&self, _limit: Option<f64>, _analysis: &Analysis) -> Vec<Mark> {
+        Vec::new()
+    }
 }
 
 /// The value of a criterion.
@@ -81,22 +86,51 @@ pub enum Usage {
     Monitor,
 }
 
-/// Value at which a criterion's scaled value is 0, and value at which it is 1.
-///
-/// A demand `d > 0` is `good = 0`, `bad = d`: the scaled value is `c/d`.
+/// How a value is scaled.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Demand {
-    /// Scaled value 0.
-    pub good: f64,
-    /// Scaled value 1.
-    pub bad: f64,
+pub enum Demand {
+    /// Divided by this positive number.
+    Value(f64),
+    /// 0 at `good`, 1 at `bad`, either way round.
+    Pair {
+        /// Scaled value 0.
+        good: f64,
+        /// Scaled value 1.
+        bad: f64,
+    },
+    /// Nothing was asked for: the criterion is only watched, and its scaled value is NaN.
+    None,
 }
 
 impl Demand {
-    /// `(c - good)/(bad - good)`, either way round.
+    /// The scaled value: `c/d`, or `(c - good)/(bad - good)`.
     pub fn scale(&self, value: f64) -> f64 {
-        if self.good == 0.0 { value / self.bad } else { (value - self.good) / (self.bad - self.good) }
+        match *self {
+            Self::Value(demand) => value / demand,
+            Self::Pair { good, bad } => (value - good) / (bad - good),
+            Self::None => f64::NAN,
+        }
     }
+
+    /// The value that scales to 1.
+    pub fn limit(&self) -> Option<f64> {
+        match *self {
+            Self::Value(demand) => Some(demand),
+            Self::Pair { bad, .. } => Some(bad),
+            Self::None => None,
+        }
+    }
+}
+
+/// A level of a signal that a criterion looks at, to be drawn in plots.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// The signal.
+    pub signal: String,
+    /// What the level is, in a word or two.
+    pub label: String,
+    /// Where it lies, in the signal's unit.
+    pub level: f64,
 }
 
 #[cfg(test)]
@@ -105,8 +139,8 @@ mod tests {
 
     #[test]
     fn a_demand_scales_by_division_and_a_pair_either_way_round() {
-        assert_eq!(Demand { good: 0.0, bad: 0.1 }.scale(0.05), 0.05 / 0.1);
-        let margin = Demand { good: 12.0, bad: 6.0 };
+        assert_eq!(Demand::Value(0.1).scale(0.05), 0.05 / 0.1);
+        let margin = Demand::Pair { good: 12.0, bad: 6.0 };
         assert_eq!((margin.scale(12.0), margin.scale(6.0), margin.scale(3.0)), (0.0, 1.0, 1.5));
     }
 }

@@ -30,7 +30,7 @@ pub use catalogue::{
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Demand, Usage, Value};
+pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use experiment::{Channel, Experiment, Hold, Input, Role};
 pub use expression::{Expression, SyntaxError};

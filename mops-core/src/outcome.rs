@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::criterion::Usage;
+use crate::criterion::{Demand, Usage};
 use crate::experiment::Role;
 use crate::problem::{Evaluation, FEASIBLE};
 use crate::solver::Stop;
@@ -101,7 +101,7 @@ pub struct CriterionReport {
     pub case: String,
     /// What the study does with it.
     pub usage: Usage,
-    /// The demand; null where `good` and `bad` stand for it.
+    /// The demand; null where `good` and `bad` stand for it, or nothing was asked.
     pub demand: Option<f64>,
     /// Value that scales to 0, where given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +115,7 @@ pub struct CriterionReport {
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,
-    /// Whether the demand is met.
+    /// Whether the demand is met; true where there is none.
     pub met: bool,
     /// What a reader must know of the value.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -216,19 +216,24 @@ pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport>
     let report = |(row, reading): (&crate::study::Row, &Option<crate::problem::Reading>)| {
         let plan = &study.jobs[row.job];
         let scaled = reading.map_or(f64::NAN, |r| r.scaled);
-        let pair = row.demand.good != 0.0;
+        let (demand, good, bad) = match row.demand {
+            Demand::Value(demand) => (Some(demand), None, None),
+            Demand::Pair { good, bad } => (None, Some(good), Some(bad)),
+            Demand::None => (None, None, None),
+        };
         CriterionReport {
             name: row.name.clone(),
             model: study.models[plan.model].0.clone(),
             case: study.cases[plan.case].name.clone(),
             usage: row.usage,
-            demand: (!pair).then_some(row.demand.bad),
-            good: pair.then_some(row.demand.good),
-            bad: pair.then_some(row.demand.bad),
+            demand,
+            good,
+            bad,
             value: reading.map_or(f64::NAN, |r| r.value),
             scaled,
             unit: row.unit.to_string(),
             met: match row.usage {
+                _ if row.demand == Demand::None => true,
                 Usage::Equality => (scaled - 1.0).abs() <= FEASIBLE,
                 _ => scaled <= 1.0 + FEASIBLE,
             },

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::criterion::{Usage, Value};
+use crate::criterion::{Demand, Usage, Value};
 use crate::experiment::Role;
 use crate::model::{Analysis, Failure, Job};
 use crate::solver::Shape;
@@ -274,10 +274,11 @@ impl Problem {
             if *usage != Usage::Minimise {
                 continue;
             }
-            if residuals.is_empty() || row.demand.good != 0.0 {
+            let Demand::Value(demand) = row.demand else { return Vec::new() };
+            if residuals.is_empty() {
                 return Vec::new();
             }
-            let factor = (weight / row.demand.bad).sqrt();
+            let factor = (weight / demand).sqrt();
             all.extend(residuals.into_iter().map(|r| factor * r));
         }
         all

@@ -73,9 +73,11 @@ impl<'a> Run<'a> {
 
     /// Runs the solver from `start`, a point of the unit box, to its end.
     pub fn solve(&mut self, solver: &mut dyn Solver, start: &[f64]) -> Stop {
+        // The start is evaluated before all else: whatever happens, there is a point to report.
+        let first = self.problem.evaluate(start);
+        self.record(&first);
+        self.cache.insert(key(self.problem, start), first);
         let mut iterate = || -> Result<Stop, Halt> {
-            // The start is evaluated before all else: whatever happens, there is a point to report.
-            self.evaluate(&[start.to_vec()])?;
             solver.begin(self, start)?;
             loop {
                 match solver.step(self)? {

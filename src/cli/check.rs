@@ -35,7 +35,13 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let rows = study.rows.iter().map(|row| {
         let plan = &study.jobs[row.job];
         let usage = format!("{:?}", row.usage).to_lowercase();
-        vec![study.key(row), study.models[plan.model].0.clone(), usage, number(row.demand.bad), row.unit.to_string()]
+        vec![
+            study.key(row),
+            study.models[plan.model].0.clone(),
+            usage,
+            row.demand.limit().map_or_else(String::new, number),
+            row.unit.to_string(),
+        ]
     });
     text += &format!("\n{}", table(&["criterion", "model", "usage", "demand", "unit"], &[3], rows.collect()));
     let fixed = study.jobs.iter().flat_map(|job| {

@@ -46,7 +46,6 @@ pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport]) -> S
     };
     let rows = start.iter().zip(best).map(|(start, best)| {
         let demand = match (best.demand, best.good, best.bad) {
-            _ if best.usage == Usage::Monitor => String::new(),
             (Some(demand), ..) => number(demand),
             (None, Some(good), Some(bad)) => format!("{} .. {}", number(good), number(bad)),
             _ => String::new(),

@@ -1,9 +1,9 @@
 //! Start and reported point beside each other: a signal in both, and measurements with them.
 
-use mops_core::{Analysis, Channel, Failure, Trace, Variable};
+use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
 
 use super::numbers::{labelled, with_unit};
-use super::plot::{Band, Curve, CurveStyle, Ink, Plot};
+use super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
 use super::sampling;
 
 /// The two analyses that are compared.
@@ -35,12 +35,21 @@ impl Both {
     }
 
     /// A signal at both points.
-    pub(super) fn response(&self, signal: &Variable, case: &str) -> Plot {
+    pub(super) fn response(&self, signal: &Variable, case: &str, rows: &[&Row]) -> Plot {
         Plot {
             title: format!("{} in case {case}", signal.name),
             curves: self.curves(&signal.name),
+            levels: self.levels(&signal.name, rows),
             ..over_time(signal)
         }
+    }
+
+    /// The levels that criteria look at: limits of demands, edges of bands.
+    fn levels(&self, signal: &str, rows: &[&Row]) -> Vec<Level> {
+        let Ok(analysis) = &self.best else { return Vec::new() };
+        let marks = rows.iter().flat_map(|row| row.criterion.marks(row.demand.limit(), analysis));
+        let of_signal = marks.filter(|mark| mark.signal == signal && mark.level.is_finite());
+        of_signal.map(|mark| Level { name: mark.label, value: mark.level }).collect()
     }
 
     /// A measured signal at both points, and the measurement.

@@ -10,8 +10,6 @@ use super::page::scrolling;
 /// What a criterion is asked for, with its unit; `None` where it is only watched and nothing was asked.
 pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
     match (criterion.demand, criterion.good, criterion.bad) {
-        // A criterion that is only watched is scaled by 1 where the study gives it no demand.
-        (Some(1.0), _, _) if criterion.usage == Usage::Monitor => None,
         (Some(demand), _, _) => Some(with_unit(demand, &criterion.unit)),
         (None, Some(good), Some(bad)) => {
             let side = if good > bad { "at least" } else { "at most" };

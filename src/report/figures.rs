@@ -100,7 +100,8 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     }
     let measured = |signal: &Variable| case.experiment.as_ref().is_some_and(|e| e.channel(&signal.name).is_some());
     for signal in plan.signals.iter().map(|&i| &signals[i]).filter(|s| !measured(s)) {
-        let plot = both.response(signal, &case.name);
+        let rows: Vec<&Row> = study.rows.iter().filter(|row| row.job == job).collect();
+        let plot = both.response(signal, &case.name, &rows);
         let plots = vec![(format!("response-{place}-{}", signal.name), plot)];
         group.figures.push(Figure { plots, caption: captions(&signal.name) });
     }

@@ -137,7 +137,7 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
             model: "lag".into(),
             case: study.case_of(row).name.clone(),
             usage: row.usage,
-            demand: Some(row.demand.bad),
+            demand: row.demand.limit(),
             good: None,
             bad: None,
             value: reading.map_or(f64::NAN, |r| r.value),

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable};
+use mops_core::{Analysis, Mark, Mistake, Quantity, Trace, Unit, Variable};
 
 use super::{optional, part, signal, step_time, trace};
 
@@ -69,6 +69,11 @@ impl Step {
             target: self.target.unwrap_or_else(|| whole.last()),
             time,
         })
+    }
+
+    /// A level of the signal, to draw.
+    pub fn mark(&self, label: &str, level: f64) -> Vec<Mark> {
+        vec![Mark { signal: self.signal.clone(), label: label.to_owned(), level }]
     }
 }
 

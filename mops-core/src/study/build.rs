@@ -530,13 +530,13 @@ fn demand(draft: &CriterionDraft, unit: &Unit) -> Result<Demand, Mistake> {
         |key: &str, q: &Option<Quantity>| q.as_ref().map(|q| q.to(unit).map_err(|e| Mistake::new(key, e))).transpose();
     let (demand, good, bad) = (value("demand", &draft.demand)?, value("good", &draft.good)?, value("bad", &draft.bad)?);
     match (demand, good, bad) {
-        (Some(d), None, None) if d.is_finite() && d > 0.0 => Ok(Demand { good: 0.0, bad: d }),
+        (Some(d), None, None) if d.is_finite() && d > 0.0 => Ok(Demand::Value(d)),
         (Some(d), None, None) => Err(Mistake::new("demand", format!("a demand must be positive, not {d}"))
             .with_help("the value is divided by its demand; for zero, a negative wish or `at least`, give `good` (scaled to 0) and `bad` (scaled to 1) instead")),
-        (None, Some(good), Some(bad)) if good.is_finite() && bad.is_finite() && good != bad => Ok(Demand { good, bad }),
+        (None, Some(good), Some(bad)) if good.is_finite() && bad.is_finite() && good != bad => Ok(Demand::Pair { good, bad }),
         (None, Some(_), Some(_)) => Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")),
         (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")),
-        (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand { good: 0.0, bad: 1.0 }),
+        (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
         (None, None, None) => Err(Mistake::here("the criterion has no demand").with_help("add `demand = ...`, or the pair `good` and `bad`")),
         (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")),
         (None, None, Some(_)) => Err(Mistake::new("bad", "`bad` needs `good` beside it")),
