@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Ending, Evaluation, Objective, Outcome, Pareto, Problem, Record, Run, SolverChoice, Stop, Study, Watch,
-    conclude,
+    Budget, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Problem, Record, Run, SolverChoice, Stop, Study,
+    Watch, conclude,
 };
 
 /// How a study is solved.

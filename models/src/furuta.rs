@@ -253,6 +253,10 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
         self.drive.next_break(t)
     }
 
+    fn longest_step(&self) -> f64 {
+        self.drive.longest_step()
+    }
+
     fn pass_break(&mut self, t: f64, x: &mut [S; 4]) {
         self.drive.pass_break(t);
         self.find_contacts(t, x);

@@ -599,6 +599,10 @@ impl<S: Scalar> Dynamics<S> for Loop<'_, S> {
         self.sampled.as_ref().map_or(next, |sampled| next.min(sampled.next_break()))
     }
 
+    fn longest_step(&self) -> f64 {
+        self.setpoint.longest_step().min(self.load.longest_step())
+    }
+
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
         self.setpoint.pass_break(t);
         self.load.pass_break(t);

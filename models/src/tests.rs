@@ -198,3 +198,27 @@ fn a_sliding_mass_stops_where_coulomb_friction_says() {
     assert!((response.trace("phi").unwrap().at(10.0) - 1.5 * 1.5 * 2.0 / (2.0 * 0.5)).abs() < 1e-9);
     assert!((response.events[0].time - 1.5 * 2.0 / 0.5).abs() < 1e-9);
 }
+
+#[test]
+fn a_joint_that_breaks_away_for_a_moment_only_sticks_again() {
+    // Torques that exceed the friction by 1 % for a moment: the arm moves a little and stops, each period.
+    let sine = Input::Sine { amplitude: 1.01e-3, frequency: 2.0, phase: 0.0, offset: 0.0 };
+    let case = Case { inputs: vec![("u".into(), sine)], ..Case::default() };
+    let response = furuta(&[("theta0", std::f64::consts::PI), ("ca", 1e-3)], &case, 5.0);
+    let slides = response.events.iter().filter(|e| e.what == "arm slides").count();
+    assert_eq!(slides, 20, "twice a period: {:?}", response.events);
+}
+
+#[test]
+fn swings_with_dry_friction_never_chatter() {
+    // Over a grid of frictions and starts every simulation ends, with a moderate number of events.
+    for ca in [1e-4, 7.67e-4, 8.28e-4, 2e-3] {
+        for cp in [0.0, 1.2e-4, 1.77e-4] {
+            for theta0 in [-2.07, 0.4, 1.68, 3.0] {
+                let start = [("theta0", theta0), ("dtheta0", -9.2), ("dphi0", -2.1), ("ca", ca), ("cp", cp)];
+                let response = furuta(&start, &Case::default(), 6.0);
+                assert!(response.events.len() < 200, "{ca} {cp} {theta0}: {}", response.events.len());
+            }
+        }
+    }
+}

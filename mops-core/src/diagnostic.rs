@@ -13,6 +13,35 @@ pub struct Source {
     pub text: String,
 }
 
+impl Source {
+    /// A text file as it was read; a byte order mark is dropped.
+    ///
+    /// # Errors
+    /// Bytes that are not UTF-8, with the place of the first one.
+    pub fn from_bytes(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
+        let source =
+            |text: &str| Self { name: name.to_owned(), text: text.strip_prefix('\u{feff}').unwrap_or(text).to_owned() };
+        let text = match String::from_utf8(bytes) {
+            Ok(text) => return Ok(source(&text)),
+            Err(error) => error,
+        };
+        let bytes = text.as_bytes();
+        if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+            return Err(Diagnostic::new("the file is UTF-16, not UTF-8")
+                .with_help("save it as UTF-8")
+                .at(&Arc::new(source("")), 0..0));
+        }
+        let readable = text.utf8_error().valid_up_to();
+        let unreadable = String::from_utf8_lossy(&bytes[readable..]);
+        let lossy = Arc::new(source(&String::from_utf8_lossy(bytes)));
+        let start = lossy.text.len() - unreadable.len();
+        Err(Diagnostic::new("the file is not UTF-8")
+            .with_label("from here on")
+            .with_help("save it as UTF-8")
+            .at(&lossy, start..start + char::REPLACEMENT_CHARACTER.len_utf8()))
+    }
+}
+
 /// A mistake in what the user gave: the study, its data or the command line.
 ///
 /// Numerical trouble is never a diagnostic: it is a value ([`crate::Failure`]).
@@ -24,7 +53,7 @@ pub struct Diagnostic {
     pub label: Option<String>,
     /// The way out.
     pub help: Option<String>,
-    /// Where: the text and the range of bytes in it.
+    /// Where: the text and the range of bytes in it; `0..0` is the file as a whole.
     pub place: Option<(Arc<Source>, Range<usize>)>,
 }
 
@@ -55,9 +84,9 @@ impl Diagnostic {
         self
     }
 
-    /// Line and column, both from 1, the column counted in characters.
+    /// Line and column, both from 1, the column counted in characters; none where the mistake is the file as a whole.
     pub fn line_column(&self) -> Option<(usize, usize)> {
-        let (source, span) = self.place.as_ref()?;
+        let (source, span) = self.place.as_ref().filter(|(_, span)| *span != (0..0))?;
         let before = &source.text[..source.text.floor_char_boundary(span.start)];
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
@@ -70,8 +99,7 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some((source, _)) = &self.place {
             write!(f, "{}", source.name)?;
-            if !source.text.is_empty() {
-                let (line, column) = self.line_column().expect("a diagnostic with a place has a line");
+            if let Some((line, column)) = self.line_column() {
                 write!(f, ":{line}:{column}")?;
             }
             write!(f, ": ")?;
@@ -86,14 +114,22 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The known name nearest to `given`, if one is near enough to be meant.
+/// The known name nearest to `given`, if one is near enough to be meant: up to a quarter of its letters differ, or it
+/// begins with what was given.
 pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|name| (strsim::damerau_levenshtein(&given.to_lowercase(), &name.to_lowercase()), name))
-        .filter(|(distance, name)| *distance <= 1 + name.chars().count().max(given.chars().count()) / 3)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, name)| name)
+    let given = given.to_lowercase();
+    let length = given.chars().count();
+    let distance = |name: &'a str| {
+        let name = name.to_lowercase();
+        let longer = length.max(name.chars().count());
+        let distance = strsim::damerau_levenshtein(&given, &name);
+        // Of a name with one letter nothing is left when that one differs.
+        let near = distance <= 1 + longer / 4 && distance < longer;
+        let begun = length >= 3 && name.starts_with(&given);
+        (near || begun).then_some(if begun { 0 } else { distance })
+    };
+    let near = known.into_iter().filter_map(|name| Some((distance(name)?, name)));
+    near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
 }
 
 /// "did you mean `omega`?" or the list of what is known.
@@ -104,5 +140,31 @@ pub fn suggestion<'a>(given: &str, known: impl IntoIterator<Item = &'a str> + Cl
             let names: Vec<&str> = known.into_iter().collect();
             if names.is_empty() { "nothing is known here".to_owned() } else { format!("known: {}", names.join(", ")) }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_near_name_is_one_that_a_slip_of_the_hand_leads_to() {
+        let known = ["k", "Ti", "settling-time", "levenberg-marquardt"];
+        assert_eq!(nearest("ti", known), Some("Ti"));
+        assert_eq!(nearest("settlng-tiem", known), Some("settling-time"));
+        assert_eq!(nearest("levenberg", known), Some("levenberg-marquardt"));
+        assert_eq!(nearest("q", known), None);
+        assert_eq!(nearest("tau", known), None);
+    }
+
+    #[test]
+    fn a_place_in_a_text_is_counted_in_characters() {
+        let source = Arc::new(Source { name: "a.txt".into(), text: "gr\u{fc}n\n\u{b5} = x".into() });
+        let at = |text: &str| {
+            let start = source.text.find(text).unwrap();
+            Diagnostic::new("wrong").at(&source, start..start + text.len()).to_string()
+        };
+        assert_eq!(at("x"), "a.txt:2:5: wrong");
+        assert_eq!(Diagnostic::new("wrong").at(&source, 0..0).to_string(), "a.txt: wrong");
     }
 }

@@ -93,11 +93,6 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// The best point so far.
-    pub fn best(&self) -> Option<&Evaluation> {
-        self.best.as_ref()
-    }
-
     /// All points, in the order of their evaluation.
     pub fn archive(&self) -> &[Record] {
         &self.archive
@@ -188,6 +183,10 @@ impl Oracle for Run<'_> {
 
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
         differences::linearise(self, point, reach)
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref()
     }
 
     fn stream(&self, label: &str) -> Stream {

@@ -83,6 +83,9 @@ pub trait Oracle {
     /// As [`Oracle::evaluate`].
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt>;
 
+    /// The best point so far, of this solver or of what ran before it in the same run.
+    fn best(&self) -> Option<&Evaluation>;
+
     /// The random stream of that label; always the same one under the same seed.
     fn stream(&self, label: &str) -> Stream;
 }

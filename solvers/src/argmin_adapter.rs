@@ -16,23 +16,15 @@ pub(crate) struct Cost<'a> {
 struct State<'a> {
     oracle: &'a mut dyn Oracle,
     halt: Option<Halt>,
+    unit: Option<f64>,
 }
 
-/// argmin only knows errors; the halt itself waits in [`Cost::halt`].
-#[derive(Debug)]
-struct Halted;
-
-impl std::fmt::Display for Halted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the run is over")
-    }
-}
-
-impl std::error::Error for Halted {}
+/// What a point costs once the run is over: argmin ends at the target cost, and not all of its solvers take an error.
+const HALTED: f64 = f64::NEG_INFINITY;
 
 impl<'a> Cost<'a> {
     pub fn new(oracle: &'a mut dyn Oracle) -> Self {
-        Self { state: Mutex::new(State { oracle, halt: None }) }
+        Self { state: Mutex::new(State { oracle, halt: None, unit: None }) }
     }
 
     /// Why the oracle stopped answering, if it did.
@@ -49,11 +41,21 @@ impl CostFunction for &Cost<'_> {
         let inside: Vec<f64> = point.iter().map(|u| u.clamp(0.0, 1.0)).collect();
         let outside: f64 = point.iter().zip(&inside).map(|(a, b)| (a - b).abs()).sum();
         let mut state = self.state.lock().expect("nobody panics holding the lock");
+        if state.halt.is_some() {
+            return Ok(HALTED);
+        }
         match state.oracle.evaluate(&[inside]) {
-            Ok(answers) => Ok(penalised(&answers[0]) + 10.0 * outside),
+            Ok(answers) => {
+                let cost = penalised(&answers[0]);
+                // argmin's tolerances are absolute: bring the objective to the order of 1.
+                if state.unit.is_none() && cost.is_finite() && cost != 0.0 {
+                    state.unit = Some(if (1e-3..1e3).contains(&cost.abs()) { 1.0 } else { 1.0 / cost.abs() });
+                }
+                Ok(cost * state.unit.unwrap_or(1.0) + 10.0 * outside)
+            }
             Err(halt) => {
                 state.halt = Some(halt);
-                Err(Halted.into())
+                Ok(HALTED)
             }
         }
     }

@@ -10,7 +10,9 @@ use crate::pattern_search::PatternSearchOptions;
 use crate::sqp::SqpOptions;
 
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp` from several starts: the study's own, and the best points of a sample of the box.
+/// numbers or lists, else `sqp`; from several starts: the study's own, and the best points of a sample of the box. Where
+/// the objective is no sum of squares a pattern search follows from the best point found, because an optimum may lie on a
+/// jump (of a settling time, say), where slopes lead no further.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -28,13 +30,20 @@ impl SolverOptions for AutoOptions {
     const KIND: &'static str = "auto";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Auto { options: self.clone(), chosen: None })
+        Box::new(Auto { options: self.clone(), stage: None })
     }
 }
 
 struct Auto {
     options: AutoOptions,
-    chosen: Option<Multistart>,
+    stage: Option<Stage>,
+}
+
+enum Stage {
+    /// From several starts.
+    Global(Multistart),
+    /// From the best point; with whether the first stage met a test of an optimum.
+    Polish(Box<dyn Solver>, bool),
 }
 
 impl Solver for Auto {
@@ -43,14 +52,31 @@ impl Solver for Auto {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        let mut chosen = Multistart::new(choose(oracle.shape()), self.options.starts);
-        chosen.begin(oracle, start)?;
-        self.chosen = Some(chosen);
+        let mut global = Multistart::new(choose(oracle.shape()), self.options.starts);
+        global.begin(oracle, start)?;
+        self.stage = Some(Stage::Global(global));
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        self.chosen.as_mut().expect("begin comes first").step(oracle)
+        match self.stage.as_mut().expect("begin comes first") {
+            Stage::Global(global) => {
+                let progress = global.step(oracle)?;
+                if progress == Progress::Continue || oracle.shape().residuals > 0 {
+                    return Ok(progress);
+                }
+                let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(progress) };
+                let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
+                pattern.begin(oracle, &best)?;
+                self.stage = Some(Stage::Polish(pattern, progress == Progress::Converged));
+                Ok(Progress::Continue)
+            }
+            Stage::Polish(pattern, converged) => match pattern.step(oracle)? {
+                Progress::Continue => Ok(Progress::Continue),
+                Progress::Stalled if !*converged => Ok(Progress::Stalled),
+                _ => Ok(Progress::Converged),
+            },
+        }
     }
 }
 

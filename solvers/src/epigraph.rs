@@ -63,6 +63,23 @@ impl Rows {
         Self { objectives, inequalities: pick(Usage::Inequality, 1.0), equalities: pick(Usage::Equality, 1.0) }
     }
 
+    /// A factor that brings the objective to the order of 1, where it is far from it: scaled values are near 1 unless
+    /// the demands are far from what can be had.
+    pub fn unit(&self) -> f64 {
+        let largest = self.objectives.iter().map(|row| row.value.abs()).fold(0.0, f64::max);
+        if (1e-3..1e3).contains(&largest) || largest == 0.0 { 1.0 } else { 1.0 / largest }
+    }
+
+    /// The same rows with the objective in other units.
+    #[must_use]
+    pub fn with_objective_times(mut self, factor: f64) -> Self {
+        for row in &mut self.objectives {
+            row.value *= factor;
+            row.slope.iter_mut().for_each(|s| *s *= factor);
+        }
+        self
+    }
+
     /// The objective: the largest of its rows.
     pub fn objective(&self) -> f64 {
         self.objectives.iter().map(|row| row.value).fold(f64::NEG_INFINITY, f64::max)

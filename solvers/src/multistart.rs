@@ -59,7 +59,7 @@ impl Multistart {
             return Ok(Vec::new());
         }
         let mut random = oracle.stream("multistart");
-        let sample = latin_hypercube(self.extra * 2 * (n + 1), n, &mut random);
+        let sample = latin_hypercube(self.extra * 5 * (n + 1), n, &mut random);
         best_of(oracle, &sample, self.extra)
     }
 }

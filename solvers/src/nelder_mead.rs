@@ -9,8 +9,9 @@ use serde::Deserialize;
 use crate::argmin_adapter::Cost;
 use crate::start::usable_start;
 
-/// The simplex method of Nelder and Mead, by argmin. It sees one number per point, the penalised maximum, so that it may
-/// stop at a kink; for comparison, and for rough criteria of two or three tuners.
+/// The simplex method of Nelder and Mead, by argmin, begun again at its own end until that brings nothing. It sees one
+/// number per point, the penalised maximum, so that it may stop at a kink; for comparison, and for rough criteria of two
+/// or three tuners.
 ///
 /// Source: J. A. Nelder, R. Mead, Computer Journal 7 (1965) 308-313.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -18,9 +19,9 @@ use crate::start::usable_start;
 pub struct NelderMeadOptions {
     /// Length of the first simplex's edges, in the unit box.
     pub size: f64,
-    /// Ends when the standard deviation of the values at the corners is below this.
+    /// A simplex ends when the standard deviation of the values at its corners is below this.
     pub tolerance: f64,
-    /// Largest number of iterations.
+    /// Largest number of iterations of a simplex.
     pub max_iterations: u64,
 }
 
@@ -34,13 +35,17 @@ impl SolverOptions for NelderMeadOptions {
     const KIND: &'static str = "nelder-mead";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Simplex { options: self.clone(), start: None })
+        Box::new(Simplex { options: self.clone(), start: None, size: self.size, before: f64::INFINITY })
     }
 }
 
 struct Simplex {
     options: NelderMeadOptions,
     start: Option<Vec<f64>>,
+    /// Edges of the next simplex; they shrink each time.
+    size: f64,
+    /// Value at which the last simplex ended.
+    before: f64,
 }
 
 impl Solver for Simplex {
@@ -50,19 +55,21 @@ impl Solver for Simplex {
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.start = usable_start(oracle, start)?;
+        self.size = self.options.size;
+        self.before = f64::INFINITY;
         Ok(())
     }
 
-    /// argmin runs to its end in one step.
+    /// A whole simplex is one step: argmin runs to its end.
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let Some(start) = self.start.take() else { return Ok(Progress::Stalled) };
+        let Some(start) = &self.start else { return Ok(Progress::Stalled) };
         if start.is_empty() {
             return Ok(Progress::Converged);
         }
         let mut corners = vec![start.clone()];
         for (j, u) in start.iter().enumerate() {
             let mut corner = start.clone();
-            corner[j] = if u + self.options.size <= 1.0 { u + self.options.size } else { u - self.options.size };
+            corner[j] = if u + self.size <= 1.0 { u + self.size } else { u - self.size };
             corners.push(corner);
         }
         let Ok(method) = NelderMead::new(corners).with_sd_tolerance(self.options.tolerance) else {
@@ -70,10 +77,20 @@ impl Solver for Simplex {
         };
         let cost = Cost::new(oracle);
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
-        match (cost.halt(), run) {
-            (Some(halt), _) => Err(halt),
-            (None, Ok(done)) if done.state.iter < self.options.max_iterations => Ok(Progress::Converged),
-            _ => Ok(Progress::Stalled),
+        if let Some(halt) = cost.halt() {
+            return Err(halt);
         }
+        let Ok(done) = run else { return Ok(Progress::Stalled) };
+        let value = done.state.best_cost;
+        let gained = self.before - value;
+        if gained <= self.options.tolerance.max(1e-6 * value.abs()) {
+            return Ok(Progress::Converged);
+        }
+        self.before = value;
+        self.size *= 0.3;
+        if let Some(end) = done.state.best_param {
+            self.start = Some(end.iter().map(|u| u.clamp(0.0, 1.0)).collect());
+        }
+        Ok(Progress::Continue)
     }
 }

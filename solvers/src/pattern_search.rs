@@ -188,6 +188,8 @@ impl State {
         let slopes: Vec<Vec<f64>> =
             slopes.into_iter().map(|s| (&turn * DVector::from_vec(s)).iter().copied().collect()).collect();
         let rows = Rows::new(shape, here, &slopes);
+        let unit = rows.unit();
+        let rows = rows.with_objective_times(unit);
         let reach = 2.0 * self.size;
         let low: Vec<f64> = self.best.point.iter().map(|u| (-u).max(-reach)).collect();
         let high: Vec<f64> = self.best.point.iter().map(|u| (1.0 - u).min(reach)).collect();

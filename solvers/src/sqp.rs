@@ -55,6 +55,8 @@ struct Sqp {
 struct State {
     at: Linearisation,
     rows: Rows,
+    /// Factor of the objective, so that it is of the order of 1.
+    unit: f64,
     /// Points beyond kinks, with the rows there.
     bundle: Vec<(Vec<f64>, Rows)>,
     hessian: DMatrix<f64>,
@@ -86,8 +88,11 @@ impl Solver for Sqp {
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let Some(at) = oracle.linearise(&start, self.options.radius)? else { return Ok(()) };
         let n = start.len();
+        let rows = Rows::of(oracle.shape(), &at);
+        let unit = rows.unit();
         self.state = Some(State {
-            rows: Rows::of(oracle.shape(), &at),
+            rows: rows.with_objective_times(unit),
+            unit,
             bundle: Vec::new(),
             at,
             hessian: DMatrix::identity(n, n) * 0.1,
@@ -160,7 +165,7 @@ impl Solver for Sqp {
             if improves || length < KINK {
                 match oracle.linearise(&evaluation.point, state.radius)? {
                     Some(at) if improves => state.move_to(oracle.shape(), at, &direction),
-                    Some(at) => state.remember(at.at.point.clone(), Rows::of(oracle.shape(), &at)),
+                    Some(at) => state.remember(at.at.point.clone(), state.rows_of(oracle.shape(), &at)),
                     None => state.radius *= 0.25,
                 }
             }
@@ -252,18 +257,23 @@ impl State {
         self.at.at.point.iter().map(|u| (1.0 - u).min(self.radius)).collect()
     }
 
+    fn rows_of(&self, shape: &Shape, at: &Linearisation) -> Rows {
+        Rows::of(shape, at).with_objective_times(self.unit)
+    }
+
     /// The rows after a step, without slopes; `None` where the point fails.
     fn try_step(&self, oracle: &mut dyn Oracle, step: &[f64]) -> Result<Option<(Evaluation, Rows)>, Halt> {
         let point: Vec<f64> = self.at.at.point.iter().zip(step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
         let evaluation = oracle.evaluate(&[point])?.pop().expect("one point, one answer");
         let shape = oracle.shape();
         let none = vec![vec![0.0; shape.dimension()]; shape.rows.len()];
-        let rows = evaluation.scaled.as_ref().map(|scaled| Rows::new(shape, scaled, &none));
+        let rows =
+            evaluation.scaled.as_ref().map(|scaled| Rows::new(shape, scaled, &none).with_objective_times(self.unit));
         Ok(rows.map(|rows| (evaluation, rows)))
     }
 
     fn move_to(&mut self, shape: &Shape, at: Linearisation, direction: &Direction) {
-        let rows = Rows::of(shape, &at);
+        let rows = self.rows_of(shape, &at);
         let n = at.at.point.len();
         let s = DVector::from_fn(n, |j, _| at.at.point[j] - self.at.at.point[j]);
         let before = DVector::from_vec(self.rows.lagrangian_slope(&direction.multipliers));

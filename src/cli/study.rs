@@ -1,12 +1,12 @@
 //! Opens studies, and shows what is wrong with them.
 
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use mops_core::file::{Files, StudyFile};
-use mops_core::{Catalogue, Diagnostic, Shipped, suggestion};
+use mops_core::{Catalogue, Diagnostic, Shipped, Source, suggestion};
 
 /// Which study, and what goes over it.
 #[derive(Args)]
@@ -36,7 +36,7 @@ struct Inside(Shipped);
 
 impl Files for Inside {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| std::io::ErrorKind::NotFound.into())
+        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
     fn show(&self, path: &str) -> String {
@@ -56,18 +56,28 @@ pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<
     }
     // A folder stands for the study in it.
     let path = if path.is_dir() { path.join("study.toml") } else { path.to_owned() };
-    let text = std::fs::read(&path).map_err(|error| no_study(catalogue, study, &error))?;
-    let text = String::from_utf8(text).map_err(|_| {
-        Diagnostic::new(format!("`{study}` is not a text in UTF-8")).with_help("a study is a TOML file; see `mops new`")
-    })?;
+    let bytes = std::fs::read(&path).map_err(|error| no_study(catalogue, study, &error))?;
+    let source = Source::from_bytes(&path.display().to_string(), bytes)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    mops_core::file::read(catalogue, &path.display().to_string(), &text, settings, &Folder(folder))
+    mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
 }
 
 fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagnostic {
+    let path = Path::new(study);
+    if path.is_dir() {
+        return Diagnostic::new(format!("the folder `{study}` has no study.toml"))
+            .with_help("name the study file; `mops new` writes one into a folder that is not there yet");
+    }
+    if error.kind() != ErrorKind::NotFound {
+        return Diagnostic::new(format!("`{study}` cannot be read: {error}")).with_help("check its permissions");
+    }
+    if path.extension().is_some() || path.components().count() > 1 {
+        return Diagnostic::new(format!("there is no file `{study}`"))
+            .with_help("`mops new` writes a study to start from; `mops list` names the shipped ones");
+    }
     let names = catalogue.studies.iter().map(|s| s.name);
-    Diagnostic::new(format!("no study `{study}`: {error}"))
-        .with_help(format!("give a study file, or a shipped study; {}", suggestion(study, names)))
+    Diagnostic::new(format!("there is no file `{study}`, nor a shipped study of that name"))
+        .with_help(suggestion(study, names))
 }
 
 /// Shows a mistake on standard error: file, line and column, the fact, the source line, the way out.
@@ -75,14 +85,17 @@ pub(super) fn show(diagnostic: &Diagnostic) {
     let mut shown = MietteDiagnostic::new(diagnostic.message.clone());
     shown.help.clone_from(&diagnostic.help);
     let report = match &diagnostic.place {
-        Some((source, span)) if !source.text.is_empty() => {
+        Some((source, span)) if !source.text.is_empty() && *span != (0..0) => {
             let label = diagnostic.label.clone().unwrap_or_else(|| "here".into());
             let (start, end) = (span.start.min(source.text.len()), span.end.min(source.text.len()));
             let (start, end) = (source.text.floor_char_boundary(start), source.text.floor_char_boundary(end));
             // A mistake spanning lines is pointed at by its first.
             let end = source.text[start..end].find('\n').map_or(end, |first| start + first);
             shown.labels = Some(vec![LabeledSpan::at(start..end, label)]);
-            Report::new(shown).with_source_code(NamedSource::new(&source.name, source.text.clone()))
+            // N.B.: the line and the column are ours, since miette counts columns in bytes.
+            let (line, column) = diagnostic.line_column().expect("it has a place");
+            let place = format!("{}:{line}:{column}", source.name);
+            Report::new(shown).with_source_code(NamedSource::new(place, source.text.clone()))
         }
         Some((source, _)) => {
             shown.message = format!("{}: {}", source.name, shown.message);
@@ -93,7 +106,7 @@ pub(super) fn show(diagnostic: &Diagnostic) {
     let stderr = std::io::stderr();
     let theme = if stderr.is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
     let mut text = String::new();
-    let handler = GraphicalReportHandler::new_themed(theme).with_width(110);
+    let handler = GraphicalReportHandler::new_themed(theme).without_primary_span_start().with_wrap_lines(false);
     if handler.render_report(&mut text, report.as_ref()).is_err() {
         text = diagnostic.to_string();
     }

@@ -3,21 +3,9 @@
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
 use mops_core::{CriterionReport, Outcome, Usage};
 
-/// A number with about six significant digits, short.
+/// A number to six significant digits.
 pub(super) fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return "-".into();
-    }
-    let size = value.abs();
-    if value == 0.0 || (1e-3..1e6).contains(&size) {
-        #[allow(clippy::cast_possible_truncation)]
-        let before = if size >= 1.0 { size.log10().floor() as i32 + 1 } else { 1 };
-        let digits = usize::try_from((6 - before).clamp(0, 6)).unwrap_or(0);
-        let text = format!("{value:.digits$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-    } else {
-        format!("{value:.4e}")
-    }
+    crate::report::significant(value, 6)
 }
 
 /// A table with a header, columns of numbers to the right.
@@ -130,18 +118,4 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         outcome.seconds
     );
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::number;
-
-    #[test]
-    fn numbers_have_six_digits_and_no_idle_zeros() {
-        for (value, text) in
-            [(0.0, "0"), (0.863_070_4, "0.86307"), (12.953_760_5, "12.9538"), (1.5e-7, "1.5000e-7"), (20.0, "20")]
-        {
-            assert_eq!(number(value), text);
-        }
-    }
 }

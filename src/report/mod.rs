@@ -27,9 +27,9 @@ use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop};
 
-pub use numbers::file_name;
+pub(crate) use numbers::{file_name, significant};
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
-pub use sampling::points;
+pub(crate) use sampling::points;
 
 /// Everything a report shows.
 pub struct Report<'a> {

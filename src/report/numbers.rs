@@ -6,7 +6,7 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// A number to so many significant digits, without trailing zeros.
-pub(super) fn significant(value: f64, digits: usize) -> String {
+pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();
     }
@@ -52,7 +52,7 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
 }
 
 /// A name that every file system takes: ASCII letters, digits, `_` and `.` stay, all else becomes one `-`.
-pub fn file_name(name: &str) -> String {
+pub(crate) fn file_name(name: &str) -> String {
     let mut safe = String::new();
     for c in name.chars() {
         if c.is_ascii_alphanumeric() || c == '_' || c == '.' {

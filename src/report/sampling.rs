@@ -8,7 +8,7 @@ const GRID: usize = 1500;
 const COLUMNS: f64 = 1000.0;
 
 /// Points of a trace to draw.
-pub fn points(trace: &Trace) -> Vec<(f64, f64)> {
+pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
     let (start, step) = (trace.start(), (trace.end() - trace.start()) / GRID as f64);
     let mut points = Vec::new();
     let mut next = 1;

@@ -68,12 +68,14 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
     let mut last_error = 1e-4_f64;
     let mut rejected = false;
     let mut events_here = 0;
+    let longest = dynamics.longest_step();
 
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {
             return Err(Failure::StepLimit(t));
         }
         let stop = dynamics.next_break(t).min(end);
+        h = h.min(longest);
         // A step that would leave a sliver before the stop is made to reach it.
         let reaches = t + 1.01 * h >= stop;
         if reaches {
@@ -266,6 +268,12 @@ fn first_event<S: Scalar, D: Dynamics<S>>(f: &D, step: &mut Step<D::State>, x: &
         for theta in [0.25, 0.5, 0.75, 1.0] {
             let here = value(theta);
             if here < 0.0 {
+                // A guard that begins at zero, such as the speed of a joint that just broke away, may rise and fall
+                // again between two looks: look closer before it counts as an event on the spot.
+                if before.1 <= 0.0 {
+                    let closer = (1..=40).map(|k| before.0 + (theta - before.0) * 0.5_f64.powi(k));
+                    before = closer.map(|theta| (theta, value(theta))).find(|(_, g)| *g > 0.0).unwrap_or(before);
+                }
                 let root = if before.1 <= 0.0 { before.0 } else { zero_between(before, (theta, here), &mut value) };
                 if first.is_none_or(|(_, earliest)| root < earliest) {
                     first = Some((index, root));

@@ -36,6 +36,14 @@ impl<'a> Drive<'a> {
         self.input.map_or(f64::INFINITY, |input| input.next_break(t))
     }
 
+    /// A sixteenth of the period of a sine, s; infinity for inputs that are straight between their breaks.
+    pub fn longest_step(&self) -> f64 {
+        match self.input {
+            Some(Input::Sine { frequency, .. }) => 1.0 / (16.0 * frequency.abs()),
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Takes the value and slope that hold from `t` on.
     pub fn pass_break(&mut self, t: f64) {
         let Some(input) = self.input else { return };

@@ -43,6 +43,11 @@ pub trait Dynamics<S: Scalar> {
         f64::INFINITY
     }
 
+    /// Longest step within which the inputs are well resolved, s: a state that rests says nothing of them.
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// A break was reached (also called once at the start): inputs take their new values.
     fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
 }

@@ -10,6 +10,7 @@ mod tests;
 use std::collections::HashSet;
 use std::fmt;
 use std::fs;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -92,8 +93,12 @@ impl DataFile {
             Ok(bytes) => Self::parse(&name, bytes),
             Err(error) => {
                 let source = Arc::new(Source { name, text: String::new() });
-                let fact = format!("the data file cannot be read: {error}");
-                Err(Diagnostic::new(fact).with_help("check its path and its permissions").at(&source, 0..0))
+                let (fact, way_out) = match error.kind() {
+                    ErrorKind::NotFound => ("there is no such file".to_owned(), "check the path"),
+                    ErrorKind::IsADirectory => ("this is a folder".to_owned(), "name a file in it"),
+                    _ => (format!("the file cannot be read: {error}"), "check its permissions"),
+                };
+                Err(Diagnostic::new(fact).with_help(way_out).at(&source, 0..0))
             }
         }
     }
@@ -103,17 +108,14 @@ impl DataFile {
     /// # Errors
     /// As [`Self::read`], but for the file itself.
     pub fn parse(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
-        let name = name.to_owned();
         let (format, read): (_, fn(&[u8]) -> _) = if mat5::recognises(&bytes) {
             (Format::Mat5, mat5::read)
         } else if mat4::recognises(&bytes) {
             (Format::Mat4, mat4::read)
         } else {
-            let source = text_source(name, bytes)?;
-            let (variables, skipped, layout) = csv::read(&source)?;
-            return Ok(Self { source, format: Format::Csv, variables, skipped, layout });
+            return Self::parse_text(name, bytes);
         };
-        let source = Arc::new(Source { name, text: String::new() });
+        let source = Arc::new(Source { name: name.to_owned(), text: String::new() });
         let (mut variables, skipped) = read(&bytes).map_err(|error| error.at(&source, 0..0))?.finish();
         keep_last_of_each_name(&mut variables);
         if variables.is_empty() {
@@ -124,6 +126,18 @@ impl DataFile {
                 .at(&source, 0..0));
         }
         Ok(Self { source, format, variables, skipped, layout: csv::Layout::default() })
+    }
+
+    fn parse_text(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
+        let source = text_source(name, bytes)?;
+        let read = csv::read(&source);
+        if read.is_err() && name.to_lowercase().ends_with(".mat") {
+            return Err(Diagnostic::new("the file is not MATLAB, in spite of its name")
+                .with_help("copy it again, or save it again with `save -v7`")
+                .at(&source, 0..0));
+        }
+        let (variables, skipped, layout) = read?;
+        Ok(Self { source, format: Format::Csv, variables, skipped, layout })
     }
 
     /// The column called `name`: a vector by its name, column k (from 1) of a matrix as `Data:3`, an element of a cell
@@ -178,7 +192,8 @@ impl DataFile {
         }
         let reason = self.skipped.iter().find_map(|entry| entry.strip_prefix(name)?.strip_prefix(": "));
         if let Some(reason) = reason {
-            return Diagnostic::new(format!("`{name}` of {file} is not a column of numbers: {reason}"));
+            return Diagnostic::new(format!("`{name}` of {file} is not a column of numbers: {reason}"))
+                .with_help(format!("columns of numbers: {}", self.column_names().join(", ")));
         }
         let names = self.column_names();
         Diagnostic::new(format!("no column `{name}` in {file}"))
@@ -194,35 +209,28 @@ fn keep_last_of_each_name(variables: &mut Vec<Variable>) {
     variables.reverse();
 }
 
-/// The file as text without its byte order mark, or why it is none.
-fn text_source(name: String, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
-    let source = |mut text: String| {
-        let mark = '\u{feff}';
-        if text.starts_with(mark) {
-            text.drain(..mark.len_utf8());
-        }
-        Arc::new(Source { name, text })
-    };
+/// The file as text, or why it is none.
+fn text_source(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
+    let whole = Arc::new(Source { name: name.to_owned(), text: String::new() });
     if matlab::is_level_7_3(&bytes) {
         return Err(Diagnostic::new("the file is MATLAB level 7.3 (HDF5), which is not read")
             .with_help("save it in MATLAB with `save -v7`")
-            .at(&source(String::new()), 0..0));
+            .at(&whole, 0..0));
     }
+    let binary = || {
+        Diagnostic::new("the file is neither CSV nor MATLAB level 4 or 5")
+            .with_help("save it as CSV, or in MATLAB with `save -v7`")
+            .at(&whole, 0..0)
+    };
     let utf16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
     if !utf16 && bytes.contains(&0) {
-        return Err(Diagnostic::new("the file is neither CSV nor MATLAB level 4 or 5")
-            .with_help("save it as CSV, or in MATLAB with `save -v7`")
-            .at(&source(String::new()), 0..0));
+        return Err(binary());
     }
-    let error = match String::from_utf8(bytes) {
-        Ok(text) => return Ok(source(text)),
-        Err(error) => error,
-    };
-    let unreadable = String::from_utf8_lossy(&error.as_bytes()[error.utf8_error().valid_up_to()..]);
-    let lossy = source(String::from_utf8_lossy(error.as_bytes()).into_owned());
-    let start = lossy.text.len() - unreadable.len();
-    Err(Diagnostic::new("the file is not UTF-8")
-        .with_label("from here on")
-        .with_help(if utf16 { "it looks like UTF-16: save it as UTF-8" } else { "save it as UTF-8" })
-        .at(&lossy, start..start + char::REPLACEMENT_CHARACTER.len_utf8()))
+    // A text in another encoding has letters that are not UTF-8, but no control characters.
+    let controls = bytes.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
+    match Source::from_bytes(name, bytes) {
+        Ok(source) => Ok(Arc::new(source)),
+        Err(_) if !utf16 && controls => Err(binary()),
+        Err(mistake) => Err(mistake),
+    }
 }

@@ -143,7 +143,7 @@ mod csv {
             ("data:1:7: the file is not UTF-8; save it as UTF-8", "\u{fffd}")
         );
         let (message, _) = error(b"\xff\xfet\0,\0y\0\n\0");
-        assert_eq!(message, "data:1:1: the file is not UTF-8; it looks like UTF-16: save it as UTF-8");
+        assert_eq!(message, "data: the file is UTF-16, not UTF-8; save it as UTF-8");
     }
 }
 
@@ -162,7 +162,7 @@ mod files {
     #[test]
     fn missing_file_is_told_by_its_path() {
         let error = DataFile::read(Path::new("no/such/file.csv")).unwrap_err().to_string();
-        assert!(error.starts_with("no/such/file.csv: the data file cannot be read: "), "{error}");
+        assert_eq!(error, "no/such/file.csv: there is no such file; check the path");
     }
 
     #[test]
@@ -182,6 +182,15 @@ mod files {
             "data: the file is neither CSV nor MATLAB level 4 or 5; save it as CSV, or in MATLAB with `save -v7`";
         assert_eq!(error(b"PK\x03\x04\x14\0\x06\0\x08\0\0\0!\0").0, message);
         assert_eq!(error([0; 10]).0, message);
+        assert_eq!(error(b"\x8a\x01\xff\x1b[31m").0, message);
+    }
+
+    #[test]
+    fn text_that_is_called_as_a_matlab_file_is_read_if_it_can_be() {
+        assert_eq!(DataFile::parse("run.mat", b"t,y\n0,1\n".to_vec()).unwrap().format, Format::Csv);
+        let error = DataFile::parse("run.mat", b"404: not found".to_vec()).unwrap_err().to_string();
+        let way_out = "copy it again, or save it again with `save -v7`";
+        assert_eq!(error, format!("run.mat: the file is not MATLAB, in spite of its name; {way_out}"));
     }
 }
 

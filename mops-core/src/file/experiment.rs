@@ -1,11 +1,12 @@
 //! Experiments of a study file: from the columns of a data file to channels and inputs.
 
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::sections::{ChannelTable, ExperimentSection, InputTable};
 use super::tree::Node;
-use super::{Files, read_seconds, read_unit};
+use super::{Files, UNIT_HELP, at_key, read_seconds, read_unit};
 use crate::data::{Column, DataFile};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::experiment::Input;
@@ -50,9 +51,11 @@ fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
 
 fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diagnostic> {
     let bytes = files.read(path).map_err(|error| {
+        let shown = files.show(path);
         let why = match error.kind() {
-            std::io::ErrorKind::NotFound => format!("no data file `{}`", files.show(path)),
-            _ => format!("the data file `{}` cannot be read: {error}", files.show(path)),
+            ErrorKind::NotFound => format!("no data file `{shown}`"),
+            ErrorKind::IsADirectory => format!("`{shown}` is a folder, not a data file"),
+            _ => format!("the data file `{shown}` cannot be read: {error}"),
         };
         let place = node.child("file").expect("it was just read");
         place.diagnostic(why).with_help("paths count from the folder of the study file")
@@ -85,26 +88,35 @@ impl<'f> Table<'f> {
         let column = column_at(&place, file, &time)?;
         let unit = match (&section.time_unit, column.unit) {
             (Some(unit), _) => read_unit(node, "time-unit", unit)?,
-            (None, Some(unit)) => read_unit(node, "time", unit)?,
+            (None, Some(unit)) => unit_of_header(&place, file, &time, unit, "time-unit")?,
             (None, None) => Unit::known("s"),
         };
         let factor = unit.factor_to(&Unit::known("s")).ok_or_else(|| {
+            let place = node.child("time-unit").unwrap_or(place);
             place
-                .diagnostic(format!("the time column is in `{unit}`, which is not a time"))
-                .with_help("give `time-unit`")
+                .diagnostic(format!("the time column `{time}` is in `{unit}`, which is no unit of time"))
+                .with_help("say which it is: time-unit = \"s\"")
         })?;
         let times: Vec<f64> = column.values.iter().map(|t| t * factor).collect();
-        check_times(file, &time, &times)?;
+        let skip = section.skip.min(times.len());
+        check_times(file, &time, &times, skip)?;
 
-        let from = read_seconds(node, "from", section.from.as_ref())?.unwrap_or(f64::NEG_INFINITY);
-        let to = read_seconds(node, "to", section.to.as_ref())?.unwrap_or(f64::INFINITY);
-        let first = times.partition_point(|&t| t < from).max(section.skip);
-        let last = times.partition_point(|&t| t <= to);
+        let from = read_seconds(node, "from", section.from.as_ref())?;
+        let to = read_seconds(node, "to", section.to.as_ref())?;
+        let first = from.map_or(0, |from| times[skip..].partition_point(|&t| t < from)) + skip;
+        let last = to.map_or(times.len(), |to| times[skip..].partition_point(|&t| t <= to) + skip);
         if first + 2 > last {
-            let seen = format!("the file runs from {} to {} s", times[0], times[times.len() - 1]);
-            return Err(node
-                .key_diagnostic(format!("{} samples are left of the file", last.saturating_sub(first)))
-                .with_help(format!("{seen}; widen `from`, `to` and `skip`")));
+            let few = |rows: usize| rows < 2;
+            let key = match (few(times.len() - skip), few(times.len() - first)) {
+                (true, _) if skip > 0 => "skip",
+                (_, true) if from.is_some() => "from",
+                _ if to.is_some() => "to",
+                _ => "file",
+            };
+            let left = if first + 1 == last { "one sample is left" } else { "no sample is left" };
+            let all = format!("{} samples, from {} to {} s", times.len(), times[0], times[times.len() - 1]);
+            return Err(at_key(node, key, format!("{left} of `{}`, and two are needed", file.source.name))
+                .with_help(format!("the file has {all}")));
         }
         let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
         let times = times[first..last].iter().map(|t| t - origin).collect();
@@ -127,10 +139,10 @@ impl<'f> Table<'f> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
         if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
+            let fact = format!("the input column `{}` has a gap at {} s", table.column, self.times[gap]);
             return Err(self
-                .at(&table.column, self.rows.start + gap)
-                .unwrap_or_else(|| place.diagnostic(String::new()))
-                .with_message(format!("input column `{}` has a gap at {} s", table.column, self.times[gap]))
+                .at(&table.column, self.rows.start + gap, &fact)
+                .unwrap_or_else(|| place.diagnostic(fact))
                 .with_help("an input must be known throughout: fill the gap, or cut it off with `from` and `to`"));
         }
         Ok((Input::Sampled { times: self.times.clone(), values, hold: table.hold }, unit))
@@ -148,38 +160,34 @@ impl<'f> Table<'f> {
         let column = column_at(&at, self.file, name)?;
         let time_rows = self.file.column(&self.time)?.values.len();
         if column.values.len() != time_rows {
-            return Err(at.diagnostic(format!(
-                "`{name}` has {} rows, the time `{}` has {time_rows}",
-                column.values.len(),
-                self.time
-            )));
+            return Err(at
+                .diagnostic(format!(
+                    "`{name}` has {} samples, the time `{}` has {time_rows}",
+                    column.values.len(),
+                    self.time
+                ))
+                .with_help("say which column is its time with `time`, in an experiment of its own if need be"));
         }
         let unit = match (unit, column.unit) {
             (Some(unit), _) => Some(read_unit(place, "unit", unit)?),
-            (None, Some(unit)) => Some(read_unit(place, "column", unit)?),
+            (None, Some(unit)) => Some(unit_of_header(&at, self.file, name, unit, "unit")?),
             (None, None) => None,
         };
         let scale = scale.unwrap_or(1.0);
         let offset = match (offset, &unit) {
             (None, _) => 0.0,
-            (Some(q), Some(unit)) => {
-                q.to(unit).map_err(|e| place.child("offset").unwrap_or_else(|| place.clone()).diagnostic(e))?
-            }
+            (Some(q), Some(unit)) => q.to(unit).map_err(|why| {
+                at_key(place, "offset", why).with_help(format!("a number without a unit counts in `{unit}`"))
+            })?,
             (Some(q), None) => q.number,
         };
         Ok((column.values[self.rows.clone()].iter().map(|v| scale * v + offset).collect(), unit))
     }
 
-    fn at(&self, column: &str, row: usize) -> Option<Diagnostic> {
+    /// A mistake in a cell of a CSV file.
+    fn at(&self, column: &str, row: usize, fact: &str) -> Option<Diagnostic> {
         let span = self.file.span_of(column, row);
-        (!span.is_empty()).then(|| Diagnostic::new("").at(&self.file.source, span))
-    }
-}
-
-impl Diagnostic {
-    fn with_message(mut self, message: String) -> Self {
-        self.message = message;
-        self
+        (span != (0..0)).then(|| Diagnostic::new(fact).at(&self.file.source, span))
     }
 }
 
@@ -196,23 +204,38 @@ fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Col
     })
 }
 
-fn check_times(file: &DataFile, column: &str, times: &[f64]) -> Result<(), Diagnostic> {
-    let wrong = |row: usize, message: String| {
+/// The unit that the header of the file gives a column; `key` says it in the study.
+fn unit_of_header(place: &Node<'_>, file: &DataFile, column: &str, unit: &str, key: &str) -> Result<Unit, Diagnostic> {
+    Unit::parse(unit).map_err(|_| {
+        let name = &file.source.name;
+        place
+            .diagnostic(format!("the header of {name} gives `{column}` the unit `{unit}`, which is not known"))
+            .with_help(format!("say here which it is, as in {key} = \"...\"; {UNIT_HELP}"))
+    })
+}
+
+/// Times from row `skip` on must be there and increase.
+fn check_times(file: &DataFile, column: &str, times: &[f64], skip: usize) -> Result<(), Diagnostic> {
+    let wrong = |row: usize, message: String, way_out: &str| {
         let source: &Arc<Source> = &file.source;
-        Diagnostic::new(message)
-            .with_help(
-                "each row must be later than the one before; cut the file with `from`, `to` or `skip`, or sort it",
-            )
-            .at(source, file.span_of(column, row))
+        Err(Diagnostic::new(message).with_help(way_out).at(source, file.span_of(column, row)))
     };
-    if let Some(row) = times.iter().position(|t| !t.is_finite()) {
-        return Err(wrong(row, format!("the time `{column}` has a gap in row {}", row + 1)));
+    let used = &times[skip..];
+    if let Some(row) = used.iter().position(|t| !t.is_finite()) {
+        let fact = format!("sample {} has no time: `{column}` has a gap there", skip + row + 1);
+        return wrong(skip + row, fact, "delete the row; wrong ones at the start are dropped with `skip`");
     }
-    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
-        Some(row) => Err(wrong(
-            row + 1,
-            format!("time does not increase: {} s follows {} s in row {}", times[row + 1], times[row], row + 2),
-        )),
+    match used.windows(2).position(|pair| pair[1] <= pair[0]) {
+        Some(row) => wrong(
+            skip + row + 1,
+            format!(
+                "the time `{column}` does not increase: sample {} at {} s follows one at {} s",
+                skip + row + 2,
+                used[row + 1],
+                used[row]
+            ),
+            "sort the rows, and delete what is there twice; wrong ones at the start are dropped with `skip`",
+        ),
         None => Ok(()),
     }
 }

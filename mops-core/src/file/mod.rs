@@ -4,6 +4,8 @@
 mod experiment;
 mod schema;
 mod sections;
+mod shape;
+mod syntax;
 mod tree;
 
 use std::io;
@@ -14,6 +16,7 @@ pub use schema::{describe, schema_of, study_schema};
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::criterion::Usage;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
+use crate::expression::Expression;
 use crate::study::{CaseDraft, CriterionDraft, Draft, ModelDraft, Study, TunerDraft};
 use crate::unit::{Quantity, Unit};
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
@@ -55,6 +58,10 @@ pub fn read(
     files: &dyn Files,
 ) -> Result<StudyFile, Diagnostic> {
     let text = Text::new(name, text, settings);
+    read_text(catalogue, &text, files).map_err(|mistake| text.settle(mistake))
+}
+
+fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
     root.check_keys(&["study", "models", "tuners", "cases", "experiments", "criteria", "solver"])?;
     let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
@@ -77,7 +84,9 @@ pub fn read(
     }
     for (name, node) in root.table("experiments")? {
         if draft.cases.iter().any(|case| case.name == name) {
-            return Err(node.key_diagnostic(format!("a case and an experiment are both called `{name}`")));
+            return Err(node
+                .key_diagnostic(format!("a case and an experiment are both called `{name}`"))
+                .with_help("rename one of them: results are listed by these names"));
         }
         draft.cases.push(experiment::read(name, &node, files)?);
     }
@@ -131,6 +140,11 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diag
 
 fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
     let section: TunerSection = node.read()?;
+    if let (Some(place), Some(tie)) = (node.child("tie"), &section.tie) {
+        Expression::parse(tie).map_err(|wrong| {
+            place.diagnostic_within(wrong.span, wrong.message).with_help("as in tie = \"2*Ti + 0.1\"")
+        })?;
+    }
     Ok(TunerDraft {
         unit: section.unit.as_deref().map(|unit| read_unit(node, "unit", unit)).transpose()?,
         start: section.start,
@@ -145,18 +159,24 @@ fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
     })
 }
 
+/// Which units there are.
+const UNIT_HELP: &str =
+    "units are s, ms, min, Hz, m, kg, rad, deg, N, V, A and the like, and products such as \"kg m2\" or \"N m s/rad\"";
+
 fn read_unit(node: &Node<'_>, key: &str, text: &str) -> Result<Unit, Diagnostic> {
-    Unit::parse(text).map_err(|why| {
-        node.child(key).map_or_else(|| node.diagnostic(why.clone()), |n| n.diagnostic(why.clone())).with_help(
-            "units are products of powers, such as \"kg m2\" or \"N m s/rad\"; write angles in rad or deg, times in s",
-        )
-    })
+    Unit::parse(text).map_err(|why| at_key(node, key, why).with_help(UNIT_HELP))
+}
+
+/// A mistake in the value under a key, or in the value itself where there is no such key.
+fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
+    node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
 
 fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
+    let entries = node.entries()?;
     let options: CaseOptions = node.only(CaseOptions::KEYS).read()?;
     let mut parameters = Vec::new();
-    for (key, value) in node.entries()? {
+    for (key, value) in entries {
         if !CaseOptions::KEYS.contains(&key.as_str()) {
             parameters.push((key, value.read::<Quantity>()?));
         }
@@ -169,11 +189,7 @@ fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
     let second = Unit::known("s");
     quantity
-        .map(|q| {
-            q.to(&second).map_err(|why| {
-                node.child(key).map_or_else(|| node.diagnostic(why.clone()), |n| n.diagnostic(why.clone()))
-            })
-        })
+        .map(|q| q.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit counts in s")))
         .transpose()
 }
 
@@ -218,7 +234,9 @@ fn read_solver(catalogue: &Catalogue, root: &Node<'_>) -> Result<(SolverChoice, 
     let common: SolverCommon = node.only(SolverCommon::KEYS).read()?;
     if common.max_evaluations == Some(0) {
         let place = node.child("max-evaluations").expect("it was read");
-        return Err(place.diagnostic("a run needs at least one evaluation".to_owned()));
+        return Err(place
+            .diagnostic("a run needs at least one evaluation".to_owned())
+            .with_help("leave `max-evaluations` out for its default"));
     }
     if node.entries()?.iter().all(|(key, _)| SolverCommon::KEYS.contains(&key.as_str())) {
         return Ok((default(), common.max_evaluations));

@@ -111,10 +111,9 @@ pub(super) fn keys_of(schema: &Value) -> Option<Keys<'_>> {
     (closed || !known.is_empty()).then_some(Keys::Known(known))
 }
 
-/// The documentation of a key, on one line.
+/// The documentation of a key, as the end of a sentence.
 pub(super) fn documentation(schema: &Value, key: &str) -> Option<String> {
-    let text = keys_of(schema)?.get(key)?.get("description")?.as_str()?.replace('\n', " ");
-    Some(text.trim_end_matches('.').to_owned())
+    keys_of(schema)?.get(key)?.get("description")?.as_str().map(super::shape::on_one_line)
 }
 
 /// A kind's page in the manual, from its schema: what it is, then its options.

@@ -6,34 +6,41 @@ use std::sync::Arc;
 
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
+use serde_json::json;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-use super::schema::{documentation, keys_of, schema_of};
+use super::schema::{documentation, schema_of};
+use super::{UNIT_HELP, shape, syntax};
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::study::Mistake;
+use crate::unit::Quantity;
 
 /// A study's text, with every setting of the command line as a line of its own at the end, so that mistakes in
 /// settings have a position too. `parts` are what is parsed: each padded so that positions are those in the whole text.
 pub(super) struct Text {
     source: Arc<Source>,
     parts: Vec<String>,
+    /// Where the settings stand in the whole text.
+    settings: Vec<Range<usize>>,
 }
 
 impl Text {
     pub fn new(name: &str, text: &str, settings: &[String]) -> Self {
         let mut all = text.to_owned();
         let mut parts = vec![text.to_owned()];
+        let mut places = Vec::new();
         for setting in settings {
             if !all.ends_with('\n') {
                 all.push('\n');
             }
             all.push_str("# --set ");
             parts.push(" ".repeat(all.len()) + setting);
+            places.push(all.len()..all.len() + setting.len());
             all.push_str(setting);
             all.push('\n');
         }
-        Self { source: Arc::new(Source { name: name.to_owned(), text: all }), parts }
+        Self { source: Arc::new(Source { name: name.to_owned(), text: all }), parts, settings: places }
     }
 
     pub fn source(&self) -> &Arc<Source> {
@@ -52,16 +59,24 @@ impl Text {
     }
 
     fn syntax_error(&self, part: &str, error: &toml::de::Error) -> Diagnostic {
-        let mut lines = error.message().lines();
-        let message = lines.next().unwrap_or("this is not TOML").to_owned();
-        let rest: Vec<&str> = lines.collect();
-        let help = match rest.join("; ") {
-            help if help.is_empty() => {
-                "correct the TOML at the place shown; texts need quotes, as in unit = \"s\"".to_owned()
-            }
-            help => help,
+        let (diagnostic, place) = syntax::explain(part, error);
+        diagnostic.at(&self.source, place)
+    }
+
+    /// A mistake in a setting of the command line, with its place there.
+    pub fn settle(&self, diagnostic: Diagnostic) -> Diagnostic {
+        let Some((_, span)) = diagnostic.place.as_ref().filter(|(source, _)| Arc::ptr_eq(source, &self.source)) else {
+            return diagnostic;
         };
-        Diagnostic::new(message).with_help(help).at(&self.source, error.span().unwrap_or(0..part.len()))
+        let within = |setting: &&Range<usize>| setting.start <= span.start && span.end <= setting.end;
+        let Some(setting) = self.settings.iter().find(within) else { return diagnostic };
+        let text = self.source.text[setting.clone()].to_owned() + "\n";
+        let span = span.start - setting.start..span.end - setting.start;
+        let help = diagnostic.help.as_ref().map(|help| match help.contains('"') {
+            true => format!("{help}; a shell takes quotes away, unless single ones stand around the setting"),
+            false => help.clone(),
+        });
+        Diagnostic { help, ..diagnostic.at(&Arc::new(Source { name: "--set".to_owned(), text }), span) }
     }
 }
 
@@ -98,11 +113,33 @@ impl<'t> Node<'t> {
         Diagnostic::new(message).at(self.source, self.key.clone())
     }
 
+    /// A mistake in the text that the value is: `within` are bytes of it.
+    pub fn diagnostic_within(&self, within: Range<usize>, message: String) -> Diagnostic {
+        let span = self.value.span();
+        let quoted = self.source.text.get(span.start + 1..span.end.saturating_sub(1));
+        match self.value.get_ref().as_str() {
+            // Without escapes, what is read is what is written.
+            text if text == quoted => {
+                Diagnostic::new(message).at(self.source, span.start + 1 + within.start..span.start + 1 + within.end)
+            }
+            _ => self.diagnostic(message),
+        }
+    }
+
+    pub fn value(&self) -> &DeValue<'t> {
+        self.value.get_ref()
+    }
+
+    /// The key as it is written, without quotes.
+    pub fn key_text(&self) -> String {
+        self.source.text[self.key.clone()].trim_matches(['"', '\'']).to_owned()
+    }
+
     fn as_table(&self) -> Result<&DeTable<'t>, Diagnostic> {
-        self.value.get_ref().as_table().ok_or_else(|| {
-            self.diagnostic(format!("a {} stands where a table is expected", self.value.get_ref().type_str()))
-                .with_help("write a table: name = { key = value }, or [name] followed by its keys")
-        })
+        match self.value.get_ref().as_table() {
+            Some(table) => Ok(table),
+            None => Err(shape::check(self, &json!({ "type": "object" })).expect_err("it is no table")),
+        }
     }
 
     fn below(&self, key: &Spanned<Cow<'t, str>>, value: &Spanned<DeValue<'t>>) -> Self {
@@ -119,6 +156,12 @@ impl<'t> Node<'t> {
     pub fn child(&self, key: &str) -> Option<Self> {
         let table = self.value.get_ref().as_table()?;
         table.iter().find(|(k, _)| k.get_ref() == key).map(|(k, v)| self.below(k, v))
+    }
+
+    /// The elements of a list.
+    pub fn elements(&self) -> Vec<Self> {
+        let elements = self.value.get_ref().as_array().into_iter().flat_map(|array| array.iter());
+        elements.map(|e| Node { source: self.source, key: e.span(), value: Cow::Owned(e.clone()) }).collect()
     }
 
     /// The value under a key that must be there.
@@ -142,7 +185,7 @@ impl<'t> Node<'t> {
         Ok(())
     }
 
-    fn unknown_key(&self, key: &str, known: &[&str]) -> Diagnostic {
+    pub fn unknown_key(&self, key: &str, known: &[&str]) -> Diagnostic {
         self.key_diagnostic(format!("unknown key `{key}`")).with_help(suggestion(key, known.iter().copied()))
     }
 
@@ -166,48 +209,27 @@ impl<'t> Node<'t> {
         schema: &Schema,
         reader: impl FnOnce(ValueDeserializer<'t>) -> Result<T, toml::de::Error>,
     ) -> Result<T, Diagnostic> {
-        self.check_against(schema.as_value())?;
+        shape::check(self, schema.as_value())?;
         reader(ValueDeserializer::from(self.value.as_ref().clone())).map_err(|error| self.type_error(schema, &error))
     }
 
-    /// Refuses unknown keys at any depth.
-    fn check_against(&self, schema: &serde_json::Value) -> Result<(), Diagnostic> {
-        let Some(known) = keys_of(schema) else { return Ok(()) };
-        if let Ok(entries) = self.entries() {
-            for (key, node) in entries {
-                match known.get(&key) {
-                    Some(below) => node.check_against(below)?,
-                    None => {
-                        let names: Vec<&str> = known.names();
-                        return Err(node.unknown_key(&key, &names));
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
+    /// What a reader refuses although its shape is right, such as a quantity with an unknown unit.
     fn type_error(&self, schema: &Schema, error: &toml::de::Error) -> Diagnostic {
         let span = error.span().unwrap_or_else(|| self.value.span());
-        let message = error.message().trim_end().replace("invalid type: ", "wrong type: ").replace('\n', "; ");
-        // serde names the missing key between back-quotes.
-        let named = message.split('`').nth(1).unwrap_or_default();
-        let help = if message.starts_with("unknown variant") {
-            let known: Vec<&str> = message.split('`').skip(3).step_by(2).collect();
-            suggestion(named, known.iter().copied())
-        } else if message.starts_with("missing field") {
-            format!(
-                "add `{named}`: {}",
-                documentation(schema.as_value(), named).unwrap_or_else(|| "it has no default".into())
-            )
-        } else {
-            let key = self.key_around(&span).and_then(|key| documentation(schema.as_value(), &key).map(|d| (key, d)));
-            match key {
-                Some((key, about)) => format!("`{key}` is: {about}"),
-                None => "`mops describe` tells what each key takes".to_owned(),
-            }
+        let message = error.message().trim_end().replace('\n', "; ");
+        let message = match message.split_once(", expected ") {
+            Some((_, expected)) => format!("{} stands where {expected} is expected", &self.source.text[span.clone()]),
+            None => message,
         };
-        let span = if message.starts_with("missing field") && !self.key.is_empty() { self.key.clone() } else { span };
+        let key = self.key_around(&span).and_then(|key| documentation(schema.as_value(), &key).map(|d| (key, d)));
+        let written = self.source.text[span.clone()].trim_matches(['"', '\'']);
+        let is_unit = written.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
+            && Quantity::parse(written).is_err_and(|why| why == message);
+        let help = match key {
+            _ if is_unit => UNIT_HELP.to_owned(),
+            Some((key, about)) => format!("`{key}`: {about}"),
+            None => "`mops describe` tells what each key takes".to_owned(),
+        };
         Diagnostic::new(message).with_help(help).at(self.source, span)
     }
 
@@ -221,34 +243,24 @@ impl<'t> Node<'t> {
     /// A mistake with its position: the value under its last key, or the last key that is there.
     pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
         let mut node = self.clone();
-        let mut whole = true;
         for key in &mistake.path {
-            match node.child(key) {
+            // `free = ["phi"]` names its entries as elements; the options of a kind stand in the table of its name.
+            let element = || node.elements().into_iter().find(|e| e.value().as_str() == Some(key));
+            let option = || node.entries().ok()?.into_iter().find_map(|(_, kind)| kind.child(key));
+            match node.child(key).or_else(element).or_else(option) {
                 Some(below) => node = below,
-                None => {
-                    // `free = ["phi"]` names its entries as elements.
-                    if let Some(element) = node.element(key) {
-                        node = element;
-                    } else {
-                        whole = false;
-                    }
-                    break;
-                }
+                None => break,
             }
         }
-        let is_table = node.value.get_ref().is_table();
-        let diagnostic = if (is_table || !whole) && !node.key.is_empty() {
-            node.key_diagnostic(mistake.message.clone())
-        } else if node.key.is_empty() && node.value.span().len() == self.source.text.len() {
+        // A message that ends with the key is about this name, not about the value under it.
+        let names_key = mistake.path.last().is_some_and(|key| mistake.message.ends_with(&format!("`{key}`")));
+        let diagnostic = if node.key.is_empty() {
             Diagnostic::new(mistake.message.clone()).at(self.source, 0..0)
+        } else if node.value().is_table() || names_key {
+            node.key_diagnostic(mistake.message.clone())
         } else {
             node.diagnostic(mistake.message.clone())
         };
         Diagnostic { help: mistake.help.clone(), ..diagnostic }
-    }
-
-    fn element(&self, text: &str) -> Option<Self> {
-        let found = self.value.get_ref().as_array()?.iter().find(|e| e.get_ref().as_str() == Some(text))?;
-        Some(Node { source: self.source, key: found.span(), value: Cow::Owned(found.clone()) })
     }
 }

@@ -22,13 +22,12 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     }
     let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
     let mut fixed = Vec::new();
-    for (name, model) in draft.models {
-        let model_draft = model;
-        models.push((name.clone(), Arc::from(model_draft.model)));
-        fixed.push(
-            fixed_values(&model_draft.parameters, &models.last().expect("just pushed").1.interface().parameters)
-                .map_err(|m| m.within("parameters").within(&name).within("models"))?,
-        );
+    for (name, draft) in draft.models {
+        let Interface { parameters, horizon, .. } = draft.model.interface();
+        let within = |mistake: Mistake| mistake.within(&name).within("models");
+        check_horizon(*horizon).map_err(within)?;
+        fixed.push(fixed_values(&draft.parameters, parameters).map_err(|m| within(m.within("parameters")))?);
+        models.push((name, Arc::from(draft.model)));
     }
     let mut warnings = Vec::new();
     let drafts = if draft.cases.is_empty() {
@@ -41,12 +40,12 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         .map(|case| build_case(case, &models, &mut warnings).map_err(|m| m.within(&case.name).within(section(case))))
         .collect::<Result<_, _>>()?;
 
+    check_use(&draft.tuners, &models)?;
     let mut tuners = Vec::new();
     for (name, tuner) in &draft.tuners {
         build_tuner(name, tuner, &models, &cases, &mut tuners).map_err(|m| m.within(name).within("tuners"))?;
     }
     tie_tuners(&draft.tuners, &mut tuners)?;
-    check_use(&tuners, &models)?;
     for (index, (case, case_draft)) in cases.iter().zip(&drafts).enumerate() {
         for free in case_draft.measured.iter().flat_map(|m| &m.free) {
             let tuner = free_start(free, index, case, &models)
@@ -77,7 +76,12 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         ));
     }
     for (name, criterion) in draft.criteria {
-        add_rows(&mut study, &fixed, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
+        add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
+    }
+    for index in 0..study.jobs.len() {
+        let JobPlan { model, case, .. } = study.jobs[index];
+        complete(&mut study, index, &fixed[model])
+            .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     Ok(study)
@@ -99,6 +103,16 @@ fn signal_names(signals: &[Variable]) -> impl Iterator<Item = &str> + Clone {
     signals.iter().map(|s| s.name.as_str())
 }
 
+fn check_horizon(end: Option<f64>) -> Result<(), Mistake> {
+    match end {
+        Some(end) if !(end.is_finite() && end > 0.0) => {
+            Err(Mistake::new("horizon", format!("a simulation must end after its start, not at {end} s"))
+                .with_help("it starts at 0 s; give the time of its end, such as \"60 s\""))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Values of a model's parameters that the study fixes, in the parameters' units.
 fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) -> Result<Vec<(String, f64)>, Mistake> {
     given
@@ -113,27 +127,61 @@ fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) -> Result<Vec
         .collect()
 }
 
+/// The value of a parameter, in its unit.
 fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64, Mistake> {
-    let value = quantity.to(&parameter.variable.unit).map_err(Mistake::here)?;
-    let [low, high] = parameter.range;
-    if !(low..=high).contains(&value) {
-        return Err(Mistake::here(format!(
-            "{value} is outside the meaningful range of `{}`, {low} to {high} {}",
-            parameter.variable.name, parameter.variable.unit
-        )));
-    }
+    let value = converted(quantity, &parameter.variable.unit)?;
+    check_range(value, parameter)?;
     Ok(value)
+}
+
+fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mistake> {
+    let [low, high] = parameter.range;
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    let Variable { name, unit, about } = &parameter.variable;
+    let wanted = if high < f64::INFINITY {
+        format!("lie between {low} and {}", amount(high, unit))
+    } else if low == 0.0 {
+        "not be negative".to_owned()
+    } else if low == f64::MIN_POSITIVE {
+        "be positive".to_owned()
+    } else if low > f64::NEG_INFINITY {
+        format!("be at least {}", amount(low, unit))
+    } else {
+        "be a number".to_owned()
+    };
+    Err(Mistake::here(format!("`{name}` must {wanted}, not {}", amount(value, unit)))
+        .with_help(format!("`{name}` is: {about}")))
+}
+
+/// A number with its unit.
+fn amount(value: f64, unit: &Unit) -> String {
+    format!("{value} {unit}").trim_end_matches(" 1").to_owned()
+}
+
+/// The number in `unit`.
+fn converted(quantity: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
+    quantity.to(unit).map_err(|why| {
+        let unit = unit.to_string();
+        Mistake::here(why).with_help(match unit.as_str() {
+            "1" => "write a pure number".to_owned(),
+            _ => format!("a number without a unit counts in `{unit}`"),
+        })
+    })
 }
 
 fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {
     let mut parameters = Vec::new();
     for (name, quantity) in &draft.parameters {
+        // In a file, an experiment has a table of them.
+        let within = |mistake: Mistake| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
         let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
         let parameter = known.iter().find(|p| p.variable.name == *name).ok_or_else(|| {
-            Mistake::new(name, format!("no model has a parameter `{name}`"))
+            within(Mistake::new(name, format!("no model has a parameter `{name}`")))
                 .with_help(suggestion(name, known.iter().map(|p| p.variable.name.as_str())))
         })?;
-        parameters.push((name.clone(), in_range(quantity, parameter).map_err(|m| m.within(name))?));
+        parameters.push((name.clone(), in_range(quantity, parameter).map_err(|m| within(m.within(name)))?));
     }
     let inputs = draft.inputs.iter().map(|input| build_input(input, models)).collect::<Result<_, _>>()?;
     let experiment = match &draft.measured {
@@ -141,9 +189,7 @@ fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) ->
         None => None,
     };
     let horizon = draft.horizon.or_else(|| experiment.as_ref().map(Experiment::end));
-    if let Some(end) = horizon.filter(|end| !(end.is_finite() && *end > 0.0)) {
-        return Err(Mistake::new("horizon", format!("a simulation must end after its start, not at {end} s")));
-    }
+    check_horizon(draft.horizon)?;
     Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon })
 }
 
@@ -160,7 +206,8 @@ fn build_input(
     let mut input = input.clone();
     if let Some(unit) = unit {
         let factor = unit.factor_to(&variable.unit).ok_or_else(|| {
-            Mistake::new(name, format!("input `{name}` is given in `{unit}`, the model takes `{}`", variable.unit))
+            Mistake::new(name, format!("the input `{name}` is given in `{unit}`, the model takes `{}`", variable.unit))
+                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
                 .within("inputs")
         })?;
         match &mut input {
@@ -207,16 +254,17 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     let factor = match &draft.unit {
         None => 1.0,
         Some(unit) => unit.factor_to(to).ok_or_else(|| {
-            Mistake::new("column", format!("the column is in `{unit}`, the signal in `{to}`"))
-                .with_help("correct the unit in the header of the file, or say `unit` here")
+            Mistake::new("column", format!("the column is in `{unit}`, the signal `{}` in `{to}`", draft.signal))
+                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
         })?,
     };
     let noise = match &draft.noise {
         None => None,
         Some(noise) => {
-            let value = noise.to(to).map_err(|e| Mistake::new("noise", e))?;
+            let value = converted(noise, to).map_err(|m| m.within("noise"))?;
             if !(value.is_finite() && value > 0.0) {
-                return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}")));
+                return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}"))
+                    .with_help("leave `noise` out where it is not known; `mops data` estimates it"));
             }
             Some(value)
         }
@@ -224,8 +272,9 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
     let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, value * factor)).unzip();
     if times.len() < 2 {
-        return Err(Mistake::new("column", format!("the column holds {} usable samples", times.len()))
-            .with_help("check `from`, `to` and the gaps in the file"));
+        let count = if times.is_empty() { "no sample" } else { "one sample" };
+        return Err(Mistake::new("column", format!("{count} of the column is left, and two are needed"))
+            .with_help("the others are gaps, or cut off by `from`, `to` and `skip`"));
     }
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
 }
@@ -261,7 +310,8 @@ fn build_tuner(
             return Err(Mistake::new(
                 "unit",
                 format!("`{name}` is in `{}` in the model, not in `{unit}`", p.variable.unit),
-            ));
+            )
+            .with_help("give a unit that converts to it, or leave `unit` out"));
         }
         (Some(unit), _) => unit.clone(),
         (None, Some(p)) => p.variable.unit.clone(),
@@ -269,11 +319,12 @@ fn build_tuner(
     };
     let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, Mistake> {
         let Some(quantity) = quantity else { return Ok(None) };
-        let value = quantity.to(&unit).map_err(|e| Mistake::new(key, e))?;
+        let value = converted(quantity, &unit).map_err(|m| m.within(key))?;
         if value.is_finite() {
             Ok(Some(value))
         } else {
-            Err(Mistake::new(key, format!("{value} is not a finite number")))
+            Err(Mistake::new(key, format!("`{key}` must be a finite number, not {value}"))
+                .with_help("every tuner moves between two finite bounds"))
         }
     };
     let (start, mut min, mut max) =
@@ -282,12 +333,13 @@ fn build_tuner(
     if let Some(list) = &draft.values {
         let mut values: Vec<f64> = Vec::new();
         for quantity in list {
-            values.push(quantity.to(&unit).map_err(|e| Mistake::new("values", e))?);
+            values.push(converted(quantity, &unit).map_err(|m| m.within("values"))?);
         }
         values.sort_by(f64::total_cmp);
         values.dedup();
         if values.len() < 2 {
-            return Err(Mistake::new("values", "a list needs at least two different values"));
+            return Err(Mistake::new("values", "a tuner needs at least two different values")
+                .with_help("add values, or say `active = false` to keep the one"));
         }
         (min, max) = (values.first().copied(), values.last().copied());
         grid = Grid::List(values);
@@ -301,7 +353,11 @@ fn build_tuner(
     let bounds = match (min, max) {
         (Some(min), Some(max)) => [min, max],
         _ if fixed => [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)],
-        _ => return Err(Mistake::here("a tuner needs both bounds").with_help("add `min = ...` and `max = ...`")),
+        (None, Some(_)) => return Err(Mistake::here("the tuner has no lower bound").with_help("add `min = ...`")),
+        (Some(_), None) => return Err(Mistake::here("the tuner has no upper bound").with_help("add `max = ...`")),
+        (None, None) => {
+            return Err(Mistake::here("the tuner has no bounds").with_help("add `min = ...` and `max = ...`"));
+        }
     };
     let [min, max] = bounds;
     if max <= min {
@@ -310,20 +366,19 @@ fn build_tuner(
         ));
     }
     if !fixed && !(min..=max).contains(&start) {
-        return Err(Mistake::new("start", format!("the start value {start} is outside the bounds, {min} to {max}")));
+        let (start, max) = (amount(start, &unit), amount(max, &unit));
+        return Err(Mistake::new("start", format!("the start value {start} is outside the bounds, {min} to {max}"))
+            .with_help("correct it, or widen the bounds"));
     }
     if draft.scale == Scale::Log && min <= 0.0 {
-        return Err(Mistake::new("scale", format!("a logarithmic range must be positive, but min is {min}")));
+        return Err(Mistake::new("scale", format!("a logarithmic range must be positive, but `min` is {min}"))
+            .with_help("raise `min`, or leave `scale` out"));
     }
     if let Some(parameter) = parameter {
         let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
         for (key, bound) in [("min", min), ("max", max)] {
-            let [low, high] = parameter.range;
-            if bound.is_finite() && !(low..=high).contains(&(bound * factor)) {
-                return Err(Mistake::new(
-                    key,
-                    format!("`{name}` is meaningful from {low} to {high} {} only", parameter.variable.unit),
-                ));
+            if bound.is_finite() {
+                check_range(bound * factor, parameter).map_err(|m| m.within(key))?;
             }
         }
     }
@@ -350,12 +405,13 @@ fn build_tuner(
 }
 
 /// Every tuner must set a parameter, or be followed by one that does.
-fn check_use(tuners: &[Tuner], models: &Models) -> Result<(), Mistake> {
+fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Result<(), Mistake> {
     let known: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
-    for (index, tuner) in tuners.iter().enumerate() {
-        let followed = tuners.iter().any(|t| t.tie.as_ref().is_some_and(|(_, of)| of.contains(&index)));
-        if !followed && !known.contains(&tuner.parameter.as_str()) {
-            let name = &tuner.parameter;
+    let ties: Vec<Expression> =
+        drafts.iter().filter_map(|(_, draft)| Expression::parse(draft.tie.as_ref()?).ok()).collect();
+    for (name, _) in drafts {
+        let followed = ties.iter().any(|tie| tie.names().contains(name));
+        if !followed && !known.contains(&name.as_str()) {
             return Err(Mistake::new(name, format!("no model has a parameter `{name}`"))
                 .with_help(suggestion(name, known.iter().copied()))
                 .within("tuners"));
@@ -374,11 +430,15 @@ fn tie_tuners(drafts: &[(String, TunerDraft)], tuners: &mut [Tuner]) -> Result<(
         let mut of = Vec::new();
         for used in expression.names() {
             let earlier: Vec<&str> = drafts[..position].iter().map(|(n, _)| n.as_str()).collect();
+            if used == name {
+                return Err(wrong("a tuner cannot follow itself".to_owned(), "name tuners that stand before it"));
+            }
+            if drafts[position..].iter().any(|(n, _)| n == used) {
+                let fact = format!("`{used}` stands after this tuner");
+                return Err(wrong(fact, &format!("a tie names tuners that stand before it: move `{used}` up")));
+            }
             if !earlier.contains(&used.as_str()) {
-                return Err(wrong(
-                    format!("`{used}` is not a tuner that stands before this one"),
-                    &suggestion(used, earlier.iter().copied()),
-                ));
+                return Err(wrong(format!("there is no tuner `{used}`"), &suggestion(used, earlier.iter().copied())));
             }
             of.push(tuners.iter().position(|t| t.name == *used).ok_or_else(|| {
                 wrong(format!("`{used}` has a value of its own in every case"), "tie to tuners of the whole study")
@@ -402,7 +462,7 @@ fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result
         parameter(&model.interface().parameters, &state.start).expect("a state's start value is a parameter");
     let unit = parameter.variable.unit.clone();
     let given = |key: &str, q: &Option<Quantity>| {
-        q.as_ref().map(|q| q.to(&unit).map_err(|e| Mistake::new(key, e).within(&free.state))).transpose()
+        q.as_ref().map(|q| converted(q, &unit).map_err(|m| m.within(key).within(&free.state))).transpose()
     };
     let (start, min, max) = (given("start", &free.start)?, given("min", &free.min)?, given("max", &free.max)?);
     let in_case = case.parameters.iter().find(|(name, _)| *name == state.start).map(|(_, value)| *value);
@@ -416,7 +476,7 @@ fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result
         }
         _ => {
             return Err(Mistake::new(&free.state, format!("nothing measured tells where `{}` starts", free.state))
-                .with_help(format!("give {} = {{ start = ..., min = ..., max = ... }}", free.state)));
+                .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
         }
     };
     let [low, high] = parameter.range;
@@ -424,8 +484,14 @@ fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result
     if bounds[0] >= bounds[1] || !(bounds[0]..=bounds[1]).contains(&start) {
         return Err(Mistake::new(
             &free.state,
-            format!("the start value {start} does not lie inside its bounds, {} to {}", bounds[0], bounds[1]),
-        ));
+            format!(
+                "the start value {} does not lie inside its bounds, {} to {}",
+                amount(start, &unit),
+                bounds[0],
+                amount(bounds[1], &unit)
+            ),
+        )
+        .with_help("correct `start`, `min` and `max`; what is left out is read off the data"));
     }
     Ok(Tuner {
         name: format!("{}/{}", case.name, state.start),
@@ -457,7 +523,7 @@ fn guess_start(signal: Option<&str>, rate_of: Option<&str>, experiment: &Experim
     Some((slope(0, span), (1.5 * largest).max(f64::MIN_POSITIVE)))
 }
 
-fn add_rows(study: &mut Study, fixed: &[Vec<(String, f64)>], name: &str, draft: CriterionDraft) -> Result<(), Mistake> {
+fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> Result<(), Mistake> {
     let model = match &draft.model {
         Some(model) => study.models.iter().position(|(n, _)| n == model).ok_or_else(|| {
             Mistake::new("model", format!("the study has no model `{model}`"))
@@ -465,10 +531,9 @@ fn add_rows(study: &mut Study, fixed: &[Vec<(String, f64)>], name: &str, draft: 
         })?,
         None if study.models.len() == 1 => 0,
         None => {
-            let known: Vec<&str> = study.models.iter().map(|(n, _)| n.as_str()).collect();
-            return Err(
-                Mistake::here("the study has several models").with_help(format!("say which: model = {known:?}"))
-            );
+            let known: Vec<String> = study.models.iter().map(|(name, _)| format!("model = \"{name}\"")).collect();
+            return Err(Mistake::here("the study has several models, and the criterion does not say which it reads")
+                .with_help(format!("add {}", known.join(" or "))));
         }
     };
     let signals = study.models[model].1.interface().signals.clone();
@@ -476,10 +541,11 @@ fn add_rows(study: &mut Study, fixed: &[Vec<(String, f64)>], name: &str, draft: 
     let unit = criterion.unit();
     let demand = demand(&draft, &unit)?;
     if !(draft.weight.is_finite() && draft.weight > 0.0) {
-        return Err(Mistake::new("weight", format!("a weight must be positive, not {}", draft.weight)));
+        return Err(Mistake::new("weight", format!("a weight must be positive, not {}", draft.weight))
+            .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
     }
     for case in cases_of(study, &draft)? {
-        let job = job(study, fixed, model, case, &criterion.signals(), &signals)?;
+        let job = job(study, model, case, &criterion.signals(), &signals)?;
         study.rows.push(Row {
             name: name.to_owned(),
             job,
@@ -507,19 +573,22 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
             .iter()
             .map(|name| {
                 let found = study.cases.iter().position(|c| c.name == *name).ok_or_else(|| {
-                    Mistake::new("cases", format!("the study has no case `{name}`"))
+                    Mistake::new(name, format!("the study has no case `{name}`"))
                         .with_help(suggestion(name, study.cases.iter().map(|c| c.name.as_str())))
+                        .within("cases")
                 })?;
                 if measures(&study.cases[found]) {
                     Ok(found)
                 } else {
-                    Err(Mistake::new("cases", format!("`{name}` does not measure `{signal}`")))
+                    Err(Mistake::new(name, format!("nothing in `{name}` measures `{signal}`"))
+                        .with_help(format!("name experiments with `{signal}` among their `channels`"))
+                        .within("cases"))
                 }
             })
             .collect::<Result<_, _>>()?,
     };
     if chosen.is_empty() {
-        return Err(Mistake::here(format!("no experiment measures `{signal}`"))
+        return Err(Mistake::new("signal", format!("no experiment measures `{signal}`"))
             .with_help("add it to the `channels` of an experiment"));
     }
     Ok(chosen)
@@ -527,26 +596,30 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
 
 fn demand(draft: &CriterionDraft, unit: &Unit) -> Result<Demand, Mistake> {
     let value =
-        |key: &str, q: &Option<Quantity>| q.as_ref().map(|q| q.to(unit).map_err(|e| Mistake::new(key, e))).transpose();
+        |key: &str, q: &Option<Quantity>| q.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose();
     let (demand, good, bad) = (value("demand", &draft.demand)?, value("good", &draft.good)?, value("bad", &draft.bad)?);
     match (demand, good, bad) {
         (Some(d), None, None) if d.is_finite() && d > 0.0 => Ok(Demand::Value(d)),
         (Some(d), None, None) => Err(Mistake::new("demand", format!("a demand must be positive, not {d}"))
-            .with_help("the value is divided by its demand; for zero, a negative wish or `at least`, give `good` (scaled to 0) and `bad` (scaled to 1) instead")),
+            .with_help("the value is divided by it; where that does not fit, give `good` and `bad` instead, the values that scale to 0 and to 1")),
         (None, Some(good), Some(bad)) if good.is_finite() && bad.is_finite() && good != bad => Ok(Demand::Pair { good, bad }),
-        (None, Some(_), Some(_)) => Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")),
-        (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")),
+        (None, Some(_), Some(_)) => Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")
+            .with_help("`good` scales to 0, `bad` to 1")),
+        (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")
+            .with_help("remove one or the other")),
         (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
         (None, None, None) => Err(Mistake::here("the criterion has no demand").with_help("add `demand = ...`, or the pair `good` and `bad`")),
-        (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")),
-        (None, None, Some(_)) => Err(Mistake::new("bad", "`bad` needs `good` beside it")),
+        (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")
+            .with_help("add `bad = ...`, the value that scales to 1")),
+        (None, None, Some(_)) => Err(Mistake::new("bad", "`bad` needs `good` beside it")
+            .with_help("add `good = ...`, the value that scales to 0")),
     }
 }
 
-/// The job of a model in a case, made at the first need; the signals are added to those it computes.
+/// The job of a model in a case, made at the first need and still to be completed; the signals are added to those it
+/// computes.
 fn job(
     study: &mut Study,
-    fixed: &[Vec<(String, f64)>],
     model: usize,
     case: usize,
     wanted: &[String],
@@ -562,13 +635,7 @@ fn job(
     let index = match study.jobs.iter().position(|j| j.model == model && j.case == case) {
         Some(index) => index,
         None => {
-            let interface = study.models[model].1.interface();
-            let horizon = study.cases[case].horizon.or(interface.horizon).ok_or_else(|| {
-                Mistake::here(format!("nothing says how long `{}` is simulated", study.cases[case].name))
-                    .with_help("give the model or the case a `horizon`")
-            })?;
-            let parameters = sources(study, interface, &fixed[model], case)?;
-            study.jobs.push(JobPlan { model, case, parameters, signals: Vec::new(), horizon });
+            study.jobs.push(JobPlan { model, case, parameters: Vec::new(), signals: Vec::new(), horizon: 0.0 });
             study.jobs.len() - 1
         }
     };
@@ -577,6 +644,20 @@ fn job(
     job.signals.sort_unstable();
     job.signals.dedup();
     Ok(index)
+}
+
+/// Gives a job its horizon and its parameters.
+fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), Mistake> {
+    let JobPlan { model, case, .. } = study.jobs[index];
+    let interface = study.models[model].1.interface();
+    let horizon = study.cases[case].horizon.or(interface.horizon).ok_or_else(|| {
+        Mistake::here(format!("nothing says how long `{}` is simulated", study.cases[case].name))
+            .with_help("give the case or the model a `horizon`")
+    })?;
+    let parameters = sources(study, interface, fixed, case)?;
+    let job = &mut study.jobs[index];
+    (job.horizon, job.parameters) = (horizon, parameters);
+    Ok(())
 }
 
 /// Where each parameter comes from: a tuner of the case, a tuner of the study, the case, the model's table, the default.
@@ -605,14 +686,9 @@ fn sources(
                 return Ok(ParameterSource::Tuner { tuner, factor });
             }
             find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
-                Mistake {
-                    path: Vec::new(),
-                    message: format!("nothing gives a value to the parameter `{name}` in `{}`", study.cases[case].name),
-                    help: None,
-                }
-                .with_help(format!(
-                    "make `{name}` a tuner, or give it a value in the case or in the model's `parameters`"
-                ))
+                Mistake::here(format!("nothing gives a value to `{name}` in `{}`", study.cases[case].name)).with_help(
+                    format!("make `{name}` a tuner, or give it a value in the case or in the model's `parameters`"),
+                )
             })
         })
         .collect()

@@ -1,0 +1,264 @@
+//! What every solver of the catalogue must do, whatever its method.
+
+use std::sync::Arc;
+
+use mops::{
+    Analysis, Budget, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Interface, Job, Mistake, Model,
+    Oracle, Parameter, Problem, Response, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value, Variable,
+    Watch,
+};
+
+/// A function of the tuners, dressed as a model: signal `i` is constant at `f(x)[i]`.
+struct Function {
+    interface: Interface,
+    f: fn(&[f64]) -> Option<Vec<f64>>,
+}
+
+impl Model for Function {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        let values = (self.f)(job.parameters).ok_or(Failure::Diverged(0.5))?;
+        let traces = job.signals.iter().map(|&i| {
+            let mut trace = mops::Trace::starting_at(0.0, 1);
+            trace.push(1.0, [values[i]; 5]);
+            (self.interface.signals[i].name.clone(), trace)
+        });
+        Ok(Analysis::Time(Response { traces: traces.collect(), ..Response::default() }))
+    }
+}
+
+/// The end value of a signal.
+#[derive(Clone)]
+struct End(String);
+
+impl CriterionSpec for End {
+    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(self.clone()))
+    }
+}
+
+impl Criterion for End {
+    fn unit(&self) -> Unit {
+        Unit::one()
+    }
+    fn signals(&self) -> Vec<String> {
+        vec![self.0.clone()]
+    }
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        Ok(analysis.trace(&self.0).last().into())
+    }
+}
+
+/// A study of `f` over the box [-2, 2]^n, starting at 1.5, with a usage for every value.
+fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
+    let name = |prefix: &str, i: usize| format!("{prefix}{i}");
+    let interface = Interface {
+        signals: (0..usages.len()).map(|i| Variable::new(name("f", i), "1", "value")).collect(),
+        parameters: (0..n).map(|j| Parameter::new(name("x", j), "1", "coordinate")).collect(),
+        horizon: Some(1.0),
+        ..Interface::default()
+    };
+    Draft {
+        name: "function".into(),
+        models: vec![("function".into(), Function { interface, f }.into())],
+        tuners: (0..n).map(|j| (name("x", j), TunerDraft::new(1.5, -2.0, 2.0))).collect(),
+        criteria: usages
+            .iter()
+            .enumerate()
+            .map(|(i, usage)| (name("c", i), CriterionDraft::minimise(End(name("f", i)), 1.0).used_as(*usage)))
+            .collect(),
+        ..Draft::default()
+    }
+    .build()
+    .unwrap()
+}
+
+/// Every kind of solver that accepts the study.
+fn solvers(problem: &Problem) -> Vec<SolverKind> {
+    let mut kinds = mops::catalogue().solvers;
+    kinds.retain(|kind| kind.default_choice().make().accepts(problem.shape()).is_ok());
+    assert!(kinds.len() >= 4, "most solvers take an ordinary problem");
+    kinds
+}
+
+struct Solved {
+    stop: Stop,
+    best: mops::Evaluation,
+    points: Vec<Vec<f64>>,
+}
+
+fn solve(problem: &Problem, kind: &SolverKind, evaluations: usize, watch: &dyn Watch) -> Solved {
+    let mut run = Run::new(problem, Budget { evaluations }, watch);
+    let stop = run.solve(kind.default_choice().make().as_mut(), &problem.start());
+    let points = run.archive().iter().map(|record| record.tuners.clone()).collect();
+    Solved { stop, best: run.best().unwrap().clone(), points }
+}
+
+const MINIMISE: &[Usage] = &[Usage::Minimise, Usage::Minimise];
+
+/// Two parabolas that meet at a kink: max is least at (0.5, 0), where it is 1.25.
+fn kink(x: &[f64]) -> Option<Vec<f64>> {
+    let rest: f64 = x[1..].iter().map(|x| x * x).sum();
+    Some(vec![x[0].powi(2) + rest + 1.0, (x[0] - 1.0).powi(2) + rest + 1.0])
+}
+
+#[test]
+fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
+    for budget in [1, 2, 7, 50] {
+        let problem = Problem::new(Arc::new(study(3, MINIMISE, kink)));
+        for kind in solvers(&problem) {
+            let solved = solve(&problem, &kind, budget, &());
+            assert!(solved.points.len() <= budget, "{}: {}", kind.name, solved.points.len());
+            assert!(solved.stop != Stop::Budget || solved.points.len() == budget, "{}", kind.name);
+            assert!(solved.points.iter().flatten().all(|x| (-2.0..=2.0).contains(x)), "{}", kind.name);
+        }
+    }
+}
+
+#[test]
+fn every_solver_comes_near_the_kink_of_two_criteria() {
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
+    for kind in solvers(&problem) {
+        let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
+        assert!((1.25 - 1e-9..1.26).contains(&found), "{}: {found}", kind.name);
+    }
+}
+
+#[test]
+fn same_seed_same_bits_for_any_number_of_threads() {
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
+    for kind in solvers(&problem) {
+        let points = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| solve(&problem, &kind, 300, &()).points)
+        });
+        assert!(points[0] == points[1], "{}", kind.name);
+    }
+}
+
+#[test]
+fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
+    // The start (1.5, ...) lies in the half that fails.
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) })));
+    for kind in solvers(&problem) {
+        let solved = solve(&problem, &kind, 5000, &());
+        let found = solved.best.merit.objective;
+        assert!(found < 1.3, "{}: {found}", kind.name);
+    }
+}
+
+#[test]
+fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, |_| None)));
+    for kind in solvers(&problem) {
+        let solved = solve(&problem, &kind, 300, &());
+        assert!(solved.best.scaled.is_none(), "{}", kind.name);
+    }
+}
+
+#[test]
+fn a_constant_objective_ends() {
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, |_| Some(vec![1.0, 1.0]))));
+    for kind in solvers(&problem) {
+        assert_eq!(solve(&problem, &kind, 50_000, &()).best.merit.objective, 1.0, "{}", kind.name);
+    }
+}
+
+#[test]
+fn one_tuner_is_enough() {
+    let problem = Problem::new(Arc::new(study(1, MINIMISE, kink)));
+    for kind in solvers(&problem) {
+        let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
+        assert!((found - 1.25).abs() < 1e-3, "{}: {found}", kind.name);
+    }
+}
+
+#[test]
+fn no_active_tuner_leaves_the_start() {
+    let mut fixed = study(1, MINIMISE, kink);
+    fixed.tuners[0].active = false;
+    let problem = Problem::new(Arc::new(fixed));
+    for kind in solvers(&problem) {
+        let solved = solve(&problem, &kind, 100, &());
+        assert_eq!(solved.points, [[1.5]], "{}", kind.name);
+    }
+}
+
+#[test]
+fn constraints_are_met_where_they_can_be() {
+    // Least |x|^2 with x0 >= 0.8, written as 1.8 - x0 <= 1.
+    let usages = [Usage::Minimise, Usage::Inequality];
+    let f = |x: &[f64]| Some(vec![x.iter().map(|x| x * x).sum(), 1.8 - x[0]]);
+    let problem = Problem::new(Arc::new(study(2, &usages, f)));
+    for kind in solvers(&problem) {
+        let best = solve(&problem, &kind, 5000, &()).best;
+        assert!(best.merit.is_feasible(), "{}: {:?}", kind.name, best.merit);
+        assert!(best.merit.objective < 0.70, "{}: {:?}", kind.name, best.merit);
+    }
+}
+
+#[test]
+fn an_infeasible_problem_ends_at_a_small_violation() {
+    // x0 >= 1.5 and x0 <= 0.5: the least violation is 0.5, at 1.
+    let usages = [Usage::Minimise, Usage::Inequality, Usage::Inequality];
+    let f = |x: &[f64]| Some(vec![x[1] * x[1], 2.5 - x[0], 0.5 + x[0]]);
+    let problem = Problem::new(Arc::new(study(2, &usages, f)));
+    for kind in solvers(&problem) {
+        let violation = solve(&problem, &kind, 5000, &()).best.merit.violation;
+        assert!((0.5 - 1e-9..0.55).contains(&violation), "{}: {violation}", kind.name);
+    }
+}
+
+#[test]
+fn a_criterion_that_jumps_ends_near_its_least_value() {
+    let f = |x: &[f64]| {
+        let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
+        Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
+    };
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, f)));
+    for kind in solvers(&problem) {
+        let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
+        assert!(found < 0.2, "{}: {found}", kind.name);
+    }
+}
+
+#[test]
+fn scales_of_1e_minus_12_and_1e12_are_no_obstacle() {
+    let small = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e-12 * f).collect());
+    let large = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e12 * f).collect());
+    for (f, scale) in [(small as fn(&[f64]) -> Option<Vec<f64>>, 1e-12), (large, 1e12)] {
+        let problem = Problem::new(Arc::new(study(2, MINIMISE, f)));
+        for kind in solvers(&problem) {
+            let found = solve(&problem, &kind, 5000, &()).best.merit.objective / scale;
+            assert!(found < 1.6, "{} at {scale}: {found}", kind.name);
+        }
+    }
+}
+
+#[test]
+fn an_interrupt_ends_every_solver_with_the_best_so_far() {
+    struct Impatient;
+    impl Watch for Impatient {
+        fn wants_stop(&self) -> bool {
+            true
+        }
+    }
+    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
+    for kind in solvers(&problem) {
+        let solved = solve(&problem, &kind, 5000, &Impatient);
+        assert_eq!(solved.stop, Stop::Interrupted, "{}", kind.name);
+        assert!(solved.best.scaled.is_some(), "{}", kind.name);
+    }
+}
+
+#[test]
+fn failures_are_counted_in_the_result() {
+    let half = study(2, MINIMISE, |x| if x[0] > 0.9 { None } else { kink(x) });
+    let outcome = mops::solve(half, &mops::Options::default(), &()).unwrap().outcome;
+    assert!(outcome.worst_scaled < 1.2501, "{}", outcome.worst_scaled);
+    assert_eq!((outcome.failures.len(), outcome.failures[0].failure.as_str()), (1, "diverged"));
+    assert!(outcome.failures[0].count >= 1);
+}

@@ -1,0 +1,261 @@
+//! What a user sees of the command line: commands, files, exit statuses.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+fn mops(arguments: &[&str]) -> Command {
+    let mut command = cargo_bin_cmd!("mops");
+    command.args(arguments);
+    command
+}
+
+/// Runs a study into `folder`; the result.
+fn run(study: &str, folder: &Path, more: &[&str]) -> Value {
+    let out = folder.join("out");
+    let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
+    arguments.extend(more);
+    let output = mops(&arguments).output().unwrap();
+    let result: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
+    assert_eq!(std::fs::read(out.join("result.json")).unwrap(), output.stdout, "what is printed is what is written");
+    result
+}
+
+fn worst(result: &Value) -> f64 {
+    result["worst_scaled"].as_f64().unwrap()
+}
+
+/// Known optima, found by an independent program (SciPy): 0.8630704, 0.7359265, 3.8955098.
+#[test]
+fn the_pid_studies_reach_their_known_optima() {
+    for (study, optimum, slack) in [
+        ("pid-design", 0.863_070_4, 2e-4),
+        ("pid-design-constrained", 0.735_926_5, 2e-4),
+        ("pid-design-multi-case", 3.895_509_8, 0.02),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let result = run(study, folder.path(), &[]);
+        assert_eq!(result["feasible"], true, "{study}");
+        let found = worst(&result);
+        assert!(found <= optimum + slack && found >= optimum - 1e-5, "{study}: {found}");
+    }
+}
+
+#[test]
+fn a_run_leaves_result_report_plots_and_evaluations() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = run("pid-design", folder.path(), &["--max-evaluations", "60", "--seed", "7"]);
+    let keys = [
+        "format",
+        "mops",
+        "study",
+        "task",
+        "seed",
+        "solver",
+        "stop",
+        "evaluations",
+        "simulations",
+        "seconds",
+        "feasible",
+        "worst_scaled",
+        "violation",
+        "pareto",
+        "tuners",
+        "criteria",
+        "start",
+        "front",
+        "failures",
+    ];
+    for key in keys {
+        assert!(result.get(key).is_some(), "{key} is missing");
+    }
+    assert_eq!((&result["seed"], &result["stop"], &result["evaluations"]), (&7.into(), &"budget".into(), &60.into()));
+    let out = folder.path().join("out");
+    let rows = std::fs::read_to_string(out.join("evaluations.csv")).unwrap().lines().count();
+    assert_eq!(rows, 61, "one line per point, and the header");
+    for file in ["report.html", "plots/convergence.svg", "plots/response-nominal-y.png"] {
+        assert!(out.join(file).metadata().unwrap().len() > 1000, "{file}");
+    }
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(!page.contains("src=\"http") && !page.contains("href=\"http"), "the page opens without a network");
+}
+
+#[test]
+fn thread_count_does_not_change_a_single_bit() {
+    for study in ["pid-design-multi-case", "furuta-calibration"] {
+        let results: Vec<Value> = ["1", "2", "3"]
+            .iter()
+            .map(|jobs| {
+                let folder = tempfile::tempdir().unwrap();
+                let mut result = run(study, folder.path(), &["--jobs", jobs, "--max-evaluations", "700"]);
+                result["seconds"] = Value::Null;
+                result
+            })
+            .collect();
+        assert!(results.windows(2).all(|pair| pair[0] == pair[1]), "{study}");
+    }
+}
+
+#[test]
+fn the_calibration_recovers_the_device_within_its_intervals() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = run("furuta-calibration", folder.path(), &[]);
+    // The values of the generator, studies/furuta-calibration/generate.rs.
+    let truth = [
+        ("b", 1.133e-3),
+        ("c", 6.31e-4),
+        ("d", 2.5267e-2),
+        ("ba", 1.2e-4),
+        ("bp", 2.5e-5),
+        ("ca", 9e-4),
+        ("cp", 1.8e-4),
+    ];
+    for (name, value) in truth {
+        let parameters = result["calibration"]["parameters"].as_array().unwrap();
+        let found = parameters.iter().find(|p| p["name"] == name).unwrap();
+        let (estimate, error) = (found["value"].as_f64().unwrap(), found["std_error"].as_f64().unwrap());
+        assert!((estimate - value).abs() < 4.0 * error, "{name}: {estimate} +- {error}, generated with {value}");
+    }
+    let experiments = result["calibration"]["experiments"].as_array().unwrap();
+    for (experiment, channel, limit) in [(0, 0, 0.0033), (0, 1, 0.0033), (1, 0, 0.006), (1, 1, 0.012)] {
+        let rmse = experiments[experiment]["channels"][channel]["rmse"].as_f64().unwrap();
+        assert!(rmse < limit, "{} {channel}: {rmse}", experiments[experiment]["name"]);
+    }
+}
+
+#[test]
+fn a_violated_constraint_is_status_1_and_still_a_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let impossible = "criteria.settling.demand=0.1";
+    let arguments =
+        ["run", "pid-design-constrained", "--set", impossible, "--max-evaluations", "300", "--quiet", "--out"];
+    let mut command = mops(&arguments);
+    command.arg(&out).assert().code(1).stdout("");
+    let result: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+    assert_eq!(result["feasible"], false);
+    assert!(result["violation"].as_f64().unwrap() > 1.0);
+}
+
+#[test]
+fn every_solver_improves_the_shipped_design() {
+    for solver in ["auto", "sqp", "pattern-search", "nelder-mead", "particle-swarm"] {
+        let folder = tempfile::tempdir().unwrap();
+        let found = worst(&run("pid-design", folder.path(), &["--solver", solver, "--max-evaluations", "2500"]));
+        assert!(found < 0.9, "{solver}: {found}");
+    }
+}
+
+#[test]
+fn simulate_shows_the_published_criteria_at_the_published_parameters() {
+    // Table 5.2 of the thesis in two of its cases, with the digits of an independent integration.
+    let folder = tempfile::tempdir().unwrap();
+    let values = ["--at", "k=5.52434", "--at", "Ti=5.93807 s", "--at", "Td=1.34739"];
+    let mut command = mops(&["simulate", "pid-design-multi-case", "--out"]);
+    let output = command.arg(folder.path()).args(values).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for number in ["0.0736136", "15.0001", "0.274299", "23.3761", "0.394611", "13.2206"] {
+        assert!(text.contains(number), "{number} is not in\n{text}");
+    }
+    let csv = std::fs::read_to_string(folder.path().join("loop-nominal.csv")).unwrap();
+    assert!(csv.starts_with("t[s],r[1],y[1],e[1],u[1],d[1]\n"));
+    assert_eq!(csv.lines().count(), 1002);
+    assert!(folder.path().join("loop-nominal-y.svg").exists() && folder.path().join("loop-nominal-y.png").exists());
+}
+
+#[test]
+fn check_list_and_describe_tell_what_is_there() {
+    for study in mops::catalogue().studies {
+        mops(&["check", study.name]).assert().code(0);
+        mops(&["describe", study.name]).assert().code(0);
+    }
+    let list = String::from_utf8(mops(&["list"]).output().unwrap().stdout).unwrap();
+    let catalogue = mops::catalogue();
+    let names = catalogue.models.iter().map(|k| k.name).chain(catalogue.criteria.iter().map(|k| k.name));
+    for name in names.chain(catalogue.solvers.iter().map(|k| k.name)) {
+        assert!(list.contains(name), "{name}");
+        let page = String::from_utf8(mops(&["describe", name]).output().unwrap().stdout).unwrap();
+        assert!(page.contains("Source:") || name == "auto", "the page of {name} names its source");
+    }
+}
+
+#[test]
+fn a_new_study_checks_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    mops(&["new", "mine"]).current_dir(&folder).assert().code(0);
+    mops(&["check", "mine/study.toml"]).current_dir(&folder).assert().code(0);
+    mops(&["new", "copy", "--from", "furuta-calibration"]).current_dir(&folder).assert().code(0);
+    mops(&["run", "copy", "--quiet", "--max-evaluations", "40"]).current_dir(&folder).assert().code(0);
+    assert!(folder.path().join("results/furuta-calibration/report.html").exists());
+}
+
+#[test]
+fn the_schema_accepts_every_shipped_study_and_refuses_a_misspelt_one() {
+    let schema: Value = serde_json::from_slice(&mops(&["schema"]).output().unwrap().stdout).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let template = include_str!("../src/cli/new.toml").as_bytes();
+    let catalogue = mops::catalogue();
+    let shipped = catalogue.studies.iter().map(|study| study.file("study.toml").unwrap());
+    for text in shipped.chain([template]) {
+        let text = std::str::from_utf8(text).unwrap();
+        let study: Value = toml::from_str(text).unwrap();
+        let wrong: Vec<String> = validator.iter_errors(&study).map(|e| format!("{}: {e}", e.instance_path)).collect();
+        assert!(wrong.is_empty(), "{wrong:?}\n{text}");
+        for (from, to) in [("start", "strat"), ("demand", "demnad"), ("signal", "singal"), ("[models.", "[modles.")] {
+            if text.contains(from) {
+                let misspelt: Value = toml::from_str(&text.replace(from, to)).unwrap();
+                assert!(!validator.is_valid(&misspelt), "{to}");
+            }
+        }
+    }
+}
+
+#[test]
+fn data_shows_columns_units_gaps_and_sampling() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..50)
+        .map(|i| format!("{},{}\n", f64::from(i) * 0.1, if i == 7 { "".into() } else { i.to_string() }))
+        .collect();
+    std::fs::write(folder.path().join("d.csv"), format!("t[s],phi[rad]\n{rows}")).unwrap();
+    let text = String::from_utf8(mops(&["data", "d.csv"]).current_dir(&folder).output().unwrap().stdout).unwrap();
+    let phi: Vec<&str> = text.lines().find(|l| l.contains("phi")).unwrap().split_whitespace().collect();
+    assert_eq!(&phi[..6], ["phi", "rad", "50", "1", "0", "49"]);
+    assert!(text.contains("runs from 0 to 4.9, steps 0.1 (median)"), "{text}");
+}
+
+#[test]
+fn completions_are_written_for_every_shell() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = mops(&["completions", shell]).output().unwrap().stdout;
+        assert!(String::from_utf8(script).unwrap().contains("simulate"), "{shell}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_run_with_the_best_point_on_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // A swarm far too large to finish.
+    let program = assert_cmd::cargo::cargo_bin!("mops");
+    let mut child = std::process::Command::new(program)
+        .args(["run", "pid-design-multi-case", "--quiet", "--max-evaluations", "100000000"])
+        .args(["--set", "solver.particle-swarm.max-iterations=100000000", "--out"])
+        .arg(&out)
+        .spawn()
+        .unwrap();
+    // The run has begun once its handler is set; an interrupt before that ends it without a result, so it is asked for
+    // until the process has ended.
+    let result = out.join("result.json");
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let kill = || std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill().success());
+    let status = child.wait().unwrap();
+    assert!(matches!(status.code(), Some(0 | 1)), "{status:?}");
+    let result: Value = serde_json::from_slice(&std::fs::read(result).unwrap()).unwrap();
+    assert_eq!(result["stop"], "interrupted");
+    assert!(result["evaluations"].as_u64().unwrap() > 10);
+}

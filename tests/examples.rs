@@ -1,0 +1,17 @@
+//! The examples run, and give what they say.
+
+#[path = "../examples/own_study.rs"]
+mod own_study;
+
+#[test]
+fn a_study_in_rust_finds_the_best_compromise() {
+    let solved = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap();
+    let outcome = &solved.outcome;
+    assert!(outcome.worst_scaled < 0.6 * outcome.start.worst_scaled, "{}", outcome.worst_scaled);
+    // A dense grid over the box, evaluated independently of any solver, has nothing better to offer.
+    let steps = 60;
+    let points = (0..=steps).flat_map(|i| (0..=steps).map(move |j| [f64::from(i), f64::from(j)]));
+    let grid = points.map(|p| solved.problem.evaluate(&p.map(|x| x / f64::from(steps))).merit.objective);
+    let best = grid.fold(f64::INFINITY, f64::min);
+    assert!(outcome.worst_scaled <= best * 1.001, "{} {best}", outcome.worst_scaled);
+}

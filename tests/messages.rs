@@ -1,0 +1,565 @@
+//! What a user reads when a study, its data or the command line is wrong: the place, the fact and the way out.
+//!
+//! Every case breaks one thing of a study that is right. A page of messages per subject stands in `tests/snapshots`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+
+/// A design that is right.
+const DESIGN: &str = r#"[study]
+name = "loop"
+
+[models.loop.pid-loop]
+plant   = { poles = ["p", -4.0, -1.0], gain = 1.0 }
+horizon = "60 s"
+
+[tuners]
+k  = { start = 4.0, min = 0.1,  max = 50.0, scale = "log" }
+Ti = { start = 2.0, min = 0.2,  max = 20.0, unit = "s" }
+Td = { start = 1.0, min = 0.01, max = 10.0, unit = "s" }
+
+[cases]
+nominal = { p = 0.0 }
+
+[criteria]
+overshoot = { overshoot     = { signal = "y", target = 1.0 },              demand = 0.10 }
+settling  = { settling-time = { signal = "y", target = 1.0, band = 0.01 }, demand = "15 s" }
+"#;
+
+/// A calibration that is right.
+const CALIBRATION: &str = r#"[study]
+name = "swing"
+task = "calibration"
+
+[models.rig.furuta]
+[models.rig.parameters]
+a = 9e-4
+b = 2e-3
+c = 4e-4
+
+[tuners]
+d = { start = 2e-2, min = 5e-3, max = 1e-1, scale = "log" }
+
+[experiments.swing]
+file     = "swing.csv"
+channels = { phi = "arm", theta = { column = "pendulum", noise = 0.003 } }
+inputs   = { u = "torque" }
+free     = ["theta"]
+
+[criteria]
+theta = { fit = { signal = "theta" }, demand = 1e-3 }
+"#;
+
+/// Its recording.
+const RECORDING: &str = "\
+t[s],arm[rad],pendulum[rad],torque[N*m]
+0.00,0.000,3.00,0.0
+0.05,0.001,2.99,0.1
+0.10,0.003,2.96,0.1
+0.15,0.006,2.91,0.0
+";
+
+/// One mistake: the files of the folder in which `mops` is called, and how it is called.
+struct Case {
+    what: &'static str,
+    files: BTreeMap<String, Vec<u8>>,
+    arguments: Vec<&'static str>,
+}
+
+impl Case {
+    fn new(what: &'static str, study: &str) -> Self {
+        let files = BTreeMap::from([("study.toml".to_owned(), study.as_bytes().to_vec())]);
+        let arguments = vec!["run", "study.toml", "--out", "out", "--max-evaluations", "1"];
+        Self { what, files, arguments }
+    }
+
+    fn with(mut self, file: &str, content: impl AsRef<[u8]>) -> Self {
+        self.files.insert(file.to_owned(), content.as_ref().to_vec());
+        self
+    }
+
+    fn called(self, arguments: &[&'static str]) -> Self {
+        Self { arguments: arguments.to_vec(), ..self }
+    }
+
+    /// What `mops` says. It ends with status 2, prints no result and writes nothing.
+    fn message(&self) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in &self.files {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, content).unwrap();
+        }
+        let output = cargo_bin_cmd!("mops").args(&self.arguments).current_dir(folder.path()).output().unwrap();
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}: {message}", self.what);
+        assert_eq!(String::from_utf8_lossy(&output.stdout), "", "{}", self.what);
+        assert_eq!(files_below(folder.path()), self.files, "{}", self.what);
+        message
+    }
+}
+
+/// Every file in the folder, by its path from there.
+fn files_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            files.extend(files_below(&path).into_iter().map(|(below, content)| (format!("{name}/{below}"), content)));
+        } else {
+            files.insert(name, fs::read(path).unwrap());
+        }
+    }
+    files
+}
+
+/// `text` with `instead` in the place of `right`, which stands there once.
+fn broken(text: &str, right: &str, instead: &str) -> String {
+    assert_eq!(text.matches(right).count(), 1, "`{right}` must stand once in\n{text}");
+    text.replace(right, instead)
+}
+
+/// The design with a mistake.
+fn design(what: &'static str, right: &str, instead: &str) -> Case {
+    Case::new(what, &broken(DESIGN, right, instead))
+}
+
+/// The calibration with a mistake in its study.
+fn calibration(what: &'static str, right: &str, instead: &str) -> Case {
+    Case::new(what, &broken(CALIBRATION, right, instead)).with("swing.csv", RECORDING)
+}
+
+/// The calibration with a mistake in its recording.
+fn recording(what: &'static str, right: &str, instead: &str) -> Case {
+    Case::new(what, CALIBRATION).with("swing.csv", broken(RECORDING, right, instead))
+}
+
+/// The calibration with another data file.
+fn data_file(what: &'static str, file: &str, content: impl AsRef<[u8]>) -> Case {
+    Case::new(what, &broken(CALIBRATION, "swing.csv", file)).with(file, content)
+}
+
+/// The design as it is, with a mistake on the command line.
+fn called(what: &'static str, arguments: &[&'static str]) -> Case {
+    Case::new(what, DESIGN).called(arguments)
+}
+
+/// A file of level 4 with the column vector `t = [0; 1]`.
+fn matlab_level_4() -> Vec<u8> {
+    let header = [0_u32, 2, 1, 0, 2].map(u32::to_le_bytes).concat();
+    [&header, b"t\0".as_slice(), &0.0_f64.to_le_bytes(), &1.0_f64.to_le_bytes()].concat()
+}
+
+/// A file of level 5 that announces a matrix of 1000 bytes and ends in it.
+fn matlab_level_5_cut_off() -> Vec<u8> {
+    let header = format!("{:<124}\0\u{1}IM", "MATLAB 5.0 MAT-file, Platform: GLNXA64");
+    [header.as_bytes(), &14_u32.to_le_bytes(), &1000_u32.to_le_bytes(), &[0; 16]].concat()
+}
+
+/// The beginning of a file of level 7.3.
+fn matlab_level_7_3() -> Vec<u8> {
+    [format!("{:<512}", "MATLAB 7.3 MAT-file, Platform: GLNXA64").as_bytes(), b"\x89HDF\r\n\x1a\n"].concat()
+}
+
+/// Words of the reader's innards, which help nobody with a study.
+const JARGON: [&str; 12] = [
+    "invalid type",
+    "wrong type",
+    "a sequence",
+    "a map",
+    "variant",
+    "missing field",
+    "f64",
+    "usize",
+    "wanted",
+    "Some(",
+    "os error",
+    "panicked",
+];
+
+/// The messages of all cases on one page, which is compared with its snapshot.
+fn check(subject: &str, cases: &[Case]) {
+    let mut page = String::new();
+    for case in cases {
+        let message = case.message();
+        for word in JARGON {
+            assert!(!message.contains(word), "{}: `{word}` in\n{message}", case.what);
+        }
+        page += &format!("== {}\n$ mops {}\n{message}\n", case.what, case.arguments.join(" "));
+    }
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!(subject, page);
+    });
+}
+
+#[test]
+fn a_text_that_is_no_toml() {
+    check(
+        "toml",
+        &[
+            design("an equals sign is missing", "name = \"loop\"", "name \"loop\""),
+            design("a text without quotes", "scale = \"log\"", "scale = log"),
+            design("a text is not closed", "name = \"loop\"", "name = \"loop"),
+            design("a table is not closed", "{ p = 0.0 }", "{ p = 0.0"),
+            design("a key twice", "max = 20.0", "min = 20.0"),
+            design("a quantity without quotes", "\"60 s\"", "60 s"),
+            design("a comma is missing", "start = 4.0, ", "start = 4.0 "),
+            design("a bracket too many", "{ p = 0.0 }", "{ p = 0.0 } }"),
+            design("a decimal comma", "demand = 0.10", "demand = 0,10"),
+            Case::new("a study that is not UTF-8", "").with("study.toml", b"[study]\nname = \"R\xfcckf\xfchrung\"\n"),
+            Case::new("an empty study", ""),
+        ],
+    );
+}
+
+#[test]
+fn keys_that_are_not_known_or_not_there() {
+    check(
+        "keys",
+        &[
+            design("no [study]", "[study]\nname = \"loop\"\n", ""),
+            design("a study without a name", "name = \"loop\"", ""),
+            design("no criteria", &DESIGN[DESIGN.find("[criteria]").unwrap()..], ""),
+            design("an empty table of criteria", &DESIGN[DESIGN.find("overshoot =").unwrap()..], ""),
+            Case::new("no model", &DESIGN[..DESIGN.find("[models").unwrap()]),
+            design("an unknown table", "[cases]", "[case]"),
+            design("an unknown key of the study", "name = \"loop\"", "name = \"loop\"\nsed = 7"),
+            design("an unknown key of a tuner", "max = 20.0, unit", "max = 20.0, units"),
+            design("an unknown option of a criterion", "band = 0.01", "bnd = 0.01"),
+            design("an unknown option deep in a model", "gain = 1.0", "gains = 1.0"),
+            design("an unknown key beside a criterion's kind", "demand = 0.10", "demnd = 0.10"),
+            calibration("an unknown key of a channel", "noise = 0.003", "sigma = 0.003"),
+            design("a misspelt kind of model", "[models.loop.pid-loop]", "[models.loop.pid]"),
+            design("a misspelt kind of criterion", "{ overshoot     =", "{ overshot      ="),
+            design("a misspelt kind of solver", "[cases]", "[solver.sqpp]\n[cases]"),
+            design("a model without a kind", "[models.loop.pid-loop]\nplant", "[models.loop.parameters]\nk"),
+            design("a criterion without a kind", "overshoot     = { signal = \"y\", target = 1.0 },", ""),
+            design("a criterion of two kinds", "{ overshoot     =", "{ peak = { signal = \"u\" }, overshoot ="),
+            design("a criterion without a signal", "signal = \"y\", target = 1.0 },", "target = 1.0 },"),
+            design("a model without a horizon", "horizon = \"60 s\"", ""),
+            calibration("an experiment without a file", "file     = \"swing.csv\"", ""),
+            calibration("a channel without a column", "column = \"pendulum\", ", ""),
+        ],
+    );
+}
+
+#[test]
+fn values_of_the_wrong_type() {
+    check(
+        "types",
+        &[
+            design("a text for a number", "name = \"loop\"", "name = \"loop\"\nseed = \"seven\""),
+            design("a number for a text", "name = \"loop\"", "name = 7"),
+            design("a number for a table", "{ p = 0.0 }", "0.0"),
+            design("a number for a tuner", "{ start = 1.0, min = 0.01, max = 10.0, unit = \"s\" }", "1.0"),
+            design("a text for a table", "{ signal = \"y\", target = 1.0 },", "\"y\","),
+            design("a list for a number", "demand = 0.10", "demand = [0.10]"),
+            design("a list for a quantity of a tuner", "max = 20.0", "max = [20.0, 30.0]"),
+            design("a number for a list", "[\"p\", -4.0, -1.0]", "-4.0"),
+            design("a list of the wrong things", "[\"p\", -4.0, -1.0]", "[\"p\", true, -1.0]"),
+            design("a list that is too short", "horizon =", "limit = [1.0]\nhorizon ="),
+            design("a word for yes or no", "unit = \"s\" }\nTd", "active = \"no\" }\nTd"),
+            design("a fraction for a whole number", "name = \"loop\"", "name = \"loop\"\nseed = 1.5"),
+            design("a negative number of steps", "horizon =", "tolerance = { max-steps = -1 }\nhorizon ="),
+            design("a word that is no usage", "demand = 0.10", "demand = 0.10, usage = \"minimize\""),
+            design("a word that is no scale", "scale = \"log\"", "scale = \"cubic\""),
+            calibration("a word that is no role", "free     =", "role     = \"training\"\nfree     ="),
+            calibration("a word that is no task", "\"calibration\"", "\"identification\""),
+            design("a word for a quantity", "demand = 0.10", "demand = \"small\""),
+            design("an unknown unit in a quantity", "\"15 s\"", "\"15 sec\""),
+            design("an unknown unit of a tuner", "max = 20.0, unit = \"s\"", "max = 20.0, unit = \"seconds\""),
+            design("an input that is a number", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = 1.0 } }"),
+            design(
+                "an input that moves in no known way",
+                "{ p = 0.0 }",
+                "{ p = 0.0, inputs = { d = { ramp = 1.0 } } }",
+            ),
+            design("an input that does not move", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = {} } }"),
+            design("a step without a value", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = { step = { time = 1.0 } } } }"),
+            calibration("free states that are a text", "[\"theta\"]", "\"theta\""),
+            calibration("a column that is a number", "\"torque\"", "4"),
+            design("a date for a name", "name = \"loop\"", "name = 2026-01-01"),
+        ],
+    );
+}
+
+#[test]
+fn names_that_mean_nothing() {
+    check(
+        "names",
+        &[
+            design("an unknown signal", "signal = \"y\", target = 1.0 },", "signal = \"Y1\", target = 1.0 },"),
+            design("a tuner that no model knows", "Ti = {", "Tn = {"),
+            design("a tuner that no model knows, and nothing else of it", "Ti = {", "Tn = { start = 1.0 }\nTi = {"),
+            design("a parameter that no model knows", "{ p = 0.0 }", "{ p = 0.0, q = 1.0 }"),
+            design("a model's value for no parameter", "[tuners]", "[models.loop.parameters]\nTf = 1.0\n[tuners]"),
+            calibration("an experiment's value for no parameter", "free     =", "parameters = { e = 1.0 }\nfree     ="),
+            design("a criterion of an unknown model", "demand = 0.10", "demand = 0.10, model = \"lopp\""),
+            design(
+                "a criterion in an unknown case",
+                "demand = 0.10",
+                "demand = 0.10, cases = [\"nominal\", \"worst\"]",
+            ),
+            design(
+                "two models and a criterion that names none",
+                "[tuners]",
+                "[models.other.pid-loop]\nplant = { poles = [-1.0] }\nhorizon = 9\n[tuners]",
+            ),
+            design("a parameter without a value", "{ p = 0.0 }", "{}"),
+            design("an input that no model has", "{ p = 0.0 }", "{ p = 0.0, inputs = { w = { constant = 1.0 } } }"),
+            calibration("a recorded input that no model has", "inputs   = { u =", "inputs   = { tau ="),
+            calibration("a channel for no signal", "channels = { phi =", "channels = { phy ="),
+            calibration("a free state that no model has", "[\"theta\"]", "[\"theta\", \"omega\"]"),
+            calibration("a case and an experiment of one name", "[criteria]", "[cases]\nswing = {}\n[criteria]"),
+            calibration("a fit to what nothing measures", "signal = \"theta\"", "signal = \"dphi\""),
+            calibration(
+                "a fit in a case without a measurement",
+                "[criteria]\ntheta = { ",
+                "[cases]\nrest = { horizon = 1 }\n[criteria]\ntheta = { cases = [\"rest\"], ",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn tuners_that_cannot_be_tuned() {
+    check(
+        "tuners",
+        &[
+            design("a start value outside the bounds", "start = 2.0", "start = 25.0"),
+            design("no start value", "start = 2.0, ", ""),
+            design("no bounds", "min = 0.2,  max = 20.0, ", ""),
+            design("no upper bound", "max = 20.0, ", ""),
+            design("bounds the wrong way round", "min = 0.2,  max = 20.0", "min = 20.0, max = 0.2"),
+            design("bounds that are equal", "min = 0.2,  max = 20.0", "min = 2.0,  max = 2.0"),
+            design("a bound that is not a number", "max = 20.0", "max = nan"),
+            design("a logarithmic range from zero", "min = 0.1, ", "min = 0.0, "),
+            design("a bound without meaning for the parameter", "min = 0.2", "min = 0.0"),
+            design("a bound in a unit that does not fit", "max = 20.0", "max = \"20 m\""),
+            design("a unit that does not fit the parameter", "max = 20.0, unit = \"s\"", "max = 20.0, unit = \"m\""),
+            design("a list of one value", "min = 0.2,  max = 20.0", "values = [2.0]"),
+            design("a tie to no tuner", "Td = { start = 1.0, min = 0.01, max = 10.0,", "Td = { tie = \"Tj/4\","),
+            design("a tie to a later tuner", "Ti = { start = 2.0, min = 0.2,  max = 20.0,", "Ti = { tie = \"4*Td\","),
+            design(
+                "a tie that is no expression",
+                "Td = { start = 1.0, min = 0.01, max = 10.0,",
+                "Td = { tie = \"Ti 4\",",
+            ),
+            design("a tie that ends early", "Td = { start = 1.0, min = 0.01, max = 10.0,", "Td = { tie = \"Ti/\","),
+            design("a value of a case without meaning", "{ p = 0.0 }", "{ p = 0.0, Ti = -1.0 }"),
+            calibration("a value of a model without meaning", "b = 2e-3", "b = -2e-3"),
+            calibration("a value of a model in a unit that does not fit", "b = 2e-3", "b = \"2e-3 kg\""),
+        ],
+    );
+}
+
+#[test]
+fn demands_that_cannot_be_met_or_missed() {
+    check(
+        "demands",
+        &[
+            design("a demand of zero", "demand = 0.10", "demand = 0.0"),
+            design("a negative demand", "demand = 0.10", "demand = -0.10"),
+            design("no demand", ", band = 0.01 }, demand = \"15 s\"", " }"),
+            design("good without bad", "demand = 0.10", "good = 0.10"),
+            design("bad without good", "demand = 0.10", "bad = 0.10"),
+            design("good and bad alike", "demand = 0.10", "good = 0.10, bad = 0.10"),
+            design("a demand beside good and bad", "demand = 0.10", "demand = 0.1, good = 0.0, bad = 0.1"),
+            design("a demand in a unit that does not fit", "\"15 s\"", "\"15 m\""),
+            design("a weight of zero", "demand = 0.10", "demand = 0.10, weight = 0.0"),
+            design("an option in a unit that does not fit", "target = 1.0 }, ", "target = \"1 rad/s\" }, "),
+            design("a band of zero", "band = 0.01", "band = 0.0"),
+        ],
+    );
+}
+
+#[test]
+fn models_that_cannot_be_simulated() {
+    check(
+        "models",
+        &[
+            design("a plant that is not strictly proper", "gain = 1.0", "zeros = [-1.0, -2.0, -3.0]"),
+            design("a plant given in neither way", "poles = [\"p\", -4.0, -1.0], gain", "gain"),
+            design("a plant given in half a way", "poles = [\"p\", -4.0, -1.0], gain = 1.0", "numerator = [1.0]"),
+            design("a plant's parameter called as the controller's", "\"p\", -4.0", "\"Ti\", -4.0"),
+            design("a negative horizon", "\"60 s\"", "\"-60 s\""),
+            design("a horizon of zero in a case", "{ p = 0.0 }", "{ p = 0.0, horizon = 0 }"),
+            design("a horizon that is no time", "\"60 s\"", "\"60 m\""),
+            design("a tolerance out of range", "horizon =", "tolerance = { relative = 2.0 }\nhorizon ="),
+            design("limits the wrong way round", "horizon =", "limit = [1.0, -1.0]\nhorizon ="),
+            Case::new("a model that never ends", &broken(CALIBRATION, "furuta]", "furuta]\nhorizon = -5"))
+                .with("swing.csv", RECORDING),
+            calibration(
+                "a case without a horizon",
+                "[criteria]",
+                "[cases.rest]\n[criteria]\nhighest = { peak = { signal = \"phi\" }, cases = [\"rest\"], demand = 1.0 }",
+            ),
+            design("a run of no evaluation", "[cases]", "[solver]\nmax-evaluations = 0\n[cases]"),
+        ],
+    );
+}
+
+#[test]
+fn experiments_that_do_not_fit_their_data() {
+    check(
+        "experiments",
+        &[
+            calibration("a file that is not there", "swing.csv", "swings.csv"),
+            calibration("a file that is a folder", "swing.csv", "data").with("data/swing.csv", RECORDING),
+            calibration("a column that is not there", "\"pendulum\"", "\"pendulm\""),
+            calibration("a time column that is not there", "free     =", "time = \"clock\"\nfree     ="),
+            calibration("a time column in a unit that is no time", "free     =", "time-unit = \"rad\"\nfree     ="),
+            calibration("a time in a unit that is no time", "free     =", "from = \"2 m\"\nfree     ="),
+            calibration("a start after the end of the file", "free     =", "from = \"2 s\"\nfree     ="),
+            calibration("an end that leaves one sample", "free     =", "to = 0.01\nfree     ="),
+            calibration("every sample skipped", "free     =", "skip = 4\nfree     ="),
+            calibration("an experiment that measures nothing", "channels = {", "channels = {}\n# {"),
+            calibration("a noise of zero", "noise = 0.003", "noise = 0.0"),
+            calibration("a noise in a unit that does not fit", "noise = 0.003", "noise = \"3 mm\""),
+            calibration("a unit that does not fit the signal", "noise = 0.003", "unit = \"N m\""),
+            calibration("a column of another kind than its signal", "phi = \"arm\"", "phi = \"torque\""),
+            calibration("a column of another kind than its input", "u = \"torque\"", "u = \"arm\""),
+            calibration(
+                "a free state of which nothing is measured",
+                ", theta = { column = \"pendulum\", noise = 0.003 }",
+                "",
+            ),
+            calibration(
+                "a free start value outside its bounds",
+                "[\"theta\"]",
+                "{ theta = { start = 3.0, min = 4.0, max = 5.0 } }",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn recordings_that_are_damaged() {
+    check(
+        "recordings",
+        &[
+            data_file("an empty file", "empty.csv", ""),
+            recording("a header and nothing else", &RECORDING[RECORDING.find('\n').unwrap()..], "\n"),
+            recording("a text in a column of numbers", "0.003", "0.oo3"),
+            recording("an infinite number", "0.003", "inf"),
+            recording("a row with too few cells", "2.96,0.1", "2.96"),
+            recording("a row with too many cells", "2.96,0.1", "2,96,0.1"),
+            recording("two columns of one name", "torque[N*m]", "arm[rad]"),
+            recording("an unknown unit in the header", "pendulum[rad]", "pendulum[counts]"),
+            recording("an unknown unit of the time", "t[s]", "t[ticks]"),
+            recording("no column that is called time", "t[s]", "clock[s]"),
+            recording("a gap in the time", "0.10,0.003", "nan,0.003"),
+            recording("a time that does not increase", "0.10,0.003", "0.05,0.003"),
+            recording("a gap in an input", "2.96,0.1", "2.96,"),
+            recording(
+                "a column of gaps",
+                "3.00,0.0\n0.05,0.001,2.99,0.1\n0.10,0.003,2.96,0.1\n0.15,0.006,2.91",
+                ",0\n1,1,,1\n2,2,,2\n3,3,",
+            ),
+            recording(
+                "a column of words",
+                "3.00,0.0\n0.05,0.001,2.99,0.1\n0.10,0.003,2.96,0.1\n0.15,0.006,2.91",
+                "up,0\n1,1,up,1\n2,2,up,2\n3,3,down",
+            ),
+            data_file("a MATLAB file that is cut off", "cut.mat", &matlab_level_4()[..30]),
+            data_file("a MATLAB file of level 5 that is cut off", "cut.mat", matlab_level_5_cut_off()),
+            data_file("a MATLAB file of level 7.3", "new.mat", matlab_level_7_3()),
+            data_file("a MATLAB file without the column", "old.mat", matlab_level_4()),
+            data_file(
+                "a MATLAB file by its name only",
+                "swing.mat",
+                "The recording of Tuesday\nis on the other computer.\n",
+            ),
+            data_file("bytes of another program", "swing.bin", b"\x7fELF\x02\x01\x01\x00\x00\x00\x00"),
+            data_file(
+                "bytes that are no text, without a zero",
+                "swing.dat",
+                b"\x8a\x01\xff\xfe\x03\x1b[31m\x90\x07\n\xc3\x28",
+            ),
+            data_file("a text in Latin-1", "swing.csv", b"t,arm,pendulum,torque\n# gr\xfcn\n"),
+            data_file("a text in UTF-16", "swing.csv", b"\xff\xfet\x00,\x00a\x00\n\x00"),
+        ],
+    );
+}
+
+#[test]
+fn a_command_line_that_asks_for_what_is_not_there() {
+    check(
+        "command-line",
+        &[
+            called("no such study, but a shipped one of nearly that name", &["run", "pid-desing"]),
+            called("no such study file", &["check", "loop/study.toml"]),
+            Case::new("a folder without a study", DESIGN).with("empty/notes.txt", "").called(&["check", "empty"]),
+            called("a setting that is no value", &["check", "study.toml", "--set", "tuners.Ti.start=fast"]),
+            called("a setting without a value", &["check", "study.toml", "--set", "tuners.Ti.start"]),
+            called("a setting of an unknown key", &["check", "study.toml", "--set", "tuners.Ti.strat=2.0"]),
+            called("a setting of an unknown tuner", &["check", "study.toml", "--set", "tuners.Tj.start=2.0"]),
+            called("a setting of the wrong type", &["check", "study.toml", "--set", "tuners.Ti.start=true"]),
+            called(
+                "a setting out of bounds, the second",
+                &["check", "study.toml", "--set", "study.seed=3", "--set", "tuners.Ti.start=\"30 s\""],
+            ),
+            called("an unknown solver", &["run", "study.toml", "--solver", "levenberg"]),
+            called("a solver that cannot do it", &["run", "pid-design", "--quiet", "--solver", "levenberg-marquardt"]),
+            called("no evaluation", &["run", "study.toml", "--max-evaluations", "0"]),
+            called("an unknown tuner", &["simulate", "study.toml", "--at", "Tx=1"]),
+            called("a tuner without a value", &["simulate", "study.toml", "--at", "Ti"]),
+            called("a tuner's value that is no number", &["simulate", "study.toml", "--at", "Ti=slow"]),
+            called("a tuner's value in a unit that does not fit", &["simulate", "study.toml", "--at", "Ti=2 m"]),
+            called("an unknown case", &["simulate", "study.toml", "--case", "nominl"]),
+            Case::new("a folder that is already there", DESIGN).with("mine/study.toml", "").called(&["new", "mine"]),
+            called("a copy of an unknown study", &["new", "mine", "--from", "furuta"]),
+            called("a kind that is not there", &["describe", "settle-time"]),
+            called("a data file that is not there", &["data", "swing.csv"]),
+            called("an unknown command", &["rum", "study.toml"]),
+        ],
+    );
+}
+
+/// `mops` points at the last place of `wrong` in the file, line and column counted in characters from 1.
+fn points_at(case: &Case, file: &str, wrong: &str) {
+    let text = std::str::from_utf8(&case.files[file]).unwrap();
+    let before = &text[..text.rfind(wrong).unwrap()];
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().unwrap().chars().count() + 1;
+    let (place, message) = (format!("[{file}:{line}:{column}]"), case.message());
+    assert!(message.contains(&place), "{}: not at {place}\n{message}", case.what);
+}
+
+#[test]
+fn the_second_of_two_like_places_is_pointed_at_where_it_is_the_wrong_one() {
+    let bounds = design("the bounds of the second tuner", "min = 0.01, max = 10.0", "min = 30.0, max = 20.0");
+    points_at(&bounds, "study.toml", "20.0");
+    let signal = design("the signal of the second criterion", "\"y\", target = 1.0, band", "\"k\", target = 1.0, band");
+    points_at(&signal, "study.toml", "\"k\"");
+    let element =
+        design("the second element of a list", "demand = 0.10", "cases = [\"nominal\", \"p\"], demand = 0.10");
+    points_at(&element, "study.toml", "\"p\"");
+    let kind = design("the second pole", "[\"p\", -4.0, -1.0]", "[\"p\", [-4.0], [-1.0, 0.0]]");
+    points_at(&kind, "study.toml", "[-4.0]");
+    let cell = recording("the same text in two cells", "0.10,0.003,2.96,0.1", "0.05,0.003,2.96,0.1");
+    points_at(&cell, "swing.csv", "0.05");
+}
+
+#[test]
+fn columns_count_characters_whatever_stands_before_them() {
+    let above = design("characters above", "[cases]", "# Die Fälle: Größe, 大きさ\n[cases]\nbeide = { q = 1.0 }");
+    points_at(&above, "study.toml", "q = 1.0");
+    let before = design("characters before", "nominal = { p = 0.0 }", "\"größer, 大\" = { p = true }");
+    points_at(&before, "study.toml", "true");
+    let row =
+        data_file("characters in a row", "swing.csv", "größe,t\n\"früh, 早い\",0\n\"spät\",x\n\"später, 後\",1.O\n");
+    points_at(&row, "swing.csv", "x");
+}
+
+#[test]
+fn a_study_written_on_windows_is_read_and_pointed_into() {
+    let windows = broken(DESIGN, "demand = 0.10", "demand = -0.10").replace('\n', "\r\n");
+    points_at(&Case::new("line ends of Windows", &windows), "study.toml", "-0.10");
+    let marked = Case::new("a byte order mark", &format!("\u{feff}{}", broken(DESIGN, "name = \"loop\"", "name = 7")));
+    assert!(marked.message().contains("[study.toml:2:8]"), "{}", marked.message());
+}
