@@ -86,6 +86,7 @@ fn pareto(run: &Run<'_>, stop: Stop) -> Pareto {
     let problem = run.problem();
     match run.best().filter(|best| best.merit.is_feasible()) {
         None => Pareto::NotShown,
+        Some(_) if stop == Stop::Interrupted => Pareto::NotShown,
         // A minimum of a sum with positive weights is Pareto-optimal.
         Some(_) if problem.shape().objective == Objective::Sum && stop == Stop::Converged => Pareto::CertifiedLocal,
         Some(best) => {

@@ -76,6 +76,52 @@ fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study
     .unwrap()
 }
 
+/// A sum of squares with its residuals: the distance of `(x0, x1)` from the line of the data `2 t + 0.5`.
+#[derive(Clone)]
+struct Line;
+
+impl CriterionSpec for Line {
+    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+        Ok(Box::new(self.clone()))
+    }
+}
+
+impl Criterion for Line {
+    fn unit(&self) -> Unit {
+        Unit::one()
+    }
+    fn signals(&self) -> Vec<String> {
+        vec!["f0".into(), "f1".into()]
+    }
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let (slope, offset) = (analysis.trace("f0").last(), analysis.trace("f1").last());
+        let residual = |i: u32| {
+            let t = f64::from(i) / 10.0;
+            slope * t + offset - (2.0 * t.min(1.5) + 0.5)
+        };
+        Ok(Value::sum_of_squares((0..30).map(residual).collect()))
+    }
+}
+
+/// A least-squares problem in two tuners, whose simulations fail where `f` says.
+fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
+    let interface = Interface {
+        signals: ["f0", "f1"].map(|name| Variable::new(name, "1", "coordinate")).to_vec(),
+        parameters: ["x0", "x1"].map(|name| Parameter::new(name, "1", "coordinate")).to_vec(),
+        horizon: Some(1.0),
+        ..Interface::default()
+    };
+    let study = Draft {
+        name: "line".into(),
+        task: mops::Task::Calibration,
+        models: vec![("function".into(), Function { interface, f }.into())],
+        tuners: ["x0", "x1"].map(|name| (name.into(), TunerDraft::new(-1.5, -2.0, 2.0))).into(),
+        criteria: vec![("line".into(), CriterionDraft::minimise(Line, 1.0))],
+        ..Draft::default()
+    };
+    Problem::new(Arc::new(study.build().unwrap()))
+}
+
 /// Every kind of solver that accepts the study.
 fn solvers(problem: &Problem) -> Vec<SolverKind> {
     let mut kinds = mops::catalogue().solvers;
@@ -261,4 +307,58 @@ fn failures_are_counted_in_the_result() {
     assert!(outcome.worst_scaled < 1.2501, "{}", outcome.worst_scaled);
     assert_eq!((outcome.failures.len(), outcome.failures[0].failure.as_str()), (1, "diverged"));
     assert!(outcome.failures[0].count >= 1);
+}
+
+#[test]
+fn every_kind_of_solver_takes_part() {
+    let design = Problem::new(Arc::new(study(2, MINIMISE, kink)));
+    let least_squares = line(|x| Some(x.to_vec()));
+    let taking_part = [solvers(&design), solvers(&least_squares)].concat();
+    for kind in mops::catalogue().solvers {
+        assert!(taking_part.iter().any(|k| k.name == kind.name), "{}", kind.name);
+    }
+}
+
+#[test]
+fn every_solver_fits_a_line_as_the_normal_equations_do() {
+    let problem = line(|x| Some(x.to_vec()));
+    // The normal equations of the 30 points, solved by hand.
+    let points: Vec<(f64, f64)> = (0..30).map(|i| f64::from(i) / 10.0).map(|t| (t, 2.0 * t.min(1.5) + 0.5)).collect();
+    let sum = |f: &dyn Fn(f64, f64) -> f64| points.iter().map(|&(t, y)| f(t, y)).sum::<f64>();
+    let (n, t, tt, y, ty) = (30.0, sum(&|t, _| t), sum(&|t, _| t * t), sum(&|_, y| y), sum(&|t, y| t * y));
+    let slope = (n * ty - t * y) / (n * tt - t * t);
+    let offset = (y - slope * t) / n;
+    let least = sum(&|t, y| (slope * t + offset - y).powi(2));
+    for kind in solvers(&problem) {
+        let best = solve(&problem, &kind, 5000, &()).best;
+        assert!(best.merit.objective <= least * 1.001, "{}: {} {least}", kind.name, best.merit.objective);
+        assert!(best.merit.objective >= least * (1.0 - 1e-12), "{}", kind.name);
+    }
+}
+
+#[test]
+fn least_squares_keep_budget_box_and_bits_and_survive_failures() {
+    let problem = line(|x| if x[0] < -1.0 && x[1] < 0.0 { None } else { Some(x.to_vec()) });
+    for kind in solvers(&problem) {
+        for budget in [1, 3, 40] {
+            assert!(solve(&problem, &kind, budget, &()).points.len() <= budget, "{}", kind.name);
+        }
+        let solved = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| solve(&problem, &kind, 2000, &()))
+        });
+        assert!(solved[0].points == solved[1].points, "{}", kind.name);
+        assert!(solved[0].points.iter().flatten().all(|x| (-2.0..=2.0).contains(x)), "{}", kind.name);
+        assert!(solved[0].best.merit.objective < 5.7, "{}: {:?}", kind.name, solved[0].best.merit);
+    }
+}
+
+#[test]
+fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
+    // The second value is NaN wherever x0 < 1: no value there, but it is only watched.
+    let f = |x: &[f64]| Some(vec![x[0] * x[0], if x[0] < 1.0 { f64::NAN } else { 0.0 }]);
+    let problem = Problem::new(Arc::new(study(1, &[Usage::Minimise, Usage::Monitor], f)));
+    let evaluation = problem.evaluate(&[0.5]);
+    assert_eq!(evaluation.merit.objective, 0.0);
+    assert!(evaluation.readings[1].is_none() && evaluation.failures.len() == 1);
 }

@@ -242,20 +242,23 @@ fn an_interrupt_ends_the_run_with_the_best_point_on_disk() {
     // A swarm far too large to finish.
     let program = assert_cmd::cargo::cargo_bin!("mops");
     let mut child = std::process::Command::new(program)
-        .args(["run", "pid-design-multi-case", "--quiet", "--max-evaluations", "100000000"])
+        .args(["run", "pid-design-multi-case", "--max-evaluations", "100000000"])
         .args(["--set", "solver.particle-swarm.max-iterations=100000000", "--out"])
         .arg(&out)
+        .stdout(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    // The run has begun once its handler is set; an interrupt before that ends it without a result, so it is asked for
-    // until the process has ended.
-    let result = out.join("result.json");
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    let kill = || std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(kill().success());
+    // The first line is printed once the program listens.
+    let mut line = String::new();
+    let mut stdout = std::io::BufReader::new(child.stdout.take().unwrap());
+    std::io::BufRead::read_line(&mut stdout, &mut line).unwrap();
+    assert!(line.starts_with("pid-design-multi-case"), "{line}");
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut stdout, &mut rest).unwrap();
     let status = child.wait().unwrap();
     assert!(matches!(status.code(), Some(0 | 1)), "{status:?}");
-    let result: Value = serde_json::from_slice(&std::fs::read(result).unwrap()).unwrap();
+    let result: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
     assert_eq!(result["stop"], "interrupted");
-    assert!(result["evaluations"].as_u64().unwrap() > 10);
+    assert!(result["evaluations"].as_u64().unwrap() >= 1);
 }

@@ -51,8 +51,9 @@ impl Criterion for Bound {
         let jump = trace.largest_jump();
         if jump > ROUNDING * trace.maximum().0.max(-trace.minimum().0) {
             return Err(format!(
-                "`{}` jumps by {jump} {}, where its rate is infinite: read a continuous signal, or filter this one",
-                self.signal.name, self.signal.unit
+                "`{}` jumps by {}, where its rate is infinite: read a continuous signal, or filter this one",
+                self.signal.name,
+                self.signal.unit.amount(jump)
             ));
         }
         let rate = trace.derivative();

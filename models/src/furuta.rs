@@ -197,7 +197,8 @@ const SPEED: [usize; 2] = [3, 1];
 impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
     type State = [S; 4];
 
-    #[inline]
+    // At each of the six stages of a step: as calls they would cost a fifth of a simulation.
+    #[inline(always)]
     fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {
         let (coupling, arm, [mut pendulum_force, mut arm_force]) = self.terms(t, x);
         pendulum_force -= self.coulomb[0] * self.contact[0].sign();

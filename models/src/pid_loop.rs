@@ -465,6 +465,10 @@ impl<S: Scalar> Sampled<S> {
     fn pass(&mut self, t: f64, controller: &Controller<S>, limit: [f64; 2], r: f64, y: S) {
         let Sampling { period, delay } = self.sampling;
         let due = |time: f64| time <= t + 1e-12 * period;
+        // With a delay the output of an earlier sample is due before this one is taken.
+        if delay > 0.0 && due(self.next_output * period + delay) {
+            self.act();
+        }
         if due(self.next_sample * period) {
             self.next_sample += 1.0;
             let Controller { k, ti, td, nd, wp, wd, tracking } = *controller;
@@ -481,10 +485,14 @@ impl<S: Scalar> Sampled<S> {
                 self.integral += (self.computed - wanted) / tracking * period;
             }
         }
-        if due(self.next_output * period + delay) {
-            self.next_output += 1.0;
-            self.acting = self.computed;
+        if delay == 0.0 {
+            self.act();
         }
+    }
+
+    fn act(&mut self) {
+        self.next_output += 1.0;
+        self.acting = self.computed;
     }
 }
 

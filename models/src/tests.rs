@@ -121,6 +121,12 @@ fn a_sampled_controller_acts_after_its_delay() {
     let response = respond(model.as_ref(), &Case::default(), &[("k", 2.0), ("Ti", 1.0), ("Td", 0.0)], 1.0);
     let u = response.trace("u").unwrap();
     assert_eq!((u.at(0.03), u.at(0.05)), (0.0, 2.0));
+    // A whole period of delay: the first output acts from the second sample to the third.
+    let model = pid("plant = { poles = [-1.0] }\nhorizon = 1.0\nsample-time = 0.1\ndelay = 0.1");
+    let response = respond(model.as_ref(), &Case::default(), &[("k", 2.0), ("Ti", 1.0), ("Td", 0.0)], 1.0);
+    let u = response.trace("u").unwrap();
+    assert_eq!((u.at(0.09), u.at(0.11), u.at(0.19)), (0.0, 2.0, 2.0));
+    assert!(u.at(0.21) > 2.0, "the second sample's integral has grown");
 }
 
 /// Lumped parameters from table 4.5 of the thesis, before its rounding.

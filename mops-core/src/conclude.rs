@@ -41,7 +41,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let mut warnings = study.warnings.clone();
 
     for case in 0..study.cases.len() {
-        if study.cases[case].role() == Role::Calibration {
+        if study.cases[case].role() == Role::Calibration || ending.stop == Stop::Interrupted {
             continue;
         }
         let part = Problem::of_case(Arc::clone(&study), case, &best.tuners);
@@ -65,11 +65,12 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let failures = run
         .failures()
         .iter()
-        .map(|(job, kind, count)| FailureReport {
-            model: study.models[study.jobs[*job].model].0.clone(),
-            case: study.cases[study.jobs[*job].case].name.clone(),
-            failure: (*kind).to_owned(),
-            count: *count,
+        .map(|failed| FailureReport {
+            model: study.models[study.jobs[failed.job].model].0.clone(),
+            case: study.cases[study.jobs[failed.job].case].name.clone(),
+            failure: failed.first.kind().to_owned(),
+            first: failed.first.to_string(),
+            count: failed.count,
         })
         .collect();
     let outcome = Outcome {
@@ -125,12 +126,13 @@ fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport>
     let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
     let slopes = probe.linearise(&problem.point_of(&best.tuners), 1.0).ok().flatten();
     let n = active.len();
-    let errors = slopes.filter(|l| !l.at.residuals.is_empty() && n > 0).map(|l| {
+    // As many parameters as samples leave nothing to judge the noise by.
+    let errors = slopes.filter(|l| n > 0 && l.at.residuals.len() > n).map(|l| {
         let m = l.at.residuals.len();
         let columns: Vec<DVector<f64>> = l.residuals.into_iter().map(DVector::from_vec).collect();
         let j = DMatrix::from_columns(&columns);
         #[allow(clippy::cast_precision_loss)]
-        let variance = l.at.merit.objective / m.saturating_sub(n).max(1) as f64;
+        let variance = l.at.merit.objective / (m - n) as f64;
         // Scaled to unit columns first, so that rank is judged free of units.
         let norms: Vec<f64> = j.column_iter().map(|c| c.norm()).collect();
         let scaled = DMatrix::from_fn(m, n, |i, k| if norms[k] > 0.0 { j[(i, k)] / norms[k] } else { 0.0 });
@@ -169,7 +171,8 @@ fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport>
             name: tuner.name.clone(),
             value,
             std_error: error,
-            interval95: [value - half, value + half],
+            // What lies beyond a bound was excluded beforehand.
+            interval95: [(value - half).max(tuner.bounds[0]), (value + half).min(tuner.bounds[1])],
             unit: tuner.unit.to_string(),
         }
     };

@@ -41,7 +41,7 @@ pub use outcome::{
 };
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
 pub use random::{Stream, stream};
-pub use run::{Budget, Record, Run, State as RunState, Watch};
+pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{

@@ -151,7 +151,7 @@ pub struct ParameterReport {
     pub value: f64,
     /// Standard error to first order, for white residuals; null where the data do not tell.
     pub std_error: f64,
-    /// Estimate +- 1.96 standard errors.
+    /// Estimate +- 1.96 standard errors, within the bounds.
     pub interval95: [f64; 2],
     /// Unit of all of these.
     pub unit: String,
@@ -190,8 +190,10 @@ pub struct FailureReport {
     pub model: String,
     /// The case.
     pub case: String,
-    /// Why.
+    /// Kind of failure.
     pub failure: String,
+    /// The first of them, in words.
+    pub first: String,
     /// How often.
     pub count: usize,
 }

@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
+use rand::Rng;
 use rayon::prelude::*;
 
 use crate::criterion::{Demand, Usage, Value};
 use crate::experiment::Role;
 use crate::model::{Analysis, Failure, Job};
+use crate::random::stream;
 use crate::solver::Shape;
 use crate::study::{Objective, Row, Study};
+use crate::tuner::Tuner;
 
 /// Constraints count as satisfied up to this much of their scaled value.
 pub const FEASIBLE: f64 = 1e-6;
@@ -84,6 +87,9 @@ impl Merit {
     }
 }
 
+/// A row, by index, with its value or why it has none.
+type RowValue = (usize, Result<Value, String>);
+
 impl Problem {
     /// The problem of the study itself: tuners of the study and of its calibration cases; the other cases are watched.
     pub fn new(study: Arc<Study>) -> Self {
@@ -96,10 +102,14 @@ impl Problem {
         })
     }
 
-    /// The problem of one case alone: the tuners of that case are active, all others keep the values in `tuners`. This
-    /// is how start values are estimated again on data that must move no parameter.
+    /// The problem of one case alone: its free start values are active, all else keeps the values in `tuners`. This is how
+    /// start values are estimated again on data that must move no parameter.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
-        let active = (0..study.tuners.len()).filter(|&i| study.tuners[i].case == Some(case)).collect();
+        let starts: Vec<&str> =
+            study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect();
+        let moves =
+            |tuner: &Tuner| tuner.active && tuner.case == Some(case) && starts.contains(&tuner.parameter.as_str());
+        let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
         });
@@ -117,12 +127,17 @@ impl Problem {
         problem
     }
 
-    /// Length of the residual vector, from one evaluation: a criterion knows it only once it has seen its data.
+    /// Length of the residual vector, from an evaluation that succeeds: a criterion knows it only once it has seen its
+    /// data. Looked for at the start and, where that fails, at some points of the box.
     fn count_residuals(&self) -> usize {
         if self.shape.objective != Objective::Sum {
             return 0;
         }
-        self.evaluate(&self.start()).residuals.len()
+        let mut random = stream(self.study.seed, "residuals");
+        let elsewhere = (0..20).map(|_| self.active.iter().map(|_| random.random()).collect::<Vec<f64>>());
+        let mut points = std::iter::once(self.start()).chain(elsewhere);
+        let succeeds = points.find_map(|point| Some(self.evaluate(&point)).filter(|e| e.scaled.is_some()));
+        succeeds.map_or(0, |evaluation| evaluation.residuals.len())
     }
 
     /// The study.
@@ -193,7 +208,7 @@ impl Problem {
 
     fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>) -> Evaluation {
         let study = &self.study;
-        let values: Vec<Result<Vec<(usize, Value)>, Failure>> =
+        let values: Vec<Result<Vec<RowValue>, Failure>> =
             self.jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
         let mut readings = vec![None; study.rows.len()];
         let mut residuals = vec![Vec::new(); study.rows.len()];
@@ -202,9 +217,16 @@ impl Problem {
             match result {
                 Ok(values) => {
                     for (row, value) in values {
-                        let scaled = study.rows[row].demand.scale(value.number);
-                        readings[row] = Some(Reading { value: value.number, scaled, note: value.note });
-                        residuals[row] = value.residuals;
+                        match value {
+                            Ok(value) => {
+                                let scaled = study.rows[row].demand.scale(value.number);
+                                readings[row] = Some(Reading { value: value.number, scaled, note: value.note });
+                                residuals[row] = value.residuals;
+                            }
+                            Err(why) => {
+                                failures.push((job, Failure::Criterion(format!("{}: {why}", study.rows[row].name))))
+                            }
+                        }
                     }
                 }
                 Err(failure) => failures.push((job, failure)),
@@ -216,8 +238,8 @@ impl Problem {
         Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
     }
 
-    /// The values of all rows that read one job.
-    fn run_job(&self, job: usize, tuners: &[f64]) -> Result<Vec<(usize, Value)>, Failure> {
+    /// The values of all rows that read one job. A criterion without a value takes none from the others.
+    fn run_job(&self, job: usize, tuners: &[f64]) -> Result<Vec<RowValue>, Failure> {
         let study = &self.study;
         let plan = &study.jobs[job];
         let case = &study.cases[plan.case];
@@ -225,16 +247,11 @@ impl Problem {
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let analysis = study.models[plan.model].1.analyse(&request)?;
         let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        rows.map(|(index, row)| {
-            let value = row.criterion.value(case, &analysis);
-            let value = value.map_err(|why| Failure::Criterion(format!("{}: {why}", row.name)))?;
-            if value.number.is_finite() {
-                Ok((index, value))
-            } else {
-                Err(Failure::Criterion(format!("{} is not finite", row.name)))
-            }
-        })
-        .collect()
+        let value = |row: &Row| match row.criterion.value(case, &analysis) {
+            Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
+            other => other,
+        };
+        Ok(rows.map(|(index, row)| (index, value(row))).collect())
     }
 
     fn scaled(&self, readings: &[Option<Reading>]) -> Option<Vec<f64>> {

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::differences;
+use crate::model::Failure;
 use crate::problem::{Evaluation, Merit, Problem};
 use crate::random::{Stream, stream};
 use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
@@ -62,7 +63,18 @@ pub struct Run<'a> {
     cache: HashMap<Vec<u64>, Evaluation>,
     archive: Vec<Record>,
     best: Option<Evaluation>,
-    failures: Vec<(usize, &'static str, usize)>,
+    failures: Vec<FailureCount>,
+}
+
+/// Failures of one kind in one job.
+#[derive(Debug, Clone)]
+pub struct FailureCount {
+    /// The job, by index.
+    pub job: usize,
+    /// The first of them.
+    pub first: Failure,
+    /// How many.
+    pub count: usize,
 }
 
 impl<'a> Run<'a> {
@@ -98,8 +110,8 @@ impl<'a> Run<'a> {
         &self.archive
     }
 
-    /// Failed simulations: job, kind of failure, how often.
-    pub fn failures(&self) -> &[(usize, &'static str, usize)] {
+    /// What failed, by job and kind.
+    pub fn failures(&self) -> &[FailureCount] {
         &self.failures
     }
 
@@ -110,9 +122,9 @@ impl<'a> Run<'a> {
 
     fn record(&mut self, evaluation: &Evaluation) {
         for (job, failure) in &evaluation.failures {
-            match self.failures.iter_mut().find(|(j, kind, _)| j == job && *kind == failure.kind()) {
-                Some((_, _, count)) => *count += 1,
-                None => self.failures.push((*job, failure.kind(), 1)),
+            match self.failures.iter_mut().find(|f| f.job == *job && f.first.kind() == failure.kind()) {
+                Some(known) => known.count += 1,
+                None => self.failures.push(FailureCount { job: *job, first: failure.clone(), count: 1 }),
             }
         }
         self.archive.push(Record {

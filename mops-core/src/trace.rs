@@ -25,7 +25,7 @@ pub struct Piece {
 }
 
 impl Trace {
-    /// Number of points at which [`Trace::push`] wants the signal, at `s = 0, 1/4, 1/2, 3/4, 1`.
+    /// Where within a segment [`Trace::push`] wants the signal, as `s`.
     pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
     /// An empty trace that begins at `start`, with room for `segments`.
@@ -178,8 +178,8 @@ impl Trace {
         None
     }
 
-    /// The integral of `f(t, y)` over the trace, by five-point Gauss-Legendre quadrature on each monotone piece: exact
-    /// for polynomials in `y` up to the second degree, and for `|y - r|` when `r` is split at its crossing by the caller.
+    /// The integral of `f(t, y)` over the trace, by five-point Gauss-Legendre quadrature on each segment: exact for
+    /// `t^a y^b` with `a + 4 b <= 9`.
     pub fn integral(&self, f: impl Fn(f64, f64) -> f64) -> f64 {
         let mut sum = 0.0;
         for (segment, c) in self.segments.iter().enumerate() {

@@ -58,15 +58,16 @@ impl Tuner {
     pub fn value_at(&self, u: f64) -> f64 {
         let [min, max] = self.bounds;
         let u = u.clamp(0.0, 1.0);
-        match &self.grid {
+        let spread = |u: f64| match self.scale {
             // The ends are met to the bit, whatever the rounding between them.
             _ if u == 0.0 => min,
             _ if u == 1.0 => max,
-            Grid::Continuous => match self.scale {
-                Scale::Linear => min + u * (max - min),
-                Scale::Log => (min.ln() + u * (max / min).ln()).exp(),
-            },
-            Grid::Integer => (min + u * (max - min)).round(),
+            Scale::Linear => min + u * (max - min),
+            Scale::Log => (min.ln() + u * (max / min).ln()).exp(),
+        };
+        match &self.grid {
+            Grid::Continuous => spread(u),
+            Grid::Integer => spread(u).round().clamp(min, max),
             Grid::List(values) => values[self.index_at(u, values.len())],
         }
     }
@@ -147,6 +148,8 @@ mod tests {
     fn grids_are_kept() {
         let whole = Tuner { bounds: [1.0, 5.0], ..tuner(Scale::Linear, Grid::Integer) };
         assert_eq!((whole.value_at(0.3), whole.spacing()), (2.0, 0.25));
+        let wide = Tuner { bounds: [1.0, 100.0], ..tuner(Scale::Log, Grid::Integer) };
+        assert_eq!((wide.value_at(wide.position_of(4.0)), wide.value_at(1.0)), (4.0, 100.0));
         let list = Tuner { bounds: [1.0, 47.0], ..tuner(Scale::Linear, Grid::List(vec![1.0, 10.0, 22.0, 47.0])) };
         assert_eq!((list.value_at(0.4), list.position_of(20.0)), (10.0, 2.0 / 3.0));
     }

@@ -12,7 +12,8 @@ type Dimension = [i32; 7];
 /// A unit of measure: a product of powers of SI units, prefixes allowed (`kg m2`, `N m s/rad`, `mm/s^2`).
 ///
 /// Factors stand side by side or are joined by `*`; `/` divides by the one factor, or the parenthesis, after it; an
-/// exponent follows its unit, with or without `^`. The radian counts as 1, as in the SI.
+/// exponent follows its unit, with or without `^`. The radian counts as 1, as in the SI; a revolution is 2 pi of it, so that
+/// 1 Hz is 6.28 rad/s. `degC` is a difference of temperatures: no offset is applied.
 #[derive(Debug, Clone)]
 pub struct Unit {
     text: String,
@@ -37,9 +38,9 @@ const UNITS: &[(&str, Dimension, f64)] = &[
     ("h",    [0, 0, 1, 0, 0, 0, 0],   3600.0),
     ("A",    [0, 0, 0, 1, 0, 0, 0],   1.0),
     ("K",    [0, 0, 0, 0, 1, 0, 0],   1.0),
-    ("degC", [0, 0, 0, 0, 1, 0, 0],   1.0), // as a difference: no offset is applied
+    ("degC", [0, 0, 0, 0, 1, 0, 0],   1.0),
     ("mol",  [0, 0, 0, 0, 0, 1, 0],   1.0),
-    ("Hz",   [0, 0, -1, 0, 0, 0, 0],  1.0),
+    ("Hz",   [0, 0, -1, 0, 0, 0, 0],  2.0 * PI),
     ("rpm",  [0, 0, -1, 0, 0, 0, 0],  2.0 * PI / 60.0),
     ("N",    [1, 1, -2, 0, 0, 0, 0],  1.0),
     ("Pa",   [-1, 1, -2, 0, 0, 0, 0], 1.0),
@@ -111,6 +112,11 @@ impl Unit {
         Self::parse(text).expect("units in the program are spelled right")
     }
 
+    /// A number with this unit, as it stands in a sentence: `3 rad`; a pure number alone.
+    pub fn amount(&self, number: f64) -> String {
+        if self.text == "1" { number.to_string() } else { format!("{number} {self}") }
+    }
+
     /// Whether quantities in the two units can be compared.
     pub fn is_compatible(&self, other: &Self) -> bool {
         self.dimension == other.dimension
@@ -154,7 +160,12 @@ impl Unit {
 /// Reads one factor: a symbol or a parenthesis, with its exponent. Returns it and the rest of the text.
 fn factor(text: &str) -> Option<(Unit, &str)> {
     let (mut unit, rest) = if let Some(inner) = text.strip_prefix('(') {
-        let end = inner.find(')')?;
+        let mut depth = 1;
+        let closes = |c: char| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            depth == 0
+        };
+        let end = inner.find(closes)?;
         (Unit::parse(&inner[..end]).ok()?, &inner[end + 1..])
     } else {
         let end = text.find(|c: char| !(c.is_alphabetic() || c == '%')).unwrap_or(text.len());
@@ -292,6 +303,7 @@ mod tests {
     #[test]
     fn prefixes_and_other_units_convert() {
         assert_eq!(Unit::known("mm/ms").factor_to(&Unit::known("m/s")), Some(1.0));
+        assert_eq!(Unit::known("Hz").factor_to(&Unit::known("rad/s")), Some(2.0 * PI));
         assert_eq!(Unit::known("min").factor_to(&Unit::known("s")), Some(60.0));
         assert_eq!(Unit::known("m").factor_to(&Unit::known("s")), None);
     }
@@ -311,5 +323,6 @@ mod tests {
         assert_eq!(Unit::known("rad/s").power(2, 1).to_string(), "(rad/s)^2 s");
         assert_eq!(Unit::one().power(2, 1).to_string(), "s");
         assert_eq!(Unit::known("V").power(1, -1).to_string(), "V/s");
+        assert_eq!(Unit::known("(rad/s)^2").power(2, 1), Unit::known("s^-3"));
     }
 }

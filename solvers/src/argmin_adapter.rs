@@ -23,8 +23,14 @@ struct State<'a> {
 const HALTED: f64 = f64::NEG_INFINITY;
 
 impl<'a> Cost<'a> {
-    pub fn new(oracle: &'a mut dyn Oracle) -> Self {
-        Self { state: Mutex::new(State { oracle, halt: None, unit: None }) }
+    /// `unit` brings the objective to the order of 1; it is found from the first value where absent.
+    pub fn new(oracle: &'a mut dyn Oracle, unit: Option<f64>) -> Self {
+        Self { state: Mutex::new(State { oracle, halt: None, unit }) }
+    }
+
+    /// The factor of the objective.
+    pub fn unit(&self) -> Option<f64> {
+        self.state.lock().expect("nobody panics holding the lock").unit
     }
 
     /// Why the oracle stopped answering, if it did.

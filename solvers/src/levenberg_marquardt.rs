@@ -20,7 +20,7 @@ use crate::start::usable_start;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LevenbergMarquardtOptions {
-    /// Stop when a step promises, and brings, less than this part of the sum of squares.
+    /// Stop when a step promises less than this part of the sum of squares.
     pub tolerance: f64,
     /// Number of starts, the study's own included.
     pub starts: usize,
@@ -125,7 +125,7 @@ impl Solver for Local {
         let Some(step) = state.bounded_step() else { return Ok(Progress::Stalled) };
         let promised = sum - (&state.residuals + &state.jacobian * &step).norm_squared();
         if promised <= self.options.tolerance * sum {
-            return Ok(Progress::Converged);
+            return Ok(state.verdict());
         }
         let point: Vec<f64> = state.at.at.point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
         let answer = oracle.evaluate(std::slice::from_ref(&point))?.pop().expect("one point, one answer");
@@ -134,7 +134,7 @@ impl Solver for Local {
         if ratio <= 1e-4 {
             state.damping *= state.growth;
             state.growth *= 2.0;
-            return Ok(if state.damping > 1e12 { Progress::Stalled } else { Progress::Continue });
+            return Ok(if state.damping > 1e12 { state.verdict() } else { Progress::Continue });
         }
         let Some(at) = oracle.linearise(&point, 1.0)? else { return Ok(Progress::Stalled) };
         (state.jacobian, state.residuals) = matrices(&at);
@@ -145,7 +145,7 @@ impl Solver for Local {
         state.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
         state.growth = 2.0;
         state.idle = if achieved <= 100.0 * self.options.tolerance * sum { state.idle + 1 } else { 0 };
-        Ok(if state.idle >= 3 { Progress::Converged } else { Progress::Continue })
+        Ok(if state.idle >= 3 { state.verdict() } else { Progress::Continue })
     }
 }
 
@@ -158,6 +158,22 @@ fn matrices(at: &Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
+    /// More's test: at an optimum the residuals are orthogonal to every column of the Jacobian that can move.
+    fn verdict(&self) -> Progress {
+        /// Largest cosine that counts as orthogonal: the accuracy of slopes by differences.
+        const ORTHOGONAL: f64 = 1e-3;
+        let norm = self.residuals.norm();
+        let cosine = |j: usize| {
+            let column = self.jacobian.column(j);
+            let slope = column.dot(&self.residuals);
+            let u = self.at.at.point[j];
+            let held = (u <= 0.0 && slope > 0.0) || (u >= 1.0 && slope < 0.0);
+            if held || slope == 0.0 { 0.0 } else { slope.abs() / (column.norm() * norm) }
+        };
+        let largest = (0..self.jacobian.ncols()).map(cosine).fold(0.0, f64::max);
+        if largest <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
+    }
+
     /// The damped step inside the box: coordinates that would leave it are held at their bound, one more at a time.
     fn bounded_step(&self) -> Option<DVector<f64>> {
         let point = &self.at.at.point;

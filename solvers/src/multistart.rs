@@ -1,6 +1,6 @@
 //! Runs a local solver from several starts, one after the other: the study's own first, then the best of a sample.
 
-use mops_core::{Halt, Oracle, Progress, Solver};
+use mops_core::{Halt, Merit, Oracle, Progress, Solver};
 
 use crate::start::{best_of, latin_hypercube};
 
@@ -11,13 +11,14 @@ pub struct Multistart {
     extra: usize,
     /// Starts that are left, the next one last; `None` before the first run has ended.
     left: Option<Vec<Vec<f64>>>,
-    converged: bool,
+    /// How the run ended that found the best point, and what that is worth.
+    best: Option<(Merit, Progress)>,
 }
 
 impl Multistart {
     /// Runs `local` from `starts` points.
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
-        Self { local, extra: starts.saturating_sub(1), left: None, converged: false }
+        Self { local, extra: starts.saturating_sub(1), left: None, best: None }
     }
 
     /// Begins the first run.
@@ -26,7 +27,7 @@ impl Multistart {
     /// The run is over.
     pub fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.left = None;
-        self.converged = false;
+        self.best = None;
         self.local.begin(oracle, start)
     }
 
@@ -39,7 +40,10 @@ impl Multistart {
         if progress == Progress::Continue {
             return Ok(progress);
         }
-        self.converged |= progress == Progress::Converged;
+        let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
+        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
+            self.best = Some((found, progress));
+        }
         if self.left.is_none() {
             self.left = Some(self.sample(oracle)?);
         }
@@ -48,8 +52,7 @@ impl Multistart {
                 self.local.begin(oracle, &start)?;
                 Ok(Progress::Continue)
             }
-            None if self.converged => Ok(Progress::Converged),
-            None => Ok(Progress::Stalled),
+            None => Ok(self.best.map_or(Progress::Stalled, |(_, progress)| progress)),
         }
     }
 

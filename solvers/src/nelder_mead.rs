@@ -35,7 +35,7 @@ impl SolverOptions for NelderMeadOptions {
     const KIND: &'static str = "nelder-mead";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Simplex { options: self.clone(), start: None, size: self.size, before: f64::INFINITY })
+        Box::new(Simplex { options: self.clone(), start: None, size: self.size, before: f64::INFINITY, unit: None })
     }
 }
 
@@ -46,6 +46,8 @@ struct Simplex {
     size: f64,
     /// Value at which the last simplex ended.
     before: f64,
+    /// Factor of the objective.
+    unit: Option<f64>,
 }
 
 impl Solver for Simplex {
@@ -57,6 +59,7 @@ impl Solver for Simplex {
         self.start = usable_start(oracle, start)?;
         self.size = self.options.size;
         self.before = f64::INFINITY;
+        self.unit = None;
         Ok(())
     }
 
@@ -75,11 +78,12 @@ impl Solver for Simplex {
         let Ok(method) = NelderMead::new(corners).with_sd_tolerance(self.options.tolerance) else {
             return Ok(Progress::Stalled);
         };
-        let cost = Cost::new(oracle);
+        let cost = Cost::new(oracle, self.unit);
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
         if let Some(halt) = cost.halt() {
             return Err(halt);
         }
+        self.unit = cost.unit();
         let Ok(done) = run else { return Ok(Progress::Stalled) };
         let value = done.state.best_cost;
         let gained = self.before - value;

@@ -1,6 +1,6 @@
 //! Is a point Pareto-optimal, to first order?
 
-use mops_core::{Objective, Oracle, Pareto, Usage};
+use mops_core::{Objective, Oracle, Pareto, Shape, Usage};
 use nalgebra::DMatrix;
 
 use crate::epigraph::{Linear, Rows, dot, solve};
@@ -9,15 +9,26 @@ use crate::epigraph::{Linear, Rows, dot, solve};
 /// constraints. None: `certified-local`. One, that also holds a small step ahead: `no`. No slopes, or a direction that
 /// only the linear model sees: `not-shown`.
 pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
-    /// Improvement per unit of step below which a direction is none: the accuracy of slopes by differences.
+    /// Improvement per unit of step, relative to the steepest slope of its row, below which a direction is none: the
+    /// accuracy of slopes by differences.
     const IMPROVEMENT: f64 = 1e-3;
+    /// Relative slope below which differences see nothing but noise.
+    const SMALLEST_SLOPE: f64 = 1e-5;
     let Ok(Some(at)) = oracle.linearise(point, 1e-4) else { return Pareto::NotShown };
     let shape = oracle.shape().clone();
     let n = shape.dimension();
     // Every row on its own, also where the objective is their sum.
-    let rows = Rows::of(&mops_core::Shape { objective: Objective::Max, ..shape.clone() }, &at);
+    let mut rows = Rows::of(&Shape { objective: Objective::Max, ..shape.clone() }, &at);
     if n == 0 || !shape.rows.iter().any(|(usage, _)| *usage == Usage::Minimise) {
         return Pareto::NotShown;
+    }
+    // Each row by its own steepest slope, so that loose demands hide nothing.
+    for row in &mut rows.objectives {
+        let steepest = row.slope.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
+        if steepest < SMALLEST_SLOPE * row.value.abs().max(f64::MIN_POSITIVE) {
+            return Pareto::NotShown;
+        }
+        row.slope.iter_mut().for_each(|s| *s /= steepest);
     }
     // min sum_i g_i d subject to g_i d <= 0, a_j d <= 0 where active, |b_k d| <= 0, |d| <= 1 inside the box:
     // as the subproblem with the sum as its one objective and all rows as elastic constraints.
@@ -34,8 +45,7 @@ pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
     let Some(direction) = solve(&cone, &(DMatrix::identity(n, n) * 1e-9), &low, &high, 1e4) else {
         return Pareto::NotShown;
     };
-    let size: f64 = cone.objectives[0].slope.iter().fold(1.0, |a: f64, s| a.max(s.abs()));
-    if dot(&cone.objectives[0].slope, &direction.step) > -IMPROVEMENT * size {
+    if dot(&cone.objectives[0].slope, &direction.step) > -IMPROVEMENT {
         return Pareto::CertifiedLocal;
     }
     // The linear model sees an improvement: does the problem?

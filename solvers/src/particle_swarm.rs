@@ -57,7 +57,7 @@ impl Solver for Swarm {
         let random = oracle.stream("particle-swarm");
         let method =
             ParticleSwarm::new((vec![0.0; n], vec![1.0; n]), self.options.particles).with_rng_generator(random);
-        let cost = Cost::new(oracle);
+        let cost = Cost::new(oracle, None);
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
         match (cost.halt(), run) {
             (Some(halt), _) => Err(halt),

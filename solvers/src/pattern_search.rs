@@ -113,7 +113,7 @@ impl Solver for PatternSearch {
             state.size = self.options.size;
             return Ok(Progress::Continue);
         }
-        Ok(Progress::Converged)
+        Ok(if state.best.merit.is_feasible() { Progress::Converged } else { Progress::Stalled })
     }
 }
 

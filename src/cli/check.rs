@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, ParameterSource};
+use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale};
 
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
@@ -20,28 +20,26 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let file = open(catalogue, &arguments.study)?;
     let study = &file.study;
     let mut text = format!("{}: ok\n\n", study.name);
-    let tuners = study.tuners.iter().map(|t| {
-        let [low, high] = t.bounds.map(number);
-        let state = if t.tie.is_some() {
-            "tied"
-        } else if t.active {
-            ""
-        } else {
-            "inactive"
+    let start = study.start();
+    let tuners = study.tuners.iter().zip(&start).map(|(t, &start)| {
+        let [low, high] = t.bounds.map(|bound| if bound.is_finite() { number(bound) } else { String::new() });
+        let kind = match (&t.tie, t.active, &t.grid, t.scale) {
+            (Some(_), ..) => "tied".to_owned(),
+            (_, false, ..) => "inactive".to_owned(),
+            (_, _, Grid::Integer, _) => "integer".to_owned(),
+            (_, _, Grid::List(values), _) => {
+                format!("one of {}", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", "))
+            }
+            (_, _, _, Scale::Log) => "log".to_owned(),
+            _ => String::new(),
         };
-        vec![t.name.clone(), number(t.start), low, high, t.unit.to_string(), state.to_owned()]
+        vec![t.name.clone(), number(start), low, high, t.unit.to_string(), kind]
     });
     text += &table(&["tuner", "start", "min", "max", "unit", ""], &[1, 2, 3], tuners.collect());
     let rows = study.rows.iter().map(|row| {
         let plan = &study.jobs[row.job];
         let usage = format!("{:?}", row.usage).to_lowercase();
-        vec![
-            study.key(row),
-            study.models[plan.model].0.clone(),
-            usage,
-            row.demand.limit().map_or_else(String::new, number),
-            row.unit.to_string(),
-        ]
+        vec![study.key(row), study.models[plan.model].0.clone(), usage, demand(row.demand), row.unit.to_string()]
     });
     text += &format!("\n{}", table(&["criterion", "model", "usage", "demand", "unit"], &[3], rows.collect()));
     let fixed = study.jobs.iter().flat_map(|job| {
@@ -62,4 +60,12 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     }
     print(&text);
     Ok(ExitCode::SUCCESS)
+}
+
+fn demand(demand: Demand) -> String {
+    match demand {
+        Demand::Value(value) => number(value),
+        Demand::Pair { good, bad } => format!("{} .. {}", number(good), number(bad)),
+        Demand::None => String::new(),
+    }
 }

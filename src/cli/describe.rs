@@ -10,7 +10,8 @@ use super::{Trouble, print};
 /// What is described.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, or a shipped study.
+    /// A kind of model, criterion or solver, a shipped study, or a table of study files: study, models, tuners, cases,
+    /// experiments, criteria, solver.
     name: String,
 }
 
@@ -20,6 +21,10 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let criteria = catalogue.criteria.iter().map(|k| (k.name, k.schema));
     let solvers = catalogue.solvers.iter().map(|k| (k.name, k.schema));
     let mut kinds = models.chain(criteria).chain(solvers);
+    if let Some((table, schema)) = mops_core::file::tables().into_iter().find(|(table, _)| *table == name) {
+        print(&mops_core::file::describe(&format!("[{table}] of a study file"), &schema));
+        return Ok(ExitCode::SUCCESS);
+    }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
         print(&mops_core::file::describe(name, &schema()));
         return Ok(ExitCode::SUCCESS);
@@ -29,8 +34,12 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")));
         return Ok(ExitCode::SUCCESS);
     }
-    let known: Vec<&str> =
-        kinds.by_ref().map(|(name, _)| name).chain(catalogue.studies.iter().map(|s| s.name)).collect();
+    let known: Vec<&str> = kinds
+        .by_ref()
+        .map(|(name, _)| name)
+        .chain(catalogue.studies.iter().map(|s| s.name))
+        .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
+        .collect();
     Err(Diagnostic::new(format!("nothing is called `{name}`"))
         .with_help(suggestion(name, known.iter().copied()))
         .into())

@@ -9,8 +9,8 @@ use super::{Trouble, print};
 
 pub(super) fn list(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
     let first_line = |schema: schemars::Schema| {
-        let about = schema.as_value().get("description").and_then(|d| d.as_str()).unwrap_or_default().to_owned();
-        about.split(['\n', ':', '.', ';']).next().unwrap_or_default().to_owned()
+        let about = schema.as_value().get("description").and_then(|d| d.as_str()).unwrap_or_default();
+        first_statement(about)
     };
     let row = |name: &str, about: String| vec![format!("  {name}"), about];
     let studies = catalogue.studies.iter().map(|study| {
@@ -28,6 +28,30 @@ pub(super) fn list(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
     ]
     .map(|(title, rows)| table(&[title, ""], &[], rows))
     .join("\n");
-    print(&format!("{text}\nmops describe NAME tells all of one.\n"));
+    print(&format!(
+        "{text}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver.\n"
+    ));
     Ok(ExitCode::SUCCESS)
+}
+
+/// The text up to the end of its first statement; what stands between back-quotes is not looked into.
+fn first_statement(text: &str) -> String {
+    let paragraph = text.split("\n\n").next().unwrap_or_default().replace('\n', " ");
+    let mut quoted = false;
+    let end = paragraph.char_indices().find(|(i, c)| {
+        quoted ^= *c == '`';
+        !quoted && matches!(c, '.' | ';' | ':') && paragraph[i + 1..].chars().next().is_none_or(|next| next == ' ')
+    });
+    paragraph[..end.map_or(paragraph.len(), |(i, _)| i)].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_statement;
+
+    #[test]
+    fn a_statement_ends_at_its_stop_but_not_inside_a_formula() {
+        assert_eq!(first_statement("`sup { t : |y| > 1. }`, in s. More\n\nEven more"), "`sup { t : |y| > 1. }`, in s");
+        assert_eq!(first_statement("A solver: it\nsolves"), "A solver");
+    }
 }

@@ -26,6 +26,7 @@ impl Progress {
             if flag.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
+            eprintln!("interrupted: writing the best point so far; again to end at once");
         });
         Self { bar, interrupted }
     }

@@ -67,13 +67,13 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     };
     let talks = !arguments.quiet && !arguments.json;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(&study.name));
+    let progress = Progress::new(talks, options.max_evaluations);
     if talks {
         for warning in &study.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
         }
         print(&introduction(&study, &options));
     }
-    let progress = Progress::new(talks, options.max_evaluations);
     let solved = solve(study, &options, &progress).map_err(|why| Diagnostic::new(why.0))?;
     progress.finish();
 
@@ -98,8 +98,9 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
 fn introduction(study: &Study, options: &Options) -> String {
     let active = study.tuners.iter().filter(|t| t.active).count();
     format!(
-        "{}: {active} tuners, {} criteria in {} cases, solver {}\n",
+        "{}: {} tuners, {} criteria over {} cases, solver {}\n",
         study.name,
+        active,
         study.rows.len(),
         study.cases.len(),
         options.solver.kind

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::{Analysis, Catalogue, Diagnostic, Problem, Quantity, Response, Study, suggestion};
+use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, suggestion};
 
 use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
@@ -52,8 +52,15 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         reports.retain(|report| wanted(&report.case));
         reports
     };
-    print(&criteria(&pick(&start), &pick(&here)).replace("optimum", "here   "));
-    let mut failed = false;
+    print(&criteria(&pick(&start), &pick(&here), "here"));
+    let criteria = here
+        .failures
+        .iter()
+        .filter(|(job, why)| matches!(why, Failure::Criterion(_)) && wanted(&study.cases[study.jobs[*job].case].name));
+    let mut failed = here.scaled.is_none();
+    for (job, why) in criteria {
+        print(&format!("no value in case {}: {why}\n", study.cases[study.jobs[*job].case].name));
+    }
     for (job, plan) in study.jobs.iter().enumerate() {
         let (model, case) = (&study.models[plan.model].0, &study.cases[plan.case].name);
         if !wanted(case) {
@@ -75,7 +82,11 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     if let Some(folder) = &arguments.out {
         print(&format!("\nCSV files and plots are in {}\n", folder.display()));
     }
-    if failed { Err(Trouble::Failure("a simulation failed".into())) } else { Ok(ExitCode::SUCCESS) }
+    if failed {
+        Err(Trouble::Failure("a simulation, or a criterion that counts, has no value".into()))
+    } else {
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 /// Values of all tuners: the start values, and what the command line puts over them.
@@ -93,6 +104,21 @@ fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Diagnostic> {
         let quantity = Quantity::parse(value).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
         values[index] =
             quantity.to(&study.tuners[index].unit).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
+    }
+    for (tuner, &value) in study.tuners.iter().zip(&values) {
+        let [low, high] = tuner.bounds;
+        let on_grid = tuner.tie.is_some()
+            || !tuner.active
+            || (tuner.value_at(tuner.position_of(value)) - value).abs() <= 1e-9 * (1.0 + value.abs());
+        if !on_grid {
+            print(&format!(
+                "note: {} = {} is not a value it can be tuned to, {} to {}\n",
+                tuner.name,
+                number(value),
+                number(low),
+                number(high)
+            ));
+        }
     }
     study.apply_ties(&mut values);
     Ok(values)

@@ -1,7 +1,7 @@
 //! Tables on the terminal: aligned, with units.
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
-use mops_core::{CriterionReport, Outcome, Usage};
+use mops_core::{CriterionReport, Outcome, Task, Usage};
 
 /// A number to six significant digits.
 pub(super) fn number(value: f64) -> String {
@@ -24,8 +24,8 @@ pub(super) fn table(header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>) 
     table.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
-/// The criteria at the start and at the optimum, side by side.
-pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport]) -> String {
+/// The criteria at the start and at another point, side by side.
+pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best_name: &str) -> String {
     let usage = |usage| match usage {
         Usage::Minimise => "minimise",
         Usage::Inequality => "inequality",
@@ -62,20 +62,33 @@ pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport]) -> S
         ]
     });
     let header =
-        ["case", "criterion", "usage", "demand", "start", "optimum", "unit", "scaled start", "scaled", "met", ""];
+        ["case", "criterion", "usage", "demand", "start", best_name, "unit", "scaled start", "scaled", "met", ""];
     table(&header, &[3, 4, 5, 7, 8], rows.collect())
 }
 
 /// Everything worth a line after a run.
 pub(super) fn outcome(outcome: &Outcome) -> String {
-    let mut text = format!("\n{}", criteria(&outcome.start.criteria, &outcome.criteria));
+    let mut text = format!("\n{}", criteria(&outcome.start.criteria, &outcome.criteria, "optimum"));
     let tuners = outcome.tuners.iter().map(|t| {
         let bound = t.at_bound.map_or_else(String::new, |side| format!("at its {side} bound"));
         let [low, high] = t.bounds.map(number);
-        vec![t.name.clone(), number(t.start), number(t.value), t.unit.clone(), low, high, bound]
+        let parameters = outcome.calibration.iter().flat_map(|c| &c.parameters);
+        let error =
+            parameters.filter(|p| p.name == t.name && p.std_error.is_finite()).map(|p| number(p.std_error)).next();
+        vec![
+            t.name.clone(),
+            number(t.start),
+            number(t.value),
+            error.unwrap_or_default(),
+            t.unit.clone(),
+            low,
+            high,
+            bound,
+        ]
     });
-    let header = ["tuner", "start", "optimum", "unit", "min", "max", ""];
-    text += &format!("\n{}", table(&header, &[1, 2, 4, 5], tuners.collect()));
+    let error = if outcome.calibration.is_some() { "std. error" } else { "" };
+    let header = ["tuner", "start", "optimum", error, "unit", "min", "max", ""];
+    text += &format!("\n{}", table(&header, &[1, 2, 3, 5, 6], tuners.collect()));
     if let Some(calibration) = &outcome.calibration {
         let channels = calibration.experiments.iter().flat_map(|e| e.channels.iter().map(move |c| (e, c)));
         let rows = channels.map(|(e, c)| {
@@ -104,13 +117,25 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         text += &format!("\nwarning: {warning}");
     }
     let stop = format!("{:?}", outcome.stop).to_lowercase();
-    let feasible = if outcome.feasible {
-        "feasible".to_owned()
-    } else {
-        format!("infeasible, a constraint is violated by {} of its demand", number(outcome.violation))
+    let counts = |usage: &[Usage], missed: bool| {
+        outcome.criteria.iter().filter(|c| usage.contains(&c.usage) && (!missed || !c.met)).count()
+    };
+    let constraints = match (outcome.feasible, counts(&[Usage::Inequality, Usage::Equality], false)) {
+        (true, 0) => String::new(),
+        (true, _) => "every constraint holds; ".to_owned(),
+        (false, _) if outcome.violation.is_finite() => {
+            format!("a constraint is violated by {} of its demand; ", number(outcome.violation))
+        }
+        _ => "no point has a value; ".to_owned(),
+    };
+    let demands = match (outcome.task, counts(&[Usage::Minimise], true)) {
+        (Task::Calibration, _) => String::new(),
+        (_, 0) => "every demand is met; ".to_owned(),
+        (_, 1) => "1 demand is not met; ".to_owned(),
+        (_, n) => format!("{n} demands are not met; "),
     };
     text += &format!(
-        "\n{feasible}; worst scaled value {} (start {}); {stop} after {} evaluations, {} simulations, {:.2} s\n",
+        "\n{constraints}{demands}worst scaled value {} (start {}); {stop} after {} evaluations, {} simulations, {:.2} s\n",
         number(outcome.worst_scaled),
         number(outcome.start.worst_scaled),
         outcome.evaluations,

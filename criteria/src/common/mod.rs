@@ -41,7 +41,7 @@ pub fn optional(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Opt
 pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
     match optional(key, option, unit)? {
         Some(number) if number <= 0.0 => {
-            Err(Mistake::new(key, format!("`{key}` must be positive, not {number} {unit}")))
+            Err(Mistake::new(key, format!("`{key}` must be positive, not {}", unit.amount(number))))
         }
         number => Ok(number),
     }

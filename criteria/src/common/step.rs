@@ -45,7 +45,7 @@ impl StepOptions<'_> {
         if let (Some(target), Some(from)) = (target, from)
             && target == from
         {
-            return Err(Mistake::new("target", format!("a step from {from} {unit} to the same value is none")));
+            return Err(Mistake::new("target", format!("a step from {} to the same value is none", unit.amount(from))));
         }
         Ok(Step { signal: self.signal.to_owned(), unit, target, from, time })
     }

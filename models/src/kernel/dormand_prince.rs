@@ -65,7 +65,7 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
     dynamics.derivative(t, &x, &mut k[0]);
     let mut h = initial_step(dynamics, t, end, &x, &k, &mut stage, &mut next, tolerance);
     work.derivatives += 2;
-    let mut last_error = 1e-4_f64;
+    let mut last_log_error = LOG_SMALL_ERROR;
     let mut rejected = false;
     let mut events_here = 0;
     let longest = dynamics.longest_step();
@@ -100,7 +100,9 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
         step.start = t;
         step.length = h;
         step.taken = h;
-        dense_output(h, &x, &next, &k, &mut step.dense);
+        if sink.reads_steps() || dynamics.guards() > 0 {
+            dense_output(h, &x, &next, &k, &mut step.dense);
+        }
         let event = first_event(dynamics, &mut step, &mut stage);
         sink.step(&step, dynamics);
         if let Some(index) = event {
@@ -116,6 +118,12 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
             let what = dynamics.switch(index, t, &mut at);
             sink.event(t, what);
             x = at;
+            rejected = false;
+            // An event within rounding of a break must not swallow it.
+            if t >= stop {
+                t = stop;
+                dynamics.pass_break(t, &mut x);
+            }
             dynamics.derivative(t, &x, &mut k[0]);
             work.derivatives += 1;
             continue;
@@ -133,16 +141,21 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
             t += h;
             k.swap(0, 6); // First same as last.
         }
-        // PI step-size control with beta = 0.04 (section IV.2 of part II, as in the authors' DOPRI5).
-        let factor = 0.9 * error.max(1e-10).powf(-(0.2 - 0.04 * 0.75)) * last_error.powf(0.04);
+        // PI step-size control with beta = 0.04 (section IV.2 of part II, as in the authors' DOPRI5):
+        // `0.9 error^-(0.2 - 0.75 beta) last_error^beta`.
+        let log_error = error.max(1e-10).ln();
+        let factor = 0.9 * (0.04 * last_log_error - (0.2 - 0.04 * 0.75) * log_error).exp();
         let factor = factor.clamp(0.2, if rejected { 1.0 } else { 10.0 });
         // A step cut short by a break says little about the next.
         h = if reaches { (h * factor).max(h) } else { h * factor };
-        last_error = error.max(1e-4);
+        last_log_error = log_error.max(LOG_SMALL_ERROR);
         rejected = false;
     }
     if all_finite::<S>(x.as_ref()) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
+
+/// `ln 1e-4`: the error that an earlier step counts as having had at least.
+const LOG_SMALL_ERROR: f64 = -9.210_340_371_976_182;
 
 fn all_finite<S: Scalar>(x: &[S]) -> bool {
     x.iter().all(|x| x.value().is_finite())
@@ -155,11 +168,12 @@ fn stages<S: Scalar, D: Dynamics<S>>(
     f: &D, t: f64, h: f64, x: &D::State, k: &mut [D::State; 7], stage: &mut D::State, next: &mut D::State,
 ) {
     let n = x.as_ref().len();
+    // Terms in the order of the stages, so that the newest derivative, which is waited for, comes in last.
     macro_rules! combine {
         ($target:expr, $($i:literal * $c:expr),+) => {{
             let (target, x) = ($target.as_mut(), x.as_ref());
             for j in 0..n {
-                target[j] = x[j] + ($(k[$i].as_ref()[j] * $c +)+ S::from(0.0)) * h;
+                target[j] = x[j] $(+ k[$i].as_ref()[j] * (h * ($c)))+;
             }
         }};
     }
@@ -256,36 +270,49 @@ fn initial_step<S: Scalar, D: Dynamics<S>>(
 
 /// The guard that becomes negative first within the step, which is shortened to that time. Guards are looked at in four
 /// places of the step, so that one that dips below zero and comes back is rarely missed.
+#[inline]
 fn first_event<S: Scalar, D: Dynamics<S>>(f: &D, step: &mut Step<D::State>, x: &mut D::State) -> Option<usize> {
+    const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
     let count = f.guards();
-    let mut first: Option<(usize, f64)> = None;
-    for index in 0..count {
-        let mut value = |theta: f64| {
-            step.at(theta, x);
-            f.guard(index, step.start + theta * step.length, x)
-        };
-        let mut before = (0.0, value(0.0));
-        for theta in [0.25, 0.5, 0.75, 1.0] {
-            let here = value(theta);
+    if count == 0 {
+        return None;
+    }
+    let time = |theta: f64| step.start + theta * step.length;
+    for place in PLACES.windows(2) {
+        let (from, to) = (place[0], place[1]);
+        let mut first: Option<(usize, f64)> = None;
+        step.at(to, x);
+        for index in 0..count {
+            let here = f.guard(index, time(to), x);
             if here < 0.0 {
-                // A guard that begins at zero, such as the speed of a joint that just broke away, may rise and fall
-                // again between two looks: look closer before it counts as an event on the spot.
-                if before.1 <= 0.0 {
-                    let closer = (1..=40).map(|k| before.0 + (theta - before.0) * 0.5_f64.powi(k));
-                    before = closer.map(|theta| (theta, value(theta))).find(|(_, g)| *g > 0.0).unwrap_or(before);
+                let zero = first_zero(from, (to, here), |theta| {
+                    step.at(theta, x);
+                    f.guard(index, time(theta), x)
+                });
+                if first.is_none_or(|(_, earliest)| zero < earliest) {
+                    first = Some((index, zero));
                 }
-                let root = if before.1 <= 0.0 { before.0 } else { zero_between(before, (theta, here), &mut value) };
-                if first.is_none_or(|(_, earliest)| root < earliest) {
-                    first = Some((index, root));
-                }
-                break;
+                step.at(to, x);
             }
-            before = (theta, here);
+        }
+        if let Some((index, theta)) = first {
+            step.taken = theta * step.length;
+            return Some(index);
         }
     }
-    let (index, theta) = first?;
-    step.taken = theta * step.length;
-    Some(index)
+    None
+}
+
+/// Where a guard that is not negative at `from` becomes so, before the place `to` where it is.
+fn first_zero(from: f64, to: (f64, f64), mut value: impl FnMut(f64) -> f64) -> f64 {
+    let mut before = (from, value(from));
+    // A guard that begins at zero, such as the speed of a joint that just broke away, may rise and fall again between
+    // two looks: look closer before it counts as an event on the spot.
+    if before.1 <= 0.0 {
+        let closer = (1..=40).map(|k| from + (to.0 - from) * 0.5_f64.powi(k));
+        before = closer.map(|theta| (theta, value(theta))).find(|(_, g)| *g > 0.0).unwrap_or(before);
+    }
+    if before.1 <= 0.0 { from } else { zero_between(before, to, &mut value) }
 }
 
 /// A zero between a place where `f` is positive and one where it is negative (Illinois method).

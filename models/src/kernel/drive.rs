@@ -12,12 +12,31 @@ pub struct Drive<'a> {
     since: f64,
     value: f64,
     slope: f64,
+    /// What goes on top of the value where the input is a sine.
+    sine: Option<Sine>,
+}
+
+/// `amplitude sin(angular t + phase)`.
+#[derive(Debug, Clone, Copy)]
+struct Sine {
+    amplitude: f64,
+    /// Angular frequency, rad/s.
+    angular: f64,
+    phase: f64,
+}
+
+impl Sine {
+    // Inlined, it would be evaluated for every input: to the compiler a sine is harmless enough to be taken in advance.
+    #[inline(never)]
+    fn at(&self, t: f64) -> f64 {
+        self.amplitude * (self.angular * t + self.phase).sin()
+    }
 }
 
 impl<'a> Drive<'a> {
     /// A drive at time 0; nothing drives where `input` is absent.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: 0.0, slope: 0.0 };
+        let mut drive = Self { input, since: 0.0, value: 0.0, slope: 0.0, sine: None };
         drive.pass_break(0.0);
         drive
     }
@@ -25,9 +44,9 @@ impl<'a> Drive<'a> {
     /// The value at `t`.
     #[inline]
     pub fn at(&self, t: f64) -> f64 {
-        match self.input {
-            Some(sine @ Input::Sine { .. }) => sine.at(t),
-            _ => self.value + self.slope * (t - self.since),
+        match &self.sine {
+            Some(sine) => self.value + sine.at(t),
+            None => self.value + self.slope * (t - self.since),
         }
     }
 
@@ -48,13 +67,21 @@ impl<'a> Drive<'a> {
     pub fn pass_break(&mut self, t: f64) {
         let Some(input) = self.input else { return };
         self.since = t;
-        self.value = input.at(t);
         self.slope = 0.0;
-        if let Input::Sampled { hold: Hold::First, .. } = input {
-            let next = input.next_break(t);
-            if next.is_finite() {
-                self.slope = (input.at(next) - self.value) / (next - t);
+        match input {
+            Input::Sine { amplitude, frequency, phase, offset } => {
+                self.value = *offset;
+                let angular = std::f64::consts::TAU * frequency;
+                self.sine = Some(Sine { amplitude: *amplitude, angular, phase: *phase });
             }
+            Input::Sampled { hold: Hold::First, .. } => {
+                self.value = input.at(t);
+                let next = input.next_break(t);
+                if next.is_finite() {
+                    self.slope = (input.at(next) - self.value) / (next - t);
+                }
+            }
+            _ => self.value = input.at(t),
         }
     }
 }

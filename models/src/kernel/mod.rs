@@ -14,7 +14,8 @@ pub use record::record;
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
 ///
-/// The equations are written once over [`Scalar`], so that they run with values and with tangents. States are
+/// The equations are written once over [`Scalar`], so that they run with values and with tangents. Tangents are exact
+/// between events; the derivative of an event's time is not carried across it. States are
 /// `[S; N]` where a model's size is known, `Vec<S>` where it is not; neither allocates in the step loop.
 pub trait Dynamics<S: Scalar> {
     /// The state vector.
@@ -90,6 +91,10 @@ impl Tolerance {
 pub trait Sink<S: Scalar, D: Dynamics<S>> {
     /// A step was accepted; `dynamics` is in the mode that held during it.
     fn step(&mut self, step: &Step<D::State>, dynamics: &D);
+    /// Whether it reads states within steps; if not, they are not prepared.
+    fn reads_steps(&self) -> bool {
+        true
+    }
     /// The mode changed.
     fn event(&mut self, _t: f64, _what: &'static str) {}
 }
@@ -97,6 +102,9 @@ pub trait Sink<S: Scalar, D: Dynamics<S>> {
 /// Nobody listens.
 impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for () {
     fn step(&mut self, _: &Step<D::State>, _: &D) {}
+    fn reads_steps(&self) -> bool {
+        false
+    }
 }
 
 /// What a simulation gives: the last state, and the work.

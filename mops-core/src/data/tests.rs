@@ -84,7 +84,7 @@ mod csv {
         assert_eq!(file.skipped, ["how: text (`fast`)"]);
         assert_eq!(file.column_names(), ["t"]);
         let asked = file.column("how").unwrap_err().to_string();
-        assert_eq!(asked, "`how` of data is not a column of numbers: text (`fast`)");
+        assert_eq!(asked, "`how` of data is not a column of numbers: text (`fast`); columns of numbers: t");
     }
 
     #[test]

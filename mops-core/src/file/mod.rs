@@ -11,7 +11,7 @@ mod tree;
 use std::io;
 use std::sync::Arc;
 
-pub use schema::{describe, schema_of, study_schema};
+pub use schema::{describe, schema_of, study_schema, tables};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::criterion::Usage;

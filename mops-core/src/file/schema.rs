@@ -116,12 +116,25 @@ pub(super) fn documentation(schema: &Value, key: &str) -> Option<String> {
     keys_of(schema)?.get(key)?.get("description")?.as_str().map(super::shape::on_one_line)
 }
 
+/// The tables of a study file: name, and schema of what may stand in each.
+pub fn tables() -> Vec<(&'static str, Schema)> {
+    vec![
+        ("study", schema_of::<StudySection>()),
+        ("models", schema_of::<ModelCommon>()),
+        ("tuners", schema_of::<TunerSection>()),
+        ("cases", schema_of::<CaseOptions>()),
+        ("experiments", schema_of::<ExperimentSection>()),
+        ("criteria", schema_of::<CriterionCommon>()),
+        ("solver", schema_of::<SolverCommon>()),
+    ]
+}
+
 /// A kind's page in the manual, from its schema: what it is, then its options.
 pub fn describe(name: &str, schema: &Schema) -> String {
     let schema = schema.as_value();
     let mut page = format!("{name}\n\n");
     if let Some(about) = schema.get("description").and_then(Value::as_str) {
-        page += about;
+        page += &without_fences(about);
         page += "\n\n";
     }
     page += "Options:\n";
@@ -130,6 +143,20 @@ pub fn describe(name: &str, schema: &Schema) -> String {
         page += "  none\n";
     }
     page
+}
+
+/// Formulas stand between fences in the documentation; on a terminal they are indented.
+fn without_fences(text: &str) -> String {
+    let mut inside = false;
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            inside = !inside;
+        } else {
+            lines.push(if inside { format!("    {line}") } else { line.to_owned() });
+        }
+    }
+    lines.join("\n")
 }
 
 fn options(page: &mut String, schema: &Value, depth: usize) -> usize {

@@ -8,46 +8,38 @@ use crate::unit::Quantity;
 /// The mistake that made the parser give up, and where it is: often before the place where the parser noticed it.
 pub(super) fn explain(text: &str, error: &toml::de::Error) -> (Diagnostic, Range<usize>) {
     let found = error.span().unwrap_or(0..text.len());
-    if let Some((open, place)) = unclosed(text).filter(|(_, place)| *place <= found.start) {
-        let (what, close) = match open {
-            '{' => ("table", '}'),
-            '[' => ("list or heading", ']'),
-            quote => ("text", quote),
+    if let Some((bracket, place)) = unpaired(text).filter(|(_, place)| *place <= found.start) {
+        let (fact, way_out) = match bracket {
+            '{' => ("the table that begins here does not end".to_owned(), "put a `}` at its end".to_owned()),
+            '[' => ("the list or heading that begins here does not end".to_owned(), "put a `]` at its end".to_owned()),
+            '}' | ']' => (format!("nothing is open that this `{bracket}` could close"), "remove it".to_owned()),
+            quote => ("the text that begins here does not end".to_owned(), format!("put a `{quote}` at its end")),
         };
-        let way_out = format!("put a `{close}` at its end");
-        return (
-            Diagnostic::new(format!("the {what} that begins here does not end")).with_help(way_out),
-            place..place + 1,
-        );
+        return (Diagnostic::new(fact).with_help(way_out), place..place + 1);
     }
-    if let Some(place) = value_at(text, found.start) {
-        let value = &text[place.clone()];
-        if is_decimal_comma(value) {
-            let way_out = format!("write {}", value.replace(',', "."));
-            return (Diagnostic::new("a decimal comma stands in a number").with_help(way_out), place);
-        }
-        let value = value.split(',').next().unwrap_or_default().trim_end();
-        let place = place.start..place.start + value.len();
-        let is_word =
-            value.starts_with(char::is_alphabetic) && value.chars().all(|c| c.is_alphanumeric() || "-_ ".contains(c));
-        if is_word || Quantity::parse(value).is_ok_and(|quantity| quantity.unit.is_some()) {
-            let fact = format!("`{value}` stands there without quotes");
-            return (Diagnostic::new(fact).with_help(format!("write \"{value}\"")), place);
-        }
+    if let Some(mistake) = unquoted(text, found.start) {
+        return mistake;
     }
-    if let Some(bracket) = text[found.start..].chars().next().filter(|c| "}]".contains(*c)) {
-        return (
-            Diagnostic::new(format!("nothing is open that this `{bracket}` could close")).with_help("remove it"),
-            found,
-        );
+    if error.message().starts_with("extra assignment") {
+        let before = text[..found.start].trim_end();
+        let place = before.trim_end_matches(|c: char| c.is_alphanumeric() || "-_".contains(c)).len()..before.len();
+        let fact = format!("a comma is missing before `{}`", &text[place.clone()]);
+        return (Diagnostic::new(fact).with_help("put one between a value and the next key"), place);
     }
-    let word = &text[found.clone()];
+    let word = text.get(found.clone()).unwrap_or_default();
     let (fact, way_out) = match error.message().split(", expected").next().unwrap_or_default() {
         "duplicate key" => (format!("`{word}` stands here a second time"), "remove one of the two"),
         "key with no value" => ("a key stands here without a value".to_owned(), "write it as key = value"),
-        "missing comma between key-value pairs" | "missing comma between array elements" => {
-            ("a comma is missing here".to_owned(), "put one between what stands side by side")
+        "invalid literal string" | "string values must be quoted" if word.trim().is_empty() => {
+            ("a value is missing here".to_owned(), "write it as key = value")
         }
+        "extra comma in inline table" | "extra comma in array" => {
+            ("nothing stands before this comma".to_owned(), "write the value that is missing, or remove the comma")
+        }
+        "string values must be quoted" => (
+            format!("`{word}` is neither a number nor a text in quotes"),
+            "put a comma between two values, and quotes around a text",
+        ),
         other => (
             format!("this is not TOML: {}", other.replace('\n', "; ")),
             "correct it where it is marked, or a little before; see https://toml.io",
@@ -56,8 +48,8 @@ pub(super) fn explain(text: &str, error: &toml::de::Error) -> (Diagnostic, Range
     (Diagnostic::new(fact).with_help(way_out), found)
 }
 
-/// The bracket or the quote that is never closed, and where it stands.
-fn unclosed(text: &str) -> Option<(char, usize)> {
+/// The bracket that nothing closes or that closes nothing, or the quote that does not end, and where it stands.
+fn unpaired(text: &str) -> Option<(char, usize)> {
     let mut open: Vec<(char, usize)> = Vec::new();
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
@@ -76,8 +68,8 @@ fn unclosed(text: &str) -> Option<(char, usize)> {
                 let opener = if c == '}' { '{' } else { '[' };
                 match open.pop() {
                     Some((last, _)) if last == opener => at += 1,
-                    // What is closed here was never opened, or something inside it is still open.
-                    other => return other,
+                    // Something inside what is closed here is still open, or nothing is.
+                    last => return last.or(Some((c, at))),
                 }
             }
             _ => at += c.len_utf8(),
@@ -105,27 +97,36 @@ fn end_of_text(rest: &str, quote: char) -> Option<usize> {
     None
 }
 
-/// What stands alone after the last `=` before `place`, up to the end of its line, a comment or a closing bracket.
-fn value_at(text: &str, place: usize) -> Option<Range<usize>> {
+/// The number with a decimal comma, or the text without quotes, that stands after the last `=` before `place`.
+fn unquoted(text: &str, place: usize) -> Option<(Diagnostic, Range<usize>)> {
     let line = text[..place].rfind('\n').map_or(0, |end| end + 1);
     let after = line + text[line..place].rfind('=')? + 1;
     let start = after + text[after..].len() - text[after..].trim_start_matches([' ', '\t']).len();
     let end = text[start..].find(['\n', '\r', '#', '}', ']', '=']).map_or(text.len(), |length| start + length);
-    let value = text[start..end].trim_end();
-    // A key follows on the same line: what is missing is a comma.
-    let is_alone = !text[end..].starts_with('=');
-    (is_alone && !value.is_empty()).then(|| start..start + value.len())
-}
+    let mut parts = text[start..end].split(',').map(str::trim_end);
+    let (value, next) = (parts.next().unwrap_or_default(), parts.next());
 
-/// `0,10`: digits, one comma, digits.
-fn is_decimal_comma(value: &str) -> bool {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    let value = value.strip_prefix(['-', '+']).unwrap_or(value);
-    value.split_once(',').is_some_and(|(before, after)| digits(before) && digits(after))
+    if let Some(decimals) = next.filter(|next| digits(value.trim_start_matches(['-', '+'])) && digits(next)) {
+        let fact = Diagnostic::new("a decimal comma stands in a number");
+        let end = start + value.len() + 1 + decimals.len();
+        return Some((fact.with_help(format!("write {value}.{decimals}")), start..end));
+    }
+    let is_word = !["true", "false", "inf", "nan"].contains(&value)
+        && value.starts_with(char::is_alphabetic)
+        && value.chars().all(|c| c.is_alphanumeric() || "-_ ".contains(c));
+    let is_quantity = Quantity::parse(value).is_ok_and(|quantity| quantity.unit.is_some());
+    // Where a key follows, its name is no part of the value: a comma is missing.
+    let runs_into_key = next.is_none() && text[end..].starts_with('=');
+    ((is_word || is_quantity) && !runs_into_key).then(|| {
+        let fact = Diagnostic::new(format!("`{value}` stands there without quotes"));
+        (fact.with_help(format!("write \"{value}\"")), start..start + value.len())
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
     use toml::de::DeTable;
 
     use super::*;
@@ -158,11 +159,25 @@ mod tests {
     }
 
     #[test]
-    fn everything_else_is_told_as_the_parser_tells_it() {
+    fn everything_else_is_told_by_what_the_parser_found() {
         assert_eq!(message("a = 1\na = 2").0, "`a` stands here a second time; remove one of the two");
-        let comma = "a comma is missing here; put one between what stands side by side";
-        assert_eq!(message("a = { b = 4.0 min = 1 }").0, comma);
+        let comma = "a comma is missing before `min`; put one between a value and the next key".to_owned();
+        assert_eq!(message("a = { b = 4.0 min = 1 }"), (comma, "min"));
+        assert_eq!(message("a = [1 2]").1, "1 2");
         assert_eq!(message("a = 1 }").0, "nothing is open that this `}` could close; remove it");
-        assert!(message("a = 1 b").0.starts_with("this is not TOML: "));
+        assert!(message("= 1").0.starts_with("this is not TOML: "));
+        assert_eq!(message("a = { b = true, c }").0, "a value is missing here; write it as key = value");
+        assert!(message("a = { b = , c = 1 }").0.starts_with("nothing stands before this comma; "));
+        assert_eq!(message("a =").0, "a value is missing here; write it as key = value");
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_typed_is_explained_at_a_place_in_it(text in "[ab1 ,.=#\"'{}\\[\\]\\\\\u{b5}\n]{0,40}") {
+            if let Err(error) = DeTable::parse(&text) {
+                let (_, place) = explain(&text, &error);
+                prop_assert!(text.get(place).is_some());
+            }
+        }
     }
 }

@@ -141,23 +141,18 @@ fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mistake> {
     }
     let Variable { name, unit, about } = &parameter.variable;
     let wanted = if high < f64::INFINITY {
-        format!("lie between {low} and {}", amount(high, unit))
+        format!("lie between {low} and {}", unit.amount(high))
     } else if low == 0.0 {
         "not be negative".to_owned()
     } else if low == f64::MIN_POSITIVE {
         "be positive".to_owned()
     } else if low > f64::NEG_INFINITY {
-        format!("be at least {}", amount(low, unit))
+        format!("be at least {}", unit.amount(low))
     } else {
         "be a number".to_owned()
     };
-    Err(Mistake::here(format!("`{name}` must {wanted}, not {}", amount(value, unit)))
+    Err(Mistake::here(format!("`{name}` must {wanted}, not {}", unit.amount(value)))
         .with_help(format!("`{name}` is: {about}")))
-}
-
-/// A number with its unit.
-fn amount(value: f64, unit: &Unit) -> String {
-    format!("{value} {unit}").trim_end_matches(" 1").to_owned()
 }
 
 /// The number in `unit`.
@@ -271,6 +266,10 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     };
     let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
     let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, value * factor)).unzip();
+    if let Some(early) = times.first().filter(|&&t| t < 0.0) {
+        return Err(Mistake::new("column", format!("the first sample is at {early} s, before the simulation begins"))
+            .with_help("a simulation begins at 0 s: leave `reset-time` away, or cut with `from`"));
+    }
     if times.len() < 2 {
         let count = if times.is_empty() { "no sample" } else { "one sample" };
         return Err(Mistake::new("column", format!("{count} of the column is left, and two are needed"))
@@ -344,6 +343,12 @@ fn build_tuner(
         (min, max) = (values.first().copied(), values.last().copied());
         grid = Grid::List(values);
     }
+    if let (Some(_), Some(key)) =
+        (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
+    {
+        return Err(Mistake::new(key.0, format!("a tied tuner follows others and has no `{}` of its own", key.0))
+            .with_help(format!("remove `{}`, or remove `tie`", key.0)));
+    }
     let fixed = draft.inactive || draft.tie.is_some();
     let start = match (start, &draft.tie) {
         (Some(start), _) => start,
@@ -366,9 +371,23 @@ fn build_tuner(
         ));
     }
     if !fixed && !(min..=max).contains(&start) {
-        let (start, max) = (amount(start, &unit), amount(max, &unit));
+        let (start, max) = (unit.amount(start), unit.amount(max));
         return Err(Mistake::new("start", format!("the start value {start} is outside the bounds, {min} to {max}"))
             .with_help("correct it, or widen the bounds"));
+    }
+    let off_grid = match &grid {
+        Grid::Continuous => None,
+        Grid::Integer => {
+            let is_fraction = |(_, value): &(&str, f64)| value.fract() != 0.0;
+            let found = [("start", start), ("min", min), ("max", max)].into_iter().find(is_fraction);
+            found.map(|(key, value)| {
+                (key, value, "with `integer = true`, all of `start`, `min` and `max` are whole numbers")
+            })
+        }
+        Grid::List(values) => (!values.contains(&start)).then_some(("start", start, "start at one of `values`")),
+    };
+    if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
+        return Err(Mistake::new(key, format!("the tuner cannot be at {}", unit.amount(value))).with_help(way_out));
     }
     if draft.scale == Scale::Log && min <= 0.0 {
         return Err(Mistake::new("scale", format!("a logarithmic range must be positive, but `min` is {min}"))
@@ -486,9 +505,9 @@ fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result
             &free.state,
             format!(
                 "the start value {} does not lie inside its bounds, {} to {}",
-                amount(start, &unit),
+                unit.amount(start),
                 bounds[0],
-                amount(bounds[1], &unit)
+                unit.amount(bounds[1])
             ),
         )
         .with_help("correct `start`, `min` and `max`; what is left out is read off the data"));
@@ -660,7 +679,8 @@ fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<
     Ok(())
 }
 
-/// Where each parameter comes from: a tuner of the case, a tuner of the study, the case, the model's table, the default.
+/// Where each parameter comes from: a tuner of the case, a value in the case, a tuner of the study, the model's table,
+/// the default.
 fn sources(
     study: &Study,
     interface: &Interface,

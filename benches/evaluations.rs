@@ -1,0 +1,103 @@
+//! Evaluations per second of shipped studies, on one thread and on two.
+
+use std::hint::black_box;
+use std::io;
+use std::sync::Arc;
+use std::time::Instant;
+
+use criterion::{BenchmarkId, Criterion, Throughput};
+use mops::{Budget, Oracle, Problem, Run, Shipped, file};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+const STUDIES: [&str; 3] = ["pid-design", "pid-design-multi-case", "furuta-calibration"];
+const POINTS: u32 = 200;
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let mut group = criterion.benchmark_group("200 points of the box");
+    group.throughput(Throughput::Elements(u64::from(POINTS)));
+    for name in STUDIES {
+        let problem = shipped(name);
+        let points = points(problem.shape().dimension());
+        for threads in [1, 2] {
+            let pool = pool(threads);
+            let id = BenchmarkId::new(name, format!("{threads} threads"));
+            group.bench_function(id, |b| b.iter(|| pool.install(|| evaluate(&problem, &points))));
+        }
+    }
+    group.finish();
+    criterion.final_summary();
+    print_ratios();
+}
+
+/// One thread and two in turn, so that whatever else the machine does meets both alike; medians.
+fn print_ratios() {
+    let pools = [pool(1), pool(2)];
+    for name in STUDIES {
+        let problem = shipped(name);
+        let points = points(problem.shape().dimension());
+        let mut rounds = Vec::new();
+        for _ in 0..31 {
+            rounds.push(pools.each_ref().map(|pool| {
+                let begun = Instant::now();
+                pool.install(|| evaluate(&problem, &points));
+                f64::from(POINTS) / begun.elapsed().as_secs_f64()
+            }));
+        }
+        let [one, two] = [0, 1].map(|i| median(rounds.iter().map(|round| round[i]).collect()));
+        let ratio = median(rounds.iter().map(|[one, two]| two / one).collect());
+        let failed = points.iter().filter(|point| problem.evaluate(point).scaled.is_none()).count();
+        println!(
+            "{name:22} {one:6.0} evaluations/s on 1 thread ({:.0} us each), {two:6.0} on 2, ratio 2 threads / 1 thread: \
+             {ratio:.2}; {failed} of {POINTS} fail",
+            1e6 / one
+        );
+    }
+}
+
+/// All points through a new run, which has none of them yet.
+fn evaluate(problem: &Problem, points: &[Vec<f64>]) {
+    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &());
+    black_box(run.evaluate(points)).expect("the budget suffices");
+}
+
+/// The same points each time, spread over the unit box: the R-sequence.
+///
+/// Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences (2018).
+fn points(dimension: usize) -> Vec<Vec<f64>> {
+    // The positive root of g^(d + 1) = g + 1.
+    #[allow(clippy::cast_precision_loss)]
+    let root = (0..60).fold(2.0_f64, |g, _| (1.0 + g).powf(1.0 / (dimension + 1) as f64));
+    let coordinate = |i: u32, j: i32| (0.5 + f64::from(i) * root.powi(-1 - j)).fract();
+    (0..POINTS).map(|i| (0..).take(dimension).map(|j| coordinate(i, j)).collect()).collect()
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started")
+}
+
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers[numbers.len() / 2]
+}
+
+/// Data files of a shipped study.
+struct Inside(Shipped);
+
+impl file::Files for Inside {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+fn shipped(name: &str) -> Problem {
+    let catalogue = mops::catalogue();
+    let study = *catalogue.studies.iter().find(|study| study.name == name).expect("it is shipped");
+    let text = std::str::from_utf8(study.file("study.toml").expect("every study has one")).expect("it is text");
+    let file = file::read(&catalogue, name, text, &[], &Inside(study)).expect("it is right");
+    Problem::new(Arc::new(file.study))
+}
