@@ -86,7 +86,14 @@ impl Expression {
             let from = error.offset();
             let to = (from + 1..=text.len()).find(|&end| text.is_char_boundary(end)).unwrap_or(from);
             let rest: String = text[from..].chars().take(12).collect();
-            let wanted: Vec<String> = error.inner().context().map(ToString::to_string).collect();
+            let wanted: Vec<String> = error
+                .inner()
+                .context()
+                .filter_map(|context| match context {
+                    StrContext::Expected(what) => Some(what.to_string()),
+                    _ => None,
+                })
+                .collect();
             let found = if rest.is_empty() { "the expression ends".to_owned() } else { format!("`{rest}` stands") };
             let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
             SyntaxError { span: from..to, message: format!("{found} where {wanted} is expected") }

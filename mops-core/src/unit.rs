@@ -92,7 +92,10 @@ impl Unit {
             } else if let Some(after) = rest.strip_prefix('*').or_else(|| rest.strip_prefix('\u{b7}')) {
                 rest = after.trim_start();
             }
-            let (factor, after) = factor(rest).ok_or_else(|| format!("`{rest}` is not a unit in `{text}`"))?;
+            let (factor, after) = factor(rest).ok_or_else(|| {
+                let place = if rest == text.trim() { String::new() } else { format!(" in `{text}`") };
+                format!("`{rest}` is not a known unit{place}")
+            })?;
             let sign = if divide { -1 } else { 1 };
             for (sum, exponent) in unit.dimension.iter_mut().zip(factor.dimension) {
                 *sum += sign * exponent;
@@ -242,6 +245,9 @@ impl Quantity {
             None => Ok(self.number),
             Some(given) => match given.factor_to(unit) {
                 Some(factor) => Ok(self.number * factor),
+                None if unit.text == "1" => {
+                    Err(format!("a quantity in `{given}` stands where a pure number is expected"))
+                }
                 None => Err(format!("a quantity in `{given}` stands where one in `{unit}` is expected")),
             },
         }
