@@ -211,7 +211,7 @@ mod hand_written {
         let f = |t: f64, x: &State| derivative(p, t, x);
         let mut t = 0.0;
         let mut k1 = f(t, &x);
-        let mut h = initial_step(&f, &x, &k1).min(end);
+        let mut h = initial_step(f, &x, &k1).min(end);
         let mut count = 2;
         let mut last_error = 1e-4_f64;
         let mut rejected = false;

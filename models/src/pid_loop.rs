@@ -361,11 +361,36 @@ impl Model for PidLoop {
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         let (controller, named) = job.parameters.split_at(CONTROLLER.len());
         let (numerator, denominator) = self.plant.polynomials(named)?;
-        let order = denominator.len();
+        let plant = (numerator.as_slice(), denominator.as_slice());
+        let controller = Controller::new(controller);
+        // The plant's states, then integral and derivative filter; common sizes as arrays.
+        match denominator.len() + 2 {
+            3 => self.simulate(job, plant, controller, [0.0; 3]),
+            4 => self.simulate(job, plant, controller, [0.0; 4]),
+            5 => self.simulate(job, plant, controller, [0.0; 5]),
+            6 => self.simulate(job, plant, controller, [0.0; 6]),
+            states => self.simulate(job, plant, controller, vec![0.0; states]),
+        }
+    }
+}
+
+impl PidLoop {
+    fn simulate<X: AsRef<[f64]> + AsMut<[f64]> + Clone>(
+        &self,
+        job: &Job<'_>,
+        (numerator, denominator): (&[f64], &[f64]),
+        controller: Controller<f64>,
+        start: X,
+    ) -> Result<Analysis, Failure> {
+        let padded = |coefficients: &[f64]| {
+            let mut padded = start.clone();
+            padded.as_mut()[..coefficients.len()].copy_from_slice(coefficients);
+            padded
+        };
         let mut dynamics = Loop {
-            numerator,
-            denominator,
-            controller: Controller::new(controller),
+            numerator: padded(numerator),
+            denominator: padded(denominator),
+            controller,
             limit: self.limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             setpoint: Drive::new(Some(job.case.input("r").unwrap_or(&self.setpoint))),
             load: Drive::new(job.case.input("d").or(self.load.as_ref())),
@@ -374,20 +399,19 @@ impl Model for PidLoop {
         };
         let signals = &self.interface.signals;
         let names = job.signals.iter().map(|&i| signals[i].name.clone());
-        let outputs = |dynamics: &Loop<'_, f64>, t: f64, x: &Vec<f64>, out: &mut [f64]| {
-            let (r, y) = (dynamics.setpoint.at(t), dynamics.output(x));
+        let outputs = |dynamics: &Loop<'_, f64, X>, t: f64, x: &X, out: &mut [f64]| {
+            let (r, y) = dynamics.compared(t, x);
             for (out, &signal) in out.iter_mut().zip(job.signals) {
                 *out = match signal {
                     0 => r,
                     1 => y,
                     2 => r - y,
-                    3 => dynamics.actuator(t, x),
+                    3 => dynamics.actuator(r, y, x),
                     _ => dynamics.load.at(t),
                 };
             }
         };
-        // The plant's states, then integral and derivative filter.
-        record(&mut dynamics, vec![0.0; order + 2], job.horizon, &self.tolerance, names, &outputs).map(Analysis::Time)
+        record(&mut dynamics, start, job.horizon, &self.tolerance, names, &outputs).map(Analysis::Time)
     }
 }
 
@@ -395,12 +419,15 @@ impl Model for PidLoop {
 #[derive(Debug, Clone, Copy)]
 struct Controller<S> {
     k: S,
-    ti: S,
     td: S,
     nd: S,
     wp: S,
     wd: S,
     tracking: S,
+    /// `k / Ti`.
+    integral_gain: S,
+    /// `Nd / Td`; 0 without derivative.
+    filter_rate: S,
 }
 
 impl<S: Scalar> Controller<S> {
@@ -414,7 +441,8 @@ impl<S: Scalar> Controller<S> {
         } else {
             ti
         };
-        Self { k, ti, td, nd, wp, wd, tracking }
+        let filter_rate = if td.value() > 0.0 { nd / td } else { S::from(0.0) };
+        Self { k, td, nd, wp, wd, tracking, integral_gain: k / ti, filter_rate }
     }
 
     fn has_derivative(&self) -> bool {
@@ -471,7 +499,7 @@ impl<S: Scalar> Sampled<S> {
         }
         if due(self.next_sample * period) {
             self.next_sample += 1.0;
-            let Controller { k, ti, td, nd, wp, wd, tracking } = *controller;
+            let Controller { k, td, nd, wp, wd, tracking, integral_gain, .. } = *controller;
             let weighted = wd * r - y;
             if controller.has_derivative() {
                 let filter = td / (td + nd * period);
@@ -480,7 +508,7 @@ impl<S: Scalar> Sampled<S> {
             self.last = weighted;
             let wanted = k * (wp * r - y) + self.integral + self.derivative;
             self.computed = saturate(wanted, limit);
-            self.integral += k / ti * (-y + r) * period;
+            self.integral += integral_gain * (-y + r) * period;
             if controller.winds_back() {
                 self.integral += (self.computed - wanted) / tracking * period;
             }
@@ -506,10 +534,11 @@ fn saturate<S: Scalar>(value: S, [low, high]: [f64; 2]) -> S {
     }
 }
 
-/// The closed loop: the plant in controllable canonical form, integral and derivative filter of the controller.
-struct Loop<'a, S> {
-    numerator: Vec<S>,
-    denominator: Vec<S>,
+/// The closed loop: the plant in controllable canonical form, integral and derivative filter of the controller. `X` is
+/// its state; the coefficients of the plant are kept in the same form, and end before the states of the controller.
+struct Loop<'a, S, X> {
+    numerator: X,
+    denominator: X,
     controller: Controller<S>,
     limit: [f64; 2],
     setpoint: Drive<'a>,
@@ -519,21 +548,25 @@ struct Loop<'a, S> {
     sampled: Option<Sampled<S>>,
 }
 
-/// The sum of products.
-fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
-    a.iter().zip(b).fold(S::from(0.0), |sum, (a, b)| sum + *a * *b)
-}
+impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
+    /// The sum of products over the states of the plant.
+    #[inline]
+    fn dot(coefficients: &X, x: &X) -> S {
+        let (coefficients, x) = (coefficients.as_ref(), x.as_ref());
+        (1..x.len() - 2).fold(coefficients[0] * x[0], |sum, i| sum + coefficients[i] * x[i])
+    }
 
-impl<S: Scalar> Loop<'_, S> {
-    fn output(&self, x: &[S]) -> S {
-        dot(&self.numerator, x)
+    /// Setpoint and output of the plant.
+    #[inline]
+    fn compared(&self, t: f64, x: &X) -> (f64, S) {
+        (self.setpoint.at(t), Self::dot(&self.numerator, x))
     }
 
     /// What the continuous controller asks for.
-    fn wanted(&self, t: f64, x: &[S]) -> S {
+    #[inline]
+    fn wanted(&self, r: f64, y: S, x: &X) -> S {
         let Controller { k, nd, wp, wd, .. } = self.controller;
-        let (r, y) = (self.setpoint.at(t), self.output(x));
-        let (integral, filtered) = (x[x.len() - 2], x[x.len() - 1]);
+        let [.., integral, filtered] = *x.as_ref() else { unreachable!("the controller has two states") };
         let mut error = wp * r - y;
         if self.controller.has_derivative() {
             error += nd * (wd * r - y - filtered);
@@ -542,37 +575,42 @@ impl<S: Scalar> Loop<'_, S> {
     }
 
     /// What the actuator gives.
-    fn actuator(&self, t: f64, x: &[S]) -> S {
+    #[inline]
+    fn actuator(&self, r: f64, y: S, x: &X) -> S {
         match &self.sampled {
             Some(sampled) => sampled.acting,
             None if self.saturated < 0.0 => S::from(self.limit[0]),
             None if self.saturated > 0.0 => S::from(self.limit[1]),
-            None => self.wanted(t, x),
+            None => self.wanted(r, y, x),
         }
     }
 }
 
-impl<S: Scalar> Dynamics<S> for Loop<'_, S> {
-    type State = Vec<S>;
+impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, X> {
+    type State = X;
 
-    fn derivative(&self, t: f64, x: &Vec<S>, dx: &mut Vec<S>) {
-        let n = self.denominator.len();
-        let u = self.actuator(t, x);
+    #[inline(always)]
+    fn derivative(&self, t: f64, x: &X, dx: &mut X) {
+        let (r, y) = self.compared(t, x);
+        let u = self.actuator(r, y, x);
+        let input = u + self.load.at(t) - Self::dot(&self.denominator, x);
+        let unbounded = if self.saturated == 0.0 { u } else { self.wanted(r, y, x) };
+        let (x, dx) = (x.as_ref(), dx.as_mut());
+        let n = x.len() - 2;
         dx[..n - 1].copy_from_slice(&x[1..n]);
-        dx[n - 1] = u + self.load.at(t) - dot(&self.denominator, x);
+        dx[n - 1] = input;
         dx[n] = S::from(0.0);
         dx[n + 1] = S::from(0.0);
         if self.sampled.is_some() {
             return;
         }
-        let Controller { k, ti, td, nd, wd, tracking, .. } = self.controller;
-        let (r, y) = (self.setpoint.at(t), self.output(x));
-        dx[n] = k / ti * (-y + r);
+        let Controller { wd, tracking, integral_gain, filter_rate, .. } = self.controller;
+        dx[n] = integral_gain * (-y + r);
         if self.saturated != 0.0 && self.controller.winds_back() {
-            dx[n] += (u - self.wanted(t, x)) / tracking;
+            dx[n] += (u - unbounded) / tracking;
         }
         if self.controller.has_derivative() {
-            dx[n + 1] = (wd * r - y - x[n + 1]) * nd / td;
+            dx[n + 1] = (wd * r - y - x[n + 1]) * filter_rate;
         }
     }
 
@@ -582,9 +620,10 @@ impl<S: Scalar> Dynamics<S> for Loop<'_, S> {
     }
 
     /// Guard 0 watches the lower limit, guard 1 the upper.
-    fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> f64 {
+    fn guard(&self, index: usize, t: f64, x: &X) -> f64 {
         let side = if index == 0 { -1.0 } else { 1.0 };
-        let inside = (self.limit[index] - self.wanted(t, x).value()) * side;
+        let (r, y) = self.compared(t, x);
+        let inside = (self.limit[index] - self.wanted(r, y, x).value()) * side;
         match self.saturated {
             s if s == side => -inside,
             0.0 => inside,
@@ -592,7 +631,7 @@ impl<S: Scalar> Dynamics<S> for Loop<'_, S> {
         }
     }
 
-    fn switch(&mut self, index: usize, _: f64, _: &mut Vec<S>) -> &'static str {
+    fn switch(&mut self, index: usize, _: f64, _: &mut X) -> &'static str {
         let side = if index == 0 { -1.0 } else { 1.0 };
         self.saturated = if self.saturated == side { 0.0 } else { side };
         match (index, self.saturated == 0.0) {
@@ -611,15 +650,15 @@ impl<S: Scalar> Dynamics<S> for Loop<'_, S> {
         self.setpoint.longest_step().min(self.load.longest_step())
     }
 
-    fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+    fn pass_break(&mut self, t: f64, x: &mut X) {
         self.setpoint.pass_break(t);
         self.load.pass_break(t);
-        let (r, y) = (self.setpoint.at(t), self.output(x));
+        let (r, y) = self.compared(t, x);
         if let Some(sampled) = &mut self.sampled {
             sampled.pass(t, &self.controller, self.limit, r, y);
             return;
         }
-        let wanted = self.wanted(t, x).value();
+        let wanted = self.wanted(r, y, x).value();
         self.saturated = if wanted < self.limit[0] {
             -1.0
         } else if wanted > self.limit[1] {

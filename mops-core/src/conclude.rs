@@ -172,7 +172,7 @@ fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport>
             value,
             std_error: error,
             // What lies beyond a bound was excluded beforehand.
-            interval95: [(value - half).max(tuner.bounds[0]), (value + half).min(tuner.bounds[1])],
+            interval95: [value - half, value + half].map(|end| end.clamp(tuner.bounds[0], tuner.bounds[1])),
             unit: tuner.unit.to_string(),
         }
     };

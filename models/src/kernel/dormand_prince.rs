@@ -25,7 +25,7 @@ impl<X> Step<X> {
     where
         X: AsRef<[S]> + AsMut<[S]>,
     {
-        self.at(s * self.taken / self.length, x);
+        self.at(s * (self.taken / self.length), x);
     }
 
     /// The state at `start + theta length`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
@@ -35,7 +35,8 @@ impl<X> Step<X> {
         X: AsRef<[S]> + AsMut<[S]>,
     {
         let back = 1.0 - theta;
-        let [r0, r1, r2, r3, r4] = [0, 1, 2, 3, 4].map(|i: usize| self.dense[i].as_ref());
+        let [r0, r1, r2, r3, r4] = &self.dense;
+        let (r0, r1, r2, r3, r4) = (r0.as_ref(), r1.as_ref(), r2.as_ref(), r3.as_ref(), r4.as_ref());
         for (i, x) in x.as_mut().iter_mut().enumerate() {
             *x = r0[i] + (r1[i] + (r2[i] + (r3[i] + r4[i] * back) * theta) * back) * theta;
         }
