@@ -4,10 +4,10 @@
 //! be chosen so that it settles soon and shakes its load little.
 
 use mops::criteria::settling_time::SettlingTime;
-use mops::models::kernel::{Dynamics, Tolerance, record};
+use mops::models::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
 use mops::{
     Analysis, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Interface, Job, Mistake, Model, Options,
-    Parameter, Study, TunerDraft, Unit, Value, Variable,
+    Parameter, Scalar, Study, TunerDraft, Unit, Value, Variable, WithTangents,
 };
 
 /// The model: what it offers, and how it is simulated.
@@ -24,24 +24,25 @@ impl Suspension {
     }
 }
 
-/// The equations.
-struct Wheel {
-    k: f64,
-    d: f64,
+/// Mass, kg.
+const MASS: f64 = 250.0;
+
+/// The equations, written once for values and for derivatives.
+struct Wheel<S> {
+    k: S,
+    d: S,
 }
 
-impl Wheel {
-    const MASS: f64 = 250.0;
-
-    fn acceleration(&self, x: &[f64; 2]) -> f64 {
-        -(self.k * x[0] + self.d * x[1]) / Self::MASS
+impl<S: Scalar> Wheel<S> {
+    fn acceleration(&self, x: &[S; 2]) -> S {
+        -(self.k * x[0] + self.d * x[1]) / MASS
     }
 }
 
-impl Dynamics<f64> for Wheel {
-    type State = [f64; 2];
+impl<S: Scalar> Dynamics<S> for Wheel<S> {
+    type State = [S; 2];
 
-    fn derivative(&self, _: f64, x: &[f64; 2], dx: &mut [f64; 2]) {
+    fn derivative(&self, _: f64, x: &[S; 2], dx: &mut [S; 2]) {
         *dx = [x[1], self.acceleration(x)];
     }
 }
@@ -52,14 +53,20 @@ impl Model for Suspension {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let mut wheel = Wheel { k: job.parameters[0], d: job.parameters[1] };
-        let names = job.signals.iter().map(|&i| self.0.signals[i].name.clone());
-        let outputs = |wheel: &Wheel, _: f64, x: &[f64; 2], y: &mut [f64]| {
-            for (y, &signal) in y.iter_mut().zip(job.signals) {
-                *y = [x[0], wheel.acceleration(x)][signal];
-            }
-        };
-        record(&mut wheel, [0.0, 1.0], job.horizon, &Tolerance::default(), names, &outputs).map(Analysis::Time)
+        kernel::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(kernel::tangents(self, job, seeds))
+    }
+}
+
+impl Simulate for Suspension {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let mut wheel = Wheel { k: parameters[0], d: parameters[1] };
+        let start = [0.0, 1.0].map(S::from);
+        let output = |wheel: &Wheel<S>, signal: usize, _: f64, x: &[S; 2]| [x[0], wheel.acceleration(x)][signal];
+        record(&mut wheel, start, job.horizon, &Tolerance::default(), &wanted(job, &self.0.signals), &output)
     }
 }
 

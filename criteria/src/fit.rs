@@ -1,10 +1,10 @@
 //! Fit to a measurement: the integral of the squared residual.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Tangent, Unit, Value, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, signal};
+use crate::common::{compare, compared_slopes, signal};
 
 /// `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
 ///
@@ -75,16 +75,28 @@ impl Criterion for Bound {
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal.name)?;
         let times = &comparison.channel.times;
-        let last = times.len() - 1;
-        if last == 0 {
+        if times.len() == 1 {
             return Err(format!(
                 "the measurement of `{}` is a single sample: no time to integrate over",
                 self.signal.name
             ));
         }
-        let interval = |i: usize| 0.5 * (times[(i + 1).min(last)] - times[i.saturating_sub(1)]);
         let differences = comparison.differences.iter().enumerate();
-        Ok(Value::sum_of_squares(differences.map(|(i, d)| (self.weight * interval(i)).sqrt() * d).collect()))
+        Ok(Value::sum_of_squares(differences.map(|(i, d)| self.root_weight(times, i) * d).collect()))
+    }
+
+    fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
+        let (channel, slopes) = compared_slopes(case, tangent.along, &self.signal.name)?;
+        let slopes = slopes.iter().enumerate().map(|(i, d)| self.root_weight(&channel.times, i) * d).collect();
+        Ok(Value::slope_of_squares(&tangent.value.residuals, slopes))
+    }
+}
+
+impl Bound {
+    /// `sqrt(weight w_i)`.
+    fn root_weight(&self, times: &[f64], i: usize) -> f64 {
+        let interval = 0.5 * (times[(i + 1).min(times.len() - 1)] - times[i.saturating_sub(1)]);
+        (self.weight * interval).sqrt()
     }
 }
 

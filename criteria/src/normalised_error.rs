@@ -1,10 +1,13 @@
 //! Fit to a measurement, in units of its noise.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Tangent, Unit, Value,
+    Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, positive, signal};
+use crate::common::{compare, compared_slopes, positive, signal};
 
 /// `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 where nothing but the noise is left.
 ///
@@ -58,14 +61,28 @@ impl Criterion for Bound {
 
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal)?;
-        let noise = self.noise.or(comparison.channel.noise).ok_or_else(|| {
+        let scale = self.scale(comparison.channel)?;
+        Ok(Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect()))
+    }
+
+    fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
+        let (channel, slopes) = compared_slopes(case, tangent.along, &self.signal)?;
+        let scale = self.scale(channel)?;
+        Ok(Value::slope_of_squares(&tangent.value.residuals, slopes.iter().map(|d| scale * d).collect()))
+    }
+}
+
+impl Bound {
+    /// `1/(noise sqrt(N))`.
+    #[allow(clippy::cast_precision_loss)]
+    fn scale(&self, channel: &Channel) -> Result<f64, String> {
+        let noise = self.noise.or(channel.noise).ok_or_else(|| {
             format!(
                 "the noise of `{}` is not known: give `noise` here or with the channel of the experiment",
                 self.signal
             )
         })?;
-        let scale = 1.0 / (noise * comparison.count().sqrt());
-        Ok(Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect()))
+        Ok(1.0 / (noise * (channel.times.len() as f64).sqrt()))
     }
 }
 

@@ -1,14 +1,15 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, State, Unit, Variable,
+    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, State,
+    Unit, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::kernel::drive::Drive;
-use crate::kernel::friction::{Contact, balance, contacts};
-use crate::kernel::{Dynamics, Tolerance, record};
+use crate::kernel::friction::{Contact, contacts};
+use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
 ///
@@ -97,6 +98,7 @@ impl Furuta {
             ],
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
             horizon,
+            analysis: AnalysisKind::Time,
         };
         Self { interface, tolerance }
     }
@@ -108,26 +110,30 @@ impl Model for Furuta {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let p: [f64; 12] = job.parameters.try_into().expect("the study gives every parameter");
+        kernel::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(kernel::tangents(self, job, seeds))
+    }
+}
+
+impl Simulate for Furuta {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let p: [S; 12] = parameters.try_into().expect("the study gives every parameter");
         let [a, b, c, d, ba, bp, ca, cp, start @ ..] = p;
-        if a * b <= c * c {
-            return Err(Failure::Undefined(format!(
-                "the mass matrix is not positive definite: a b = {} <= c^2 = {}",
-                a * b,
-                c * c
-            )));
+        let [ab, cc] = [(a * b).value(), (c * c).value()];
+        if ab <= cc {
+            let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
+            return Err(Failure::Undefined(fact));
         }
         let drive = Drive::new(job.case.input("u"));
         let mut dynamics =
             FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] };
-        let signals = &self.interface.signals;
-        let names = job.signals.iter().map(|&i| signals[i].name.clone());
-        let outputs = |dynamics: &FurutaDynamics<'_, f64>, t: f64, x: &[f64; 4], y: &mut [f64]| {
-            for (y, &signal) in y.iter_mut().zip(job.signals) {
-                *y = if signal < 4 { x[signal] } else { dynamics.drive.at(t) };
-            }
+        let output = |dynamics: &FurutaDynamics<'_, S>, signal: usize, t: f64, x: &[S; 4]| {
+            if signal < 4 { x[signal] } else { S::from(dynamics.drive.at(t)) }
         };
-        record(&mut dynamics, start, job.horizon, &self.tolerance, names, &outputs).map(Analysis::Time)
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
     }
 }
 
@@ -185,9 +191,12 @@ impl<S: Scalar> FurutaDynamics<'_, S> {
         self.limits()[joint] > 0.0 && self.contact[joint] == Contact::Stuck
     }
 
-    fn holding_torque(&self, t: f64, x: &[S; 4], joint: usize) -> f64 {
-        let (mass, force) = self.mass_and_force(t, x);
-        balance(&mass, &force, &self.limits(), &self.contact).1[joint]
+    /// The torque that holds a stuck joint: what its equation needs with no acceleration of its own.
+    fn holding_torque(&self, t: f64, x: &[S; 4], joint: usize) -> S {
+        let (coupling, _, force) = self.terms(t, x);
+        let mut dx = *x;
+        self.derivative(t, x, &mut dx);
+        force[joint] - coupling * dx[SPEED[1 - joint]]
     }
 }
 
@@ -223,21 +232,21 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
     }
 
     /// Sliding: the speed in its direction. Stuck: what is left of the limit.
-    fn guard(&self, joint: usize, t: f64, x: &[S; 4]) -> f64 {
-        let limit = self.limits()[joint];
-        if limit == 0.0 {
-            1.0
+    fn guard(&self, joint: usize, t: f64, x: &[S; 4]) -> S {
+        let limit = self.coulomb[joint];
+        if limit.value() == 0.0 {
+            S::from(1.0)
         } else if self.is_stuck(joint) {
             limit - self.holding_torque(t, x, joint).abs()
         } else {
-            self.contact[joint].sign() * x[SPEED[joint]].value()
+            x[SPEED[joint]] * self.contact[joint].sign()
         }
     }
 
     fn switch(&mut self, joint: usize, t: f64, x: &mut [S; 4]) -> &'static str {
         if self.is_stuck(joint) {
             let torque = self.holding_torque(t, x, joint);
-            self.contact[joint] = if torque > 0.0 { Contact::Forward } else { Contact::Backward };
+            self.contact[joint] = if torque.value() > 0.0 { Contact::Forward } else { Contact::Backward };
         } else {
             x[SPEED[joint]] = S::from(0.0);
             self.find_contacts(t, x);

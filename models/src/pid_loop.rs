@@ -1,14 +1,15 @@
 //! A PID controller in a loop with a linear plant.
 
 use mops_core::{
-    Analysis, Failure, Input, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Unit, Variable,
+    Analysis, AnalysisKind, Failure, Input, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar,
+    Unit, Variable, WithTangents,
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, Tolerance, record};
+use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
 
 /// A PID controller with filtered derivative in a loop with unity feedback and a linear plant `G`:
 ///
@@ -209,6 +210,7 @@ fn interface(named: &[String], horizon: f64) -> Interface {
         states: Vec::new(),
         inputs: vec![Variable::new("r", "1", "setpoint"), Variable::new("d", "1", "load at the plant's input")],
         horizon: Some(horizon),
+        analysis: AnalysisKind::Time,
     }
 }
 
@@ -232,9 +234,9 @@ enum Slot {
 }
 
 impl Slot {
-    fn value(self, named: &[f64]) -> f64 {
+    fn value<S: Scalar>(self, named: &[S]) -> S {
         match self {
-            Self::Number(number) => number,
+            Self::Number(number) => S::from(number),
             Self::Named(index) => named[index],
         }
     }
@@ -284,8 +286,8 @@ impl TransferFunction {
     }
 
     /// Coefficients of rising powers, the denominator's leading one being 1 and left out.
-    fn polynomials(&self, named: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
-        let values = |slots: &[Slot]| -> Vec<f64> { slots.iter().map(|s| s.value(named)).collect() };
+    fn polynomials<S: Scalar>(&self, named: &[S]) -> Result<(Vec<S>, Vec<S>), Failure> {
+        let values = |slots: &[Slot]| -> Vec<S> { slots.iter().map(|s| s.value(named)).collect() };
         let (mut numerator, mut denominator) = match &self.form {
             Form::Roots { poles, zeros, gain } => {
                 let gain = gain.value(named);
@@ -299,12 +301,12 @@ impl TransferFunction {
                 (above, below)
             }
         };
-        let leading = denominator.pop().unwrap_or(0.0);
-        if leading == 0.0 {
+        let leading = denominator.pop().unwrap_or(S::from(0.0));
+        if leading.value() == 0.0 {
             return Err(Failure::Undefined("the leading coefficient of the plant's denominator is 0".into()));
         }
-        numerator.iter_mut().chain(&mut denominator).for_each(|c| *c /= leading);
-        numerator.resize(denominator.len(), 0.0);
+        numerator.iter_mut().chain(&mut denominator).for_each(|c| *c = *c / leading);
+        numerator.resize(denominator.len(), S::from(0.0));
         Ok((numerator, denominator))
     }
 }
@@ -324,12 +326,12 @@ fn slot(coefficient: &Coefficient, names: &mut Vec<String>) -> Result<Slot, Mist
 }
 
 /// Coefficients, rising powers, of `(s - r1)(s - r2)...`.
-fn from_roots(roots: &[f64]) -> Vec<f64> {
-    let mut polynomial = vec![1.0];
-    for root in roots {
-        polynomial.push(0.0);
+fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
+    let mut polynomial = vec![S::from(1.0)];
+    for &root in roots {
+        polynomial.push(S::from(0.0));
         for i in (0..polynomial.len()).rev() {
-            let lower = if i > 0 { polynomial[i - 1] } else { 0.0 };
+            let lower = if i > 0 { polynomial[i - 1] } else { S::from(0.0) };
             polynomial[i] = lower - root * polynomial[i];
         }
     }
@@ -359,30 +361,41 @@ impl Model for PidLoop {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let (controller, named) = job.parameters.split_at(CONTROLLER.len());
+        kernel::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(kernel::tangents(self, job, seeds))
+    }
+}
+
+impl Simulate for PidLoop {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let (controller, named) = parameters.split_at(CONTROLLER.len());
         let (numerator, denominator) = self.plant.polynomials(named)?;
         let plant = (numerator.as_slice(), denominator.as_slice());
         let controller = Controller::new(controller);
+        let zero = S::from(0.0);
         // The plant's states, then integral and derivative filter; common sizes as arrays.
         match denominator.len() + 2 {
-            3 => self.simulate(job, plant, controller, [0.0; 3]),
-            4 => self.simulate(job, plant, controller, [0.0; 4]),
-            5 => self.simulate(job, plant, controller, [0.0; 5]),
-            6 => self.simulate(job, plant, controller, [0.0; 6]),
-            states => self.simulate(job, plant, controller, vec![0.0; states]),
+            3 => self.simulate_with(job, plant, controller, [zero; 3]),
+            4 => self.simulate_with(job, plant, controller, [zero; 4]),
+            5 => self.simulate_with(job, plant, controller, [zero; 5]),
+            6 => self.simulate_with(job, plant, controller, [zero; 6]),
+            states => self.simulate_with(job, plant, controller, vec![zero; states]),
         }
     }
 }
 
 impl PidLoop {
-    fn simulate<X: AsRef<[f64]> + AsMut<[f64]> + Clone>(
+    fn simulate_with<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone>(
         &self,
         job: &Job<'_>,
-        (numerator, denominator): (&[f64], &[f64]),
-        controller: Controller<f64>,
+        (numerator, denominator): (&[S], &[S]),
+        controller: Controller<S>,
         start: X,
-    ) -> Result<Analysis, Failure> {
-        let padded = |coefficients: &[f64]| {
+    ) -> Result<Recording, Failure> {
+        let padded = |coefficients: &[S]| {
             let mut padded = start.clone();
             padded.as_mut()[..coefficients.len()].copy_from_slice(coefficients);
             padded
@@ -397,21 +410,17 @@ impl PidLoop {
             saturated: 0.0,
             sampled: self.sampling.map(Sampled::new),
         };
-        let signals = &self.interface.signals;
-        let names = job.signals.iter().map(|&i| signals[i].name.clone());
-        let outputs = |dynamics: &Loop<'_, f64, X>, t: f64, x: &X, out: &mut [f64]| {
+        let output = |dynamics: &Loop<'_, S, X>, signal: usize, t: f64, x: &X| {
             let (r, y) = dynamics.compared(t, x);
-            for (out, &signal) in out.iter_mut().zip(job.signals) {
-                *out = match signal {
-                    0 => r,
-                    1 => y,
-                    2 => r - y,
-                    3 => dynamics.actuator(r, y, x),
-                    _ => dynamics.load.at(t),
-                };
+            match signal {
+                0 => S::from(r),
+                1 => y,
+                2 => -y + r,
+                3 => dynamics.actuator(r, y, x),
+                _ => S::from(dynamics.load.at(t)),
             }
         };
-        record(&mut dynamics, start, job.horizon, &self.tolerance, names, &outputs).map(Analysis::Time)
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
     }
 }
 
@@ -620,14 +629,14 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
     }
 
     /// Guard 0 watches the lower limit, guard 1 the upper.
-    fn guard(&self, index: usize, t: f64, x: &X) -> f64 {
+    fn guard(&self, index: usize, t: f64, x: &X) -> S {
         let side = if index == 0 { -1.0 } else { 1.0 };
         let (r, y) = self.compared(t, x);
-        let inside = (self.limit[index] - self.wanted(r, y, x).value()) * side;
+        let inside = (-self.wanted(r, y, x) + self.limit[index]) * side;
         match self.saturated {
             s if s == side => -inside,
             0.0 => inside,
-            _ => 1.0,
+            _ => S::from(1.0),
         }
     }
 

@@ -1,25 +1,100 @@
 //! Models against closed forms, published values and an independent integration.
 
-use mops_core::{Analysis, Case, Input, Interface, Job, Model, ModelOptions, Response};
+use mops_core::{Case, Input, Job, Model, ModelOptions, Parameter, Response};
 
 use crate::furuta::Furuta;
 use crate::kernel::Tolerance;
 use crate::pid_loop::PidLoopOptions;
 
+fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
+    let value = |p: &Parameter| {
+        let given = given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, v)| *v);
+        given.or(p.default).unwrap_or_else(|| panic!("{} has no value", p.variable.name))
+    };
+    model.interface().parameters.iter().map(value).collect()
+}
+
 fn respond(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) -> Response {
-    let interface: &Interface = model.interface();
-    let values: Vec<f64> = interface
-        .parameters
-        .iter()
-        .map(|p| {
-            let given = parameters.iter().find(|(name, _)| *name == p.variable.name).map(|(_, v)| *v);
-            given.or(p.default).unwrap_or_else(|| panic!("{} has no value", p.variable.name))
-        })
-        .collect();
-    let signals: Vec<usize> = (0..interface.signals.len()).collect();
-    let Analysis::Time(response) =
-        model.analyse(&Job { case, parameters: &values, signals: &signals, horizon }).expect("it simulates");
-    response
+    simulate(model, case, &values(model, parameters), horizon)
+}
+
+fn simulate(model: &dyn Model, case: &Case, parameters: &[f64], horizon: f64) -> Response {
+    let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
+    let analysis = model.analyse(&Job { case, parameters, signals: &signals, horizon }).expect("it simulates");
+    analysis.response().expect("a simulation").clone()
+}
+
+/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
+/// a millionth of their value.
+fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
+    let values = values(model, parameters);
+    let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
+    let finite: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
+    let seed = |&i: &usize| (0..values.len()).map(|j| f64::from(u8::from(i == j))).collect();
+    let seeds: Vec<Vec<f64>> = finite.iter().map(seed).collect();
+    let job = Job { case, parameters: &values, signals: &signals, horizon };
+    let (analysis, tangents) = model.tangents(&job, &seeds).expect("there are tangents").expect("it simulates");
+    let plain = simulate(model, case, &values, horizon);
+    assert_eq!(plain.traces, analysis.response().unwrap().traces, "tangents change no bit");
+    let times: Vec<f64> = (0..200).map(|i| horizon * (f64::from(i) + 0.5) / 200.0).collect();
+    for (&i, tangent) in finite.iter().zip(&tangents) {
+        let h = if values[i] == 0.0 { 1e-6 } else { 1e-6 * values[i].abs() };
+        let moved = |by: f64| {
+            let mut moved = values.clone();
+            moved[i] += by;
+            simulate(model, case, &moved, horizon)
+        };
+        let (high, low) = (moved(h), moved(-h));
+        for (((name, tangent), (_, high)), (_, low)) in
+            tangent.response().unwrap().traces.iter().zip(&high.traces).zip(&low.traces)
+        {
+            let tangent = tangent.sample(&times);
+            let largest = tangent.iter().fold(0.1, |m: f64, t| m.max(t.abs()));
+            let differences = high.sample(&times).into_iter().zip(low.sample(&times)).map(|(a, b)| (a - b) / (2.0 * h));
+            let far = tangent.iter().zip(differences).map(|(t, d)| (t - d).abs()).fold(0.0, f64::max) / largest;
+            let along = &model.interface().parameters[i].variable.name;
+            assert!(far < 2e-5, "{name} along {along}: {far:.1e}");
+        }
+    }
+}
+
+const EXACT: Tolerance = Tolerance { relative: 1e-12, absolute: 1e-14, max_steps: 1_000_000 };
+
+#[test]
+fn tangents_of_a_furuta_pendulum_that_sticks_agree_with_differences() {
+    let model = Furuta::new(None, EXACT);
+    let swing = [
+        ("a", 0.0044),
+        ("b", 0.0118),
+        ("c", 0.0036),
+        ("d", 0.105),
+        ("ba", 0.002),
+        ("bp", 0.0003),
+        ("ca", 0.02),
+        ("cp", 0.004),
+        ("theta0", 1.68),
+        ("dtheta0", 1.78),
+        ("phi0", 0.1),
+        ("dphi0", -0.3),
+    ];
+    let torque = Input::Sine { amplitude: 0.05, frequency: 0.6, phase: 0.4, offset: 0.0 };
+    let case = Case { inputs: vec![("u".into(), torque)], ..Case::default() };
+    let events = respond(&model, &case, &swing, 3.0).events;
+    assert!(
+        events.iter().any(|e| e.what == "arm sticks") && events.iter().any(|e| e.what == "arm slides"),
+        "{events:?}"
+    );
+    check_tangents(&model, &case, &swing, 3.0);
+}
+
+#[test]
+fn tangents_of_a_saturated_pid_loop_agree_with_differences() {
+    let model =
+        pid(&format!("{THESIS_PLANT}limit = [-0.1, 1.2]\ntolerance = {{ relative = 1e-12, absolute = 1e-14 }}"));
+    let values = [("k", 4.0), ("Ti", 2.0), ("Td", 1.0), ("Tt", 1.5), ("a", 0.0), ("b", -4.0), ("c", -1.0)];
+    let events = respond(model.as_ref(), &Case::default(), &values, 20.0).events;
+    assert!(events.len() > 1, "{events:?}");
+    check_tangents(model.as_ref(), &Case::default(), &values, 20.0);
 }
 
 fn pid(options: &str) -> Box<dyn Model> {

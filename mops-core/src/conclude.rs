@@ -37,7 +37,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let study = Arc::clone(problem.study());
     let mut best = run.best().expect("a run evaluates its start").clone();
     let start = problem.evaluate_at(&study.start());
-    let mut simulations = run.archive().len() * problem.simulations();
+    let mut simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
     let mut warnings = study.warnings.clone();
 
     for case in 0..study.cases.len() {
@@ -53,7 +53,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         if let Some(found) = run.best() {
             best.tuners.clone_from(&found.tuners);
         }
-        simulations += run.archive().len() * part.simulations();
+        simulations += (run.archive().len() + run.linearisations()) * part.simulations();
     }
     let best = problem.evaluate_at(&best.tuners);
     warnings.extend(bound_warnings(&study, problem, &best));

@@ -36,10 +36,40 @@ pub trait Criterion: Send + Sync {
     /// A response for which the criterion is not defined: one sentence.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
 
+    /// The derivative of the value, residuals included, along a tangent of the analysis. Where a criterion says nothing
+    /// else it is the central difference of two analyses moved by `tangent.reach` to both sides, without simulation.
+    ///
+    /// # Errors
+    /// A response for which the criterion has no derivative: one sentence.
+    fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
+        let Tangent { analysis, along, reach, .. } = *tangent;
+        let [high, low] = [reach, -reach].map(|distance| self.value(case, &analysis.moved(along, distance)));
+        let (high, low) = (high?, low?);
+        let slope = |(high, low): (&f64, &f64)| (high - low) / (2.0 * reach);
+        Ok(Value {
+            number: slope((&high.number, &low.number)),
+            residuals: high.residuals.iter().zip(&low.residuals).map(slope).collect(),
+            note: None,
+        })
+    }
+
     /// Levels to draw beside the signals, where the criterion has some; `limit` is the value that scales to 1.
     fn marks(&self, _limit: Option<f64>, _analysis: &Analysis) -> Vec<Mark> {
         Vec::new()
     }
+}
+
+/// Where a derivative is taken, and along what.
+#[derive(Debug, Clone, Copy)]
+pub struct Tangent<'a> {
+    /// The analysis.
+    pub analysis: &'a Analysis,
+    /// The value of the criterion for it.
+    pub value: &'a Value,
+    /// Derivative of the analysis.
+    pub along: &'a Analysis,
+    /// Distance along the derivative within which the slope is to describe the criterion.
+    pub reach: f64,
 }
 
 /// The value of a criterion.
@@ -63,6 +93,12 @@ impl Value {
     /// A number with something to know about it.
     pub fn noted(number: f64, note: &'static str) -> Self {
         Self { number, residuals: Vec::new(), note: Some(note) }
+    }
+
+    /// The derivative of [`Value::sum_of_squares`], given the residuals and their derivatives.
+    pub fn slope_of_squares(residuals: &[f64], slopes: Vec<f64>) -> Self {
+        let number = residuals.iter().zip(&slopes).map(|(r, slope)| 2.0 * r * slope).sum();
+        Self { number, residuals: slopes, note: None }
     }
 
     /// The sum of squares of `residuals`.

@@ -10,15 +10,19 @@ const STEP: f64 = 2e-4;
 /// Smallest step: below it the noise of the simulation takes over.
 const SMALLEST_STEP: f64 = 1e-6;
 
-/// Values and slopes at a point by central differences, one-sided at the bounds and where one side fails; the step is a
-/// tenth of `reach`, between the limits above.
+/// The step for slopes that are to describe the problem within `reach`: a tenth of it, between the limits above.
+pub fn step(reach: f64) -> f64 {
+    (0.1 * reach).clamp(SMALLEST_STEP, STEP)
+}
+
+/// Values and slopes at a point by central differences, one-sided at the bounds and where one side fails.
 ///
 /// # Errors
 /// The run is over.
 pub fn linearise(oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
     let n = oracle.shape().dimension();
     let spacing = oracle.shape().spacing.clone();
-    let step = |j: usize| if spacing[j] > 0.0 { spacing[j] } else { (0.1 * reach).clamp(SMALLEST_STEP, STEP) };
+    let step = |j: usize| if spacing[j] > 0.0 { spacing[j] } else { step(reach) };
     let moved = |j: usize, by: f64| {
         let mut moved = point.to_vec();
         moved[j] = (moved[j] + by).clamp(0.0, 1.0);

@@ -12,6 +12,7 @@ mod differences;
 mod experiment;
 mod expression;
 pub mod file;
+pub mod linear;
 mod model;
 mod outcome;
 mod problem;
@@ -30,11 +31,15 @@ pub use catalogue::{
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Usage, Value};
+pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use experiment::{Channel, Experiment, Hold, Input, Role};
 pub use expression::{Expression, SyntaxError};
-pub use model::{Analysis, Event, Failure, Interface, Job, Model, Parameter, Response, State, Variable, Work};
+pub use linear::StateSpace;
+pub use model::{
+    Analysis, AnalysisKind, Event, Failure, Interface, Job, Model, Parameter, Response, State, Variable, WithTangents,
+    Work,
+};
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,
     Pareto, StartReport, TunerReport, criterion_reports,

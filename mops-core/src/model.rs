@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::linear::StateSpace;
 use crate::trace::Trace;
 use crate::unit::Unit;
 
@@ -87,6 +88,18 @@ pub struct Interface {
     pub inputs: Vec<Variable>,
     /// End of the simulation, s, where no experiment gives one.
     pub horizon: Option<f64>,
+    /// What its analyses are: criteria refuse a model of the other sort.
+    pub analysis: AnalysisKind,
+}
+
+/// What a model gives to criteria.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AnalysisKind {
+    /// A simulation: signals over time.
+    #[default]
+    Time,
+    /// A linear system: poles and frequency responses.
+    Linear,
 }
 
 /// What one analysis is asked for.
@@ -114,23 +127,60 @@ pub trait Model: Send + Sync {
     /// # Errors
     /// A [`Failure`] is a value that loses against every success; it is counted and reported, and ends nothing.
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure>;
+
+    /// The analysis and its derivative along each of the `seeds`, which have one number per parameter of the model. The
+    /// analysis must have the same bits as [`Model::analyse`] gives. `None`: there are no exact derivatives, and slopes
+    /// come from differences.
+    fn tangents(&self, _job: &Job<'_>, _seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        None
+    }
 }
+
+/// An analysis, and its derivatives: one analysis of the same form per direction.
+pub type WithTangents = (Analysis, Vec<Analysis>);
 
 /// What an analysis gives.
 #[derive(Debug, Clone)]
 pub enum Analysis {
     /// A simulation.
     Time(Response),
+    /// A linear system.
+    Linear(StateSpace),
 }
 
 impl Analysis {
+    /// The simulation, if it is one.
+    pub fn response(&self) -> Option<&Response> {
+        match self {
+            Self::Time(response) => Some(response),
+            Self::Linear(_) => None,
+        }
+    }
+
+    /// The linear system, if it is one.
+    pub fn linear(&self) -> Option<&StateSpace> {
+        match self {
+            Self::Linear(system) => Some(system),
+            Self::Time(_) => None,
+        }
+    }
+
     /// The trace of a signal.
     ///
     /// # Panics
-    /// If the signal was not asked for: names are checked when the study is built.
+    /// If the analysis is no simulation or the signal was not asked for: both are checked when the study is built.
     pub fn trace(&self, signal: &str) -> &Trace {
-        let Self::Time(response) = self;
-        response.trace(signal).expect("signals are checked when the study is built")
+        self.response().and_then(|response| response.trace(signal)).expect("checked when the study is built")
+    }
+
+    /// This analysis moved by `distance` along its derivative `tangent`, to first order.
+    #[must_use]
+    pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
+        match (self, tangent) {
+            (Self::Time(response), Self::Time(tangent)) => Self::Time(response.moved(tangent, distance)),
+            (Self::Linear(system), Self::Linear(tangent)) => Self::Linear(system.moved(tangent, distance)),
+            _ => unreachable!("a derivative has the form of its analysis"),
+        }
     }
 }
 
@@ -149,6 +199,13 @@ impl Response {
     /// The trace of a signal, if it was asked for.
     pub fn trace(&self, signal: &str) -> Option<&Trace> {
         self.traces.iter().find(|(name, _)| name == signal).map(|(_, trace)| trace)
+    }
+
+    fn moved(&self, tangent: &Self, distance: f64) -> Self {
+        let moved = |((name, trace), (_, tangent)): (&(String, Trace), &(String, Trace))| {
+            (name.clone(), trace.moved(tangent, distance))
+        };
+        Self { traces: self.traces.iter().zip(&tangent.traces).map(moved).collect(), ..self.clone() }
     }
 }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use rand::Rng;
 use rayon::prelude::*;
 
-use crate::criterion::{Demand, Usage, Value};
+use crate::criterion::{Demand, Tangent, Usage, Value};
 use crate::experiment::Role;
 use crate::model::{Analysis, Failure, Job};
 use crate::random::stream;
+use crate::scalar::Dual;
 use crate::solver::Shape;
 use crate::study::{Objective, Row, Study};
 use crate::tuner::Tuner;
@@ -86,6 +87,17 @@ impl Merit {
         }
     }
 }
+
+/// Slopes of the rows and residuals, as in [`crate::Linearisation`].
+pub struct Slopes {
+    /// Derivative of the scaled value of row `i` along coordinate `j`: `rows[i][j]`; 0 for rows that are only watched.
+    pub rows: Vec<Vec<f64>>,
+    /// Derivative of residual `i` along coordinate `j`: `residuals[j][i]`.
+    pub residuals: Vec<Vec<f64>>,
+}
+
+/// A row, by index, with its derivative along every coordinate.
+type RowSlopes = (usize, Vec<Value>);
 
 /// A row, by index, with its value or why it has none.
 type RowValue = (usize, Result<Value, String>);
@@ -252,6 +264,75 @@ impl Problem {
             other => other,
         };
         Ok(rows.map(|(index, row)| (index, value(row))).collect())
+    }
+
+    /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
+    /// has no exact ones. `reach` is the distance within which they are to describe the problem.
+    pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
+        if self.shape.spacing.iter().any(|&spacing| spacing > 0.0) || at.scaled.is_none() {
+            return None;
+        }
+        let study = &self.study;
+        let counts = |job: usize| {
+            (study.rows.iter().zip(&self.shape.rows)).any(|(r, (u, _))| r.job == job && *u != Usage::Monitor)
+        };
+        let jobs: Vec<usize> = self.jobs.iter().copied().filter(|&job| counts(job)).collect();
+        let moves = self.tuner_slopes(&at.tuners);
+        let of_jobs: Vec<Option<Vec<RowSlopes>>> =
+            jobs.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
+        let n = self.active.len();
+        let mut rows = vec![vec![0.0; n]; study.rows.len()];
+        let mut residuals = vec![vec![Vec::new(); study.rows.len()]; n];
+        for of_job in of_jobs {
+            for (row, slopes) in of_job? {
+                for (j, slope) in slopes.into_iter().enumerate() {
+                    rows[row][j] = study.rows[row].demand.scale(slope.number) - study.rows[row].demand.scale(0.0);
+                    residuals[j][row] = slope.residuals;
+                }
+            }
+        }
+        let residuals: Vec<Vec<f64>> = residuals.into_iter().map(|of_rows| self.residuals(of_rows)).collect();
+        let finite = rows.iter().chain(&residuals).flatten().all(|slope| slope.is_finite());
+        finite.then_some(Slopes { rows, residuals })
+    }
+
+    /// The derivative of all tuners along each coordinate of the unit box, ties included.
+    fn tuner_slopes(&self, tuners: &[f64]) -> Vec<Vec<f64>> {
+        let along = |&active: &usize| {
+            let mut duals: Vec<Dual<1>> = tuners.iter().map(|&value| Dual::from(value)).collect();
+            duals[active].tangent[0] = self.study.tuners[active].slope_at(tuners[active]);
+            self.study.apply_ties(&mut duals);
+            duals.iter().map(|dual| dual.tangent[0]).collect()
+        };
+        self.active.iter().map(along).collect()
+    }
+
+    /// The derivative of every row that counts and reads one job, along every coordinate.
+    fn job_slopes(&self, job: usize, tuners: &[f64], moves: &[Vec<f64>], reach: f64) -> Option<Vec<RowSlopes>> {
+        let study = &self.study;
+        let plan = &study.jobs[job];
+        let case = &study.cases[plan.case];
+        let seed = |along: &Vec<f64>| study.parameter_slopes(plan, along);
+        let seeds: Vec<Vec<f64>> = moves.iter().map(seed).collect();
+        // Start values of other cases move nothing here.
+        let moving: Vec<usize> = (0..seeds.len()).filter(|&j| seeds[j].iter().any(|&s| s != 0.0)).collect();
+        let wanted: Vec<Vec<f64>> = moving.iter().map(|&j| seeds[j].clone()).collect();
+        let parameters = study.parameters(plan, tuners);
+        let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
+        let (analysis, tangents) = study.models[plan.model].1.tangents(&request, &wanted)?.ok()?;
+        let rows = study.rows.iter().zip(&self.shape.rows).enumerate();
+        let rows = rows.filter(|(_, (row, (usage, _)))| row.job == job && *usage != Usage::Monitor);
+        rows.map(|(index, (row, _))| {
+            let value = row.criterion.value(case, &analysis).ok()?;
+            let still = Value { residuals: vec![0.0; value.residuals.len()], ..Value::default() };
+            let mut slopes = vec![still; seeds.len()];
+            for (&j, along) in moving.iter().zip(&tangents) {
+                let tangent = Tangent { analysis: &analysis, value: &value, along, reach };
+                slopes[j] = row.criterion.slope(case, &tangent).ok()?;
+            }
+            Some((index, slopes))
+        })
+        .collect()
     }
 
     fn scaled(&self, readings: &[Option<Reading>]) -> Option<Vec<f64>> {

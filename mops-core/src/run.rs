@@ -64,6 +64,9 @@ pub struct Run<'a> {
     archive: Vec<Record>,
     best: Option<Evaluation>,
     failures: Vec<FailureCount>,
+    /// Whether slopes come from tangents where there are some.
+    exact: bool,
+    linearisations: usize,
 }
 
 /// Failures of one kind in one job.
@@ -80,7 +83,28 @@ pub struct FailureCount {
 impl<'a> Run<'a> {
     /// A run that has not begun.
     pub fn new(problem: &'a Problem, budget: Budget, watch: &'a dyn Watch) -> Self {
-        Self { problem, budget, watch, cache: HashMap::new(), archive: Vec::new(), best: None, failures: Vec::new() }
+        Self {
+            problem,
+            budget,
+            watch,
+            cache: HashMap::new(),
+            archive: Vec::new(),
+            best: None,
+            failures: Vec::new(),
+            exact: true,
+            linearisations: 0,
+        }
+    }
+
+    /// Takes slopes from differences alone, to compare.
+    #[must_use]
+    pub fn by_differences(self) -> Self {
+        Self { exact: false, ..self }
+    }
+
+    /// Number of times that slopes were taken from tangents: each is a simulation with tangents of every job that counts.
+    pub fn linearisations(&self) -> usize {
+        self.linearisations
     }
 
     /// Runs the solver from `start`, a point of the unit box, to its end.
@@ -166,7 +190,7 @@ impl Oracle for Run<'_> {
                 new.push(i);
             }
         }
-        let left = self.budget.evaluations.saturating_sub(self.archive.len());
+        let left = self.budget.evaluations.saturating_sub(self.archive.len() + self.linearisations);
         let within_budget = new.len() <= left;
         new.truncate(left);
         // A small batch at a time, so that an interrupt is heard soon; the results are folded in order, so that
@@ -193,7 +217,24 @@ impl Oracle for Run<'_> {
             .collect())
     }
 
+    /// Exact slopes where models and criteria have them, differences elsewhere.
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        let at = self.evaluate(&[point.to_vec()])?.pop().expect("one point, one answer");
+        if at.scaled.is_none() {
+            return Ok(None);
+        }
+        if self.exact {
+            if self.watch.wants_stop() {
+                return Err(Halt::Interrupted);
+            }
+            if self.archive.len() + self.linearisations >= self.budget.evaluations {
+                return Err(Halt::Budget);
+            }
+            if let Some(slopes) = self.problem.slopes(&at, differences::step(reach)) {
+                self.linearisations += 1;
+                return Ok(Some(Linearisation { at, rows: slopes.rows, residuals: slopes.residuals }));
+            }
+        }
         differences::linearise(self, point, reach)
     }
 

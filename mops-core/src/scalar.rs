@@ -26,8 +26,13 @@ pub trait Scalar:
     + SubAssign
     + MulAssign
 {
+    /// Number of tangents it carries.
+    const DIRECTIONS: usize;
+
     /// The number without its tangents.
     fn value(self) -> f64;
+    /// Its tangents, [`Scalar::DIRECTIONS`] of them.
+    fn tangents(&self) -> &[f64];
     /// `f(self)`, given the value and the derivative of `f` at [`Scalar::value`].
     #[must_use]
     fn chain(self, value: f64, derivative: f64) -> Self;
@@ -87,9 +92,15 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    const DIRECTIONS: usize = 0;
+
     #[inline]
     fn value(self) -> f64 {
         self
+    }
+    #[inline]
+    fn tangents(&self) -> &[f64] {
+        &[]
     }
     #[inline]
     fn chain(self, value: f64, _: f64) -> f64 {
@@ -127,9 +138,15 @@ impl<const N: usize> Dual<N> {
 }
 
 impl<const N: usize> Scalar for Dual<N> {
+    const DIRECTIONS: usize = N;
+
     #[inline]
     fn value(self) -> f64 {
         self.value
+    }
+    #[inline]
+    fn tangents(&self) -> &[f64] {
+        &self.tangent
     }
     #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {

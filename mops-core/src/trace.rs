@@ -219,6 +219,14 @@ impl Trace {
         Self { knots: self.knots.clone(), segments }
     }
 
+    /// `y + distance tangent`, for a tangent on the same segments.
+    #[must_use]
+    pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
+        debug_assert_eq!(self.knots, tangent.knots, "a tangent has the segments of its trace");
+        let add = |(c, d): (&[f64; 5], &[f64; 5])| std::array::from_fn(|i| c[i] + distance * d[i]);
+        Self { knots: self.knots.clone(), segments: self.segments.iter().zip(&tangent.segments).map(add).collect() }
+    }
+
     /// The largest jump between consecutive segments, in absolute value.
     pub fn largest_jump(&self) -> f64 {
         self.segments.windows(2).map(|s| (s[1][0] - s[0].iter().sum::<f64>()).abs()).fold(0.0, f64::max)

@@ -72,6 +72,15 @@ impl Tuner {
         }
     }
 
+    /// The derivative of [`Tuner::value_at`] where the value is `value`, for a continuous tuner.
+    pub fn slope_at(&self, value: f64) -> f64 {
+        let [min, max] = self.bounds;
+        match self.scale {
+            Scale::Linear => max - min,
+            Scale::Log => value * (max / min).ln(),
+        }
+    }
+
     /// Where `value` lies in [0, 1]; outside the bounds, the nearer end.
     pub fn position_of(&self, value: f64) -> f64 {
         let [min, max] = self.bounds;
@@ -141,6 +150,15 @@ mod tests {
                 assert!((t.value_at(t.position_of(value)) - value).abs() < 1e-12 * value.max(1.0));
             }
             assert_eq!((t.value_at(0.0), t.value_at(1.0)), (0.1, 50.0));
+        }
+    }
+
+    #[test]
+    fn the_slope_is_that_of_the_value() {
+        for scale in [Scale::Linear, Scale::Log] {
+            let t = tuner(scale, Grid::Continuous);
+            let slope = (t.value_at(0.4 + 1e-6) - t.value_at(0.4 - 1e-6)) / 2e-6;
+            assert!((t.slope_at(t.value_at(0.4)) - slope).abs() < 1e-6 * slope, "{scale:?}");
         }
     }
 

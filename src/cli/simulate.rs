@@ -71,6 +71,9 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
                 failed = true;
                 print(&format!("\n{model} in case {case}: {failure}\n"));
             }
+            Ok(Analysis::Linear(system)) => {
+                print(&format!("\n{model} in case {case}: a linear system with {} states\n", system.states.len()));
+            }
             Ok(Analysis::Time(response)) => {
                 print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)));
                 if let Some(folder) = &arguments.out {

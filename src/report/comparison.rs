@@ -95,10 +95,7 @@ impl Both {
 }
 
 fn trace<'a>(analysis: &'a Result<Analysis, Failure>, signal: &str) -> Option<&'a Trace> {
-    match analysis {
-        Ok(Analysis::Time(response)) => response.trace(signal),
-        Err(_) => None,
-    }
+    analysis.as_ref().ok()?.response()?.trace(signal)
 }
 
 fn over_time(signal: &Variable) -> Plot {

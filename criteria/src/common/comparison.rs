@@ -25,6 +25,18 @@ impl Comparison<'_> {
     }
 }
 
+/// The derivative of the differences of [`compare`], which must have succeeded, along a tangent of the simulation.
+pub fn compared_slopes<'a>(case: &'a Case, along: &Analysis, signal: &str) -> Result<(&'a Channel, Vec<f64>), String> {
+    let experiment = case.experiment.as_ref();
+    let channel = experiment.and_then(|experiment| experiment.channel(signal)).expect("compare has found the channel");
+    let slopes = along.trace(signal).sample(&channel.times);
+    if slopes.iter().all(|slope| slope.is_finite()) {
+        Ok((channel, slopes))
+    } else {
+        Err(format!("the derivative of `{signal}` is not finite throughout"))
+    }
+}
+
 /// The simulated signal at the times of its measurement.
 pub fn compare<'a>(case: &'a Case, analysis: &Analysis, signal: &str) -> Result<Comparison<'a>, String> {
     let experiment = case.experiment.as_ref();

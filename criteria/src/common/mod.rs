@@ -9,7 +9,7 @@ pub mod testing;
 
 use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable, suggestion};
 
-pub use comparison::compare;
+pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
 pub use part::part;
 pub use step::{Step, StepOptions};

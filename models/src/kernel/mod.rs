@@ -10,13 +10,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use dormand_prince::{Step, integrate};
-pub use record::record;
+pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
 ///
-/// The equations are written once over [`Scalar`], so that they run with values and with tangents. Tangents are exact
-/// between events; the derivative of an event's time is not carried across it. States are
-/// `[S; N]` where a model's size is known, `Vec<S>` where it is not; neither allocates in the step loop.
+/// The equations are written once over [`Scalar`], so that they run with values and with tangents. Tangents are exact,
+/// the jumps at events included. States are `[S; N]` where a model's size is known, `Vec<S>` where it is not; neither
+/// allocates in the step loop.
 pub trait Dynamics<S: Scalar> {
     /// The state vector.
     type State: AsRef<[S]> + AsMut<[S]> + Clone;
@@ -30,11 +30,12 @@ pub trait Dynamics<S: Scalar> {
     }
 
     /// The value of a guard: the mode holds while it is not negative.
-    fn guard(&self, _index: usize, _t: f64, _x: &Self::State) -> f64 {
-        1.0
+    fn guard(&self, _index: usize, _t: f64, _x: &Self::State) -> S {
+        S::from(1.0)
     }
 
-    /// A guard became negative: changes the mode, and the state where it jumps. Returns what happened.
+    /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
+    /// event, whose time moves too. Returns what happened.
     fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &'static str {
         ""
     }

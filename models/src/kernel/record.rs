@@ -1,32 +1,90 @@
-//! From steps to traces: the signals of a model along its dense output.
+//! From steps to traces: the signals of a model along its dense output, with their tangents.
 
-use mops_core::{Event, Response, Trace};
+use mops_core::{Analysis, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents};
 
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
-use mops_core::Failure;
 
-/// Records signals along the steps.
-struct Recorder<'a, D: Dynamics<f64>, F> {
-    traces: Vec<(String, Trace)>,
-    events: Vec<Event>,
-    /// Writes the wanted signals for a time and a state.
-    outputs: &'a F,
-    state: D::State,
-    values: Vec<[f64; 5]>,
-    row: Vec<f64>,
+/// A recorded simulation: the signals, and their derivative along every direction of the scalar.
+pub struct Recording {
+    /// The signals.
+    pub response: Response,
+    /// One per direction; on the segments of the signals.
+    pub tangents: Vec<Response>,
 }
 
-impl<D: Dynamics<f64>, F: Fn(&D, f64, &D::State, &mut [f64])> Sink<f64, D> for Recorder<'_, D, F> {
+/// What a time-domain model does once, over the scalar.
+pub trait Simulate {
+    /// Simulates a job; `parameters` stand for those of the job, with tangents.
+    ///
+    /// # Errors
+    /// The failure of the simulation.
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure>;
+}
+
+/// [`mops_core::Model::analyse`] of a model that can [`Simulate`].
+///
+/// # Errors
+/// The failure of the simulation.
+pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure> {
+    model.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
+}
+
+/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: eight directions, or four where that is enough, in
+/// one simulation.
+///
+/// # Errors
+/// The failure of the simulation.
+pub fn tangents(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
+    let mut analysis = None;
+    let mut tangents = Vec::with_capacity(seeds.len());
+    for seeds in seeds.chunks(8) {
+        let recording = if seeds.len() <= 4 { along::<4>(model, job, seeds)? } else { along::<8>(model, job, seeds)? };
+        analysis.get_or_insert(recording.response);
+        tangents.extend(recording.tangents.into_iter().take(seeds.len()).map(Analysis::Time));
+    }
+    let analysis = match analysis {
+        Some(response) => Analysis::Time(response),
+        None => analyse(model, job)?,
+    };
+    Ok((analysis, tangents))
+}
+
+fn along<const N: usize>(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<Recording, Failure> {
+    let parameter = |(i, &value): (usize, &f64)| {
+        let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
+        Dual::<N> { value, tangent }
+    };
+    let parameters: Vec<Dual<N>> = job.parameters.iter().enumerate().map(parameter).collect();
+    model.simulate(job, &parameters)
+}
+
+/// Records signals along the steps.
+struct Recorder<'a, X, F> {
+    signals: &'a [(usize, String)],
+    /// The value of a signal, by its index, at a time and a state.
+    output: &'a F,
+    /// Traces of the signals, then of their tangents along every direction in turn.
+    traces: Vec<Vec<Trace>>,
+    events: Vec<Event>,
+    /// The state at [`Trace::NODES`].
+    states: [X; 5],
+}
+
+impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D> for Recorder<'_, D::State, F> {
     fn step(&mut self, step: &Step<D::State>, dynamics: &D) {
-        for (node, s) in Trace::NODES.into_iter().enumerate() {
-            step.state(s, &mut self.state);
-            (self.outputs)(dynamics, step.start + s * step.taken, &self.state, &mut self.row);
-            for (values, value) in self.values.iter_mut().zip(&self.row) {
-                values[node] = *value;
-            }
+        for (state, s) in self.states.iter_mut().zip(Trace::NODES) {
+            step.state(s, state);
         }
-        for ((_, trace), values) in self.traces.iter_mut().zip(&self.values) {
-            trace.push(step.start + step.taken, *values);
+        let end = step.start + step.taken;
+        for (i, (signal, _)) in self.signals.iter().enumerate() {
+            let values: [S; 5] = std::array::from_fn(|node| {
+                let t = step.start + Trace::NODES[node] * step.taken;
+                (self.output)(dynamics, *signal, t, &self.states[node])
+            });
+            self.traces[0][i].push(end, values.map(Scalar::value));
+            for direction in 0..S::DIRECTIONS {
+                self.traces[1 + direction][i].push(end, std::array::from_fn(|node| values[node].tangents()[direction]));
+            }
         }
     }
 
@@ -35,28 +93,35 @@ impl<D: Dynamics<f64>, F: Fn(&D, f64, &D::State, &mut [f64])> Sink<f64, D> for R
     }
 }
 
-/// Simulates from 0 to `end` and records the signals `names`, which `outputs` writes in that order.
+/// Simulates from 0 to `end` and records `signals`, by index and name; `output` gives the value of one.
 ///
 /// # Errors
 /// The failure of the simulation.
-pub fn record<D: Dynamics<f64>>(
+pub fn record<S: Scalar, D: Dynamics<S>>(
     dynamics: &mut D,
     start: D::State,
     end: f64,
     tolerance: &Tolerance,
-    names: impl Iterator<Item = String>,
-    outputs: &impl Fn(&D, f64, &D::State, &mut [f64]),
-) -> Result<Response, Failure> {
-    let traces: Vec<(String, Trace)> = names.map(|name| (name, Trace::starting_at(0.0, 256))).collect();
-    let count = traces.len();
+    signals: &[(usize, String)],
+    output: &impl Fn(&D, usize, f64, &D::State) -> S,
+) -> Result<Recording, Failure> {
     let mut recorder = Recorder {
-        traces,
+        signals,
+        output,
+        traces: vec![vec![Trace::starting_at(0.0, 256); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
-        outputs,
-        state: start.clone(),
-        values: vec![[0.0; 5]; count],
-        row: vec![0.0; count],
+        states: std::array::from_fn(|_| start.clone()),
     };
     let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;
-    Ok(Response { traces: recorder.traces, events: recorder.events, work })
+    let name = |traces: Vec<Trace>| signals.iter().map(|(_, name)| name.clone()).zip(traces).collect();
+    let mut traces = recorder.traces.into_iter();
+    let response =
+        Response { traces: name(traces.next().expect("the signals come first")), events: recorder.events, work };
+    let tangents = traces.map(|traces| Response { traces: name(traces), ..Response::default() }).collect();
+    Ok(Recording { response, tangents })
+}
+
+/// Indices and names of the signals that a job wants.
+pub fn wanted(job: &Job<'_>, signals: &[mops_core::Variable]) -> Vec<(usize, String)> {
+    job.signals.iter().map(|&i| (i, signals[i].name.clone())).collect()
 }

@@ -13,6 +13,7 @@ pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, 
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
 use crate::model::Model;
+use crate::scalar::Scalar;
 use crate::tuner::Tuner;
 use crate::unit::Unit;
 
@@ -130,10 +131,10 @@ impl Study {
     }
 
     /// Sets every tied tuner from the ones it follows.
-    pub fn apply_ties(&self, values: &mut [f64]) {
+    pub fn apply_ties<S: Scalar>(&self, values: &mut [S]) {
         for (i, tuner) in self.tuners.iter().enumerate() {
             if let Some((expression, of)) = &tuner.tie {
-                let arguments: Vec<f64> = of.iter().map(|&j| values[j]).collect();
+                let arguments: Vec<S> = of.iter().map(|&j| values[j]).collect();
                 values[i] = expression.evaluate(&arguments);
             }
         }
@@ -148,5 +149,14 @@ impl Study {
                 ParameterSource::Tuner { tuner, factor } => tuners[tuner] * factor,
             })
             .collect()
+    }
+
+    /// Derivative of a job's parameters for a given derivative of all tuners.
+    pub fn parameter_slopes(&self, job: &JobPlan, tuners: &[f64]) -> Vec<f64> {
+        let slope = |source: &ParameterSource| match *source {
+            ParameterSource::Constant(_) => 0.0,
+            ParameterSource::Tuner { tuner, factor } => tuners[tuner] * factor,
+        };
+        job.parameters.iter().map(slope).collect()
     }
 }

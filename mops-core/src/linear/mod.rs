@@ -1,0 +1,43 @@
+//! Linear time-invariant systems.
+
+use nalgebra::DMatrix;
+
+/// A linear time-invariant system with named states, inputs and outputs:
+///
+/// ```text
+/// dx/dt = A x + B u(t - delay),   y = C x + D u(t - delay)
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateSpace {
+    /// `A`, states x states.
+    pub a: DMatrix<f64>,
+    /// `B`, states x inputs.
+    pub b: DMatrix<f64>,
+    /// `C`, outputs x states.
+    pub c: DMatrix<f64>,
+    /// `D`, outputs x inputs.
+    pub d: DMatrix<f64>,
+    /// Names of the states.
+    pub states: Vec<String>,
+    /// Names of the inputs.
+    pub inputs: Vec<String>,
+    /// Names of the outputs.
+    pub outputs: Vec<String>,
+    /// Delay of all inputs, s.
+    pub delay: f64,
+}
+
+impl StateSpace {
+    /// Every matrix, and the delay, moved by `distance` along a tangent of the same shape.
+    #[must_use]
+    pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
+        Self {
+            a: &self.a + &tangent.a * distance,
+            b: &self.b + &tangent.b * distance,
+            c: &self.c + &tangent.c * distance,
+            d: &self.d + &tangent.d * distance,
+            delay: self.delay + distance * tangent.delay,
+            ..self.clone()
+        }
+    }
+}
