@@ -101,11 +101,14 @@ pub fn integrate<S: Scalar, D: Dynamics<S>>(
         step.start = t;
         step.length = h;
         step.taken = h;
-        if sink.reads_steps() || dynamics.guards() > 0 {
+        if sink.reads_steps() || dynamics.guards() > 0 || dynamics.remembers() {
             dense_output(h, &x, &next, &k, &mut step.dense);
         }
         let event = first_event(dynamics, &mut step, &mut stage);
         sink.step(&step, dynamics);
+        if dynamics.remembers() {
+            dynamics.accepted(&step);
+        }
         if let Some(index) = event {
             let mut at = stage.clone();
             step.state(1.0, &mut at);
