@@ -184,6 +184,10 @@ impl<X: Clone> Esdirk<X> {
             return;
         }
         let (moved, slopes) = (&mut self.base, &mut self.update);
+        // The derivative kept in `k` is right to the tolerance only, which differences would magnify.
+        f.derivative(t, x, slopes);
+        work.derivatives += 1;
+        self.column.iter_mut().zip(slopes.as_ref()).for_each(|(c, s)| *c = s.value());
         for group in &self.groups {
             moved.as_mut().copy_from_slice(x.as_ref());
             // Steps of the square root of the rounding, relative to the state or to where it begins to count.
@@ -196,7 +200,7 @@ impl<X: Clone> Esdirk<X> {
             work.derivatives += 1;
             for &j in group {
                 for &i in &self.rows[j] {
-                    let slope = (slopes.as_ref()[i] - self.k[0].as_ref()[i]).value() / step(j);
+                    let slope = (slopes.as_ref()[i].value() - self.column[i]) / step(j);
                     self.jacobian.set(i, j, slope);
                 }
             }
