@@ -1,9 +1,13 @@
 //! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
 
-pub mod dormand_prince;
+mod banded;
+mod dormand_prince;
 pub mod drive;
 pub mod elements;
+mod esdirk;
+mod events;
 pub mod friction;
+mod integrate;
 pub mod mechanism;
 mod record;
 
@@ -11,7 +15,7 @@ use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use dormand_prince::{Step, integrate};
+pub use integrate::{Step, integrate};
 pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
@@ -52,6 +56,18 @@ pub trait Dynamics<S: Scalar> {
         f64::INFINITY
     }
 
+    /// The places of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
+    /// method solves with the band that they span.
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        None
+    }
+
+    /// Tells every entry of the Jacobian `df/dx` as row, column and value, and returns `true`; `false` where the
+    /// implementor has no exact one, and differences must do.
+    fn jacobian(&self, _t: f64, _x: &Self::State, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        false
+    }
+
     /// A break was reached (also called once at the start): inputs take their new values.
     fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
 
@@ -74,11 +90,24 @@ pub struct Tolerance {
     pub absolute: f64,
     /// Largest number of steps; a simulation that needs more is a failure.
     pub max_steps: usize,
+    /// The method of integration.
+    pub method: IntegrationMethod,
+}
+
+/// A method of integration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum IntegrationMethod {
+    /// Dormand-Prince 5(4): for models whose fastest motion is of interest.
+    #[default]
+    Explicit,
+    /// ESDIRK 4(3), L-stable: for models with motions much faster than what is of interest (heat, reactions, stiff contacts).
+    Stiff,
 }
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self { relative: 1e-8, absolute: 1e-10, max_steps: 100_000 }
+        Self { relative: 1e-8, absolute: 1e-10, max_steps: 100_000, method: IntegrationMethod::Explicit }
     }
 }
 
