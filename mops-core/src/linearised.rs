@@ -104,10 +104,9 @@ impl Linearised {
         let interface = Interface {
             signals: outputs.iter().map(|&i| of.signals[i].clone()).collect(),
             parameters: of.parameters.clone(),
-            states: Vec::new(),
             inputs: inputs.iter().map(|&i| of.inputs[i].clone()).collect(),
-            horizon: None,
             analysis: AnalysisKind::Linear,
+            ..Interface::default()
         };
         let free = options.equilibrium.then_some(free);
         Ok(Self { model, interface, states, inputs, outputs, given, starts, free })

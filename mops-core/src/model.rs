@@ -296,7 +296,9 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Diverged(t) => write!(f, "diverged at {t:.4} s"),
-            Self::StepLimit(t) => write!(f, "took too many steps, the last at {t:.4} s: stiff equations, or too tight a tolerance"),
+            Self::StepLimit(t) => {
+                write!(f, "took too many steps, the last at {t:.4} s: stiff equations, or too tight a tolerance")
+            }
             Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
             Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
         }
