@@ -3,6 +3,7 @@
 pub mod furuta;
 pub mod kernel;
 pub mod pid_loop;
+mod plant;
 
 use mops_core::ModelKind;
 
