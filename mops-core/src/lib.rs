@@ -10,7 +10,7 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod experiment;
-mod expression;
+pub mod expression;
 pub mod file;
 pub mod linear;
 mod model;
