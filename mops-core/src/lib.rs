@@ -15,6 +15,7 @@ pub mod file;
 pub mod linear;
 mod model;
 mod outcome;
+mod port;
 mod problem;
 mod random;
 mod run;
@@ -44,6 +45,7 @@ pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,
     Pareto, StartReport, TunerReport, criterion_reports,
 };
+pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};

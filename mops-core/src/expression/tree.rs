@@ -56,7 +56,7 @@ pub enum Operator {
 }
 
 /// A comparison of two numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Comparison {
     /// `a > b`.
     Greater,
