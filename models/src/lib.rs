@@ -1,5 +1,6 @@
 //! The simulation kernel of mops, and its models: one file each.
 
+pub mod equations;
 pub mod furuta;
 pub mod furuta_2_joint;
 pub mod furuta_3_joint;
@@ -7,6 +8,7 @@ pub mod furuta_linear;
 pub mod furuta_state_feedback;
 pub mod kernel;
 pub mod pid_loop;
+mod plant;
 
 use mops_core::ModelKind;
 
@@ -19,6 +21,7 @@ pub fn kinds() -> Vec<ModelKind> {
         ModelKind::of::<furuta_3_joint::Furuta3JointOptions>(),
         ModelKind::of::<furuta_linear::FurutaLinearOptions>(),
         ModelKind::of::<furuta_state_feedback::FurutaStateFeedbackOptions>(),
+        ModelKind::of::<equations::EquationsOptions>(),
     ]
 }
 

@@ -8,6 +8,7 @@ mod esdirk;
 mod events;
 pub mod friction;
 mod integrate;
+mod local;
 pub mod mechanism;
 mod record;
 
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use integrate::{Step, integrate};
+pub use local::{Equations, local, rates_and_signals};
 pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
