@@ -13,7 +13,7 @@ pub enum Scale {
     /// Evenly.
     #[default]
     Linear,
-    /// Evenly in the logarithm; the range must be positive.
+    /// Evenly in the logarithm; the range lies on one side of zero.
     Log,
 }
 
@@ -63,7 +63,7 @@ impl Tuner {
             _ if u == 0.0 => min,
             _ if u == 1.0 => max,
             Scale::Linear => min + u * (max - min),
-            Scale::Log => (min.ln() + u * (max / min).ln()).exp(),
+            Scale::Log => min.signum() * (min.abs().ln() + u * (max / min).ln()).exp(),
         };
         match &self.grid {
             Grid::Continuous => spread(u),
@@ -155,10 +155,21 @@ mod tests {
 
     #[test]
     fn the_slope_is_that_of_the_value() {
-        for scale in [Scale::Linear, Scale::Log] {
-            let t = tuner(scale, Grid::Continuous);
+        let negative = Tuner { bounds: [-50.0, -0.1], ..tuner(Scale::Log, Grid::Continuous) };
+        for t in [tuner(Scale::Linear, Grid::Continuous), tuner(Scale::Log, Grid::Continuous), negative] {
             let slope = (t.value_at(0.4 + 1e-6) - t.value_at(0.4 - 1e-6)) / 2e-6;
-            assert!((t.slope_at(t.value_at(0.4)) - slope).abs() < 1e-6 * slope, "{scale:?}");
+            assert!((t.slope_at(t.value_at(0.4)) - slope).abs() < 1e-6 * slope, "{:?}", t.scale);
+        }
+    }
+
+    #[test]
+    fn a_negative_range_in_the_logarithm_is_the_mirror_of_the_positive_one() {
+        let positive = tuner(Scale::Log, Grid::Continuous);
+        let negative = Tuner { bounds: [-50.0, -0.1], ..tuner(Scale::Log, Grid::Continuous) };
+        for u in [0.0, 0.2, 0.7, 1.0] {
+            let mirrored = -positive.value_at(1.0 - u);
+            assert!((negative.value_at(u) - mirrored).abs() < 1e-12 * mirrored.abs());
+            assert!((negative.position_of(negative.value_at(u)) - u).abs() < 1e-12);
         }
     }
 

@@ -389,8 +389,8 @@ fn build_tuner(
     if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
         return Err(Mistake::new(key, format!("the tuner cannot be at {}", unit.amount(value))).with_help(way_out));
     }
-    if draft.scale == Scale::Log && min <= 0.0 {
-        return Err(Mistake::new("scale", format!("a logarithmic range must be positive, but `min` is {min}"))
+    if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
+        return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
             .with_help("raise `min`, or leave `scale` out"));
     }
     if let Some(parameter) = parameter {
