@@ -98,6 +98,7 @@ impl Furuta {
                 state("dtheta", "dtheta0", "dtheta", Some("theta")),
             ],
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
+            ports: Vec::new(),
             horizon,
             analysis: AnalysisKind::Time,
         };

@@ -1,6 +1,11 @@
 //! The simulation kernel of mops, and its models: one file each.
 
+pub mod equations;
 pub mod furuta;
+pub mod furuta_2_joint;
+pub mod furuta_3_joint;
+pub mod furuta_linear;
+pub mod furuta_state_feedback;
 pub mod kernel;
 mod linear_system;
 pub mod pid_loop;
@@ -19,6 +24,11 @@ pub fn kinds() -> Vec<ModelKind> {
         ModelKind::of::<pid_open_loop::PidOpenLoopOptions>(),
         ModelKind::of::<transfer_function::TransferFunctionOptions>(),
         ModelKind::of::<state_space::StateSpaceOptions>(),
+        ModelKind::of::<furuta_2_joint::Furuta2JointOptions>(),
+        ModelKind::of::<furuta_3_joint::Furuta3JointOptions>(),
+        ModelKind::of::<furuta_linear::FurutaLinearOptions>(),
+        ModelKind::of::<furuta_state_feedback::FurutaStateFeedbackOptions>(),
+        ModelKind::of::<equations::EquationsOptions>(),
     ]
 }
 

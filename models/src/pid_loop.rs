@@ -151,6 +151,7 @@ fn interface(named: &[String], horizon: f64) -> Interface {
         states: Vec::new(),
         inputs: vec![Variable::new("r", "1", "setpoint"), Variable::new("d", "1", "load at the plant's input")],
         horizon: Some(horizon),
+        ports: Vec::new(),
         analysis: AnalysisKind::Time,
     }
 }

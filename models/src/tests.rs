@@ -1,5 +1,8 @@
 //! Models against closed forms, published values and an independent integration.
 
+mod furuta_bodies;
+mod state_feedback;
+
 use mops_core::{Case, Input, Job, Model, ModelOptions, Parameter, Response};
 
 use crate::furuta::Furuta;
@@ -24,9 +27,14 @@ fn simulate(model: &dyn Model, case: &Case, parameters: &[f64], horizon: f64) ->
     analysis.response().expect("a simulation").clone()
 }
 
-/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
-/// a millionth of their value.
+/// [`check_tangents_by`] a millionth.
 fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
+    check_tangents_by(1e-6, model, case, parameters, horizon);
+}
+
+/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
+/// the part `step` of their value.
+fn check_tangents_by(step: f64, model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
     let values = values(model, parameters);
     let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
     let finite: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
@@ -38,7 +46,7 @@ fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], ho
     assert_eq!(plain.traces, analysis.response().unwrap().traces, "tangents change no bit");
     let times: Vec<f64> = (0..200).map(|i| horizon * (f64::from(i) + 0.5) / 200.0).collect();
     for (&i, tangent) in finite.iter().zip(&tangents) {
-        let h = if values[i] == 0.0 { 1e-6 } else { 1e-6 * values[i].abs() };
+        let h = if values[i] == 0.0 { step } else { step * values[i].abs() };
         let moved = |by: f64| {
             let mut moved = values.clone();
             moved[i] += by;

@@ -10,12 +10,13 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod experiment;
-mod expression;
+pub mod expression;
 pub mod file;
 pub mod linear;
 mod linearised;
 mod model;
 mod outcome;
+mod port;
 mod problem;
 mod random;
 mod run;
@@ -46,6 +47,7 @@ pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,
     Pareto, StartReport, TunerReport, criterion_reports,
 };
+pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};

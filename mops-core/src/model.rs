@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::case::Case;
 use crate::linear::StateSpace;
+use crate::port::Port;
 use crate::trace::Trace;
 use crate::unit::Unit;
 
@@ -87,6 +88,8 @@ pub struct Interface {
     pub states: Vec<State>,
     /// What experiments and cases can drive; 0 where nothing does.
     pub inputs: Vec<Variable>,
+    /// Places where a missing effect may act.
+    pub ports: Vec<Port>,
     /// End of the simulation, s, where no experiment gives one.
     pub horizon: Option<f64>,
     /// What its analyses are: criteria refuse a model of the other sort.

@@ -147,11 +147,14 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         step.start = t;
         step.length = h;
         step.taken = h;
-        if sink.reads_steps() || dynamics.guards() > 0 {
+        if sink.reads_steps() || dynamics.guards() > 0 || dynamics.remembers() {
             method.dense(h, &x, &next, &mut step.dense);
         }
         let event = first_event(dynamics, &mut step, &mut spare);
         sink.step(&step, dynamics);
+        if dynamics.remembers() {
+            dynamics.accepted(&step);
+        }
         if let Some(index) = event {
             step.state(1.0, &mut at);
             // An event at the very start of a step is one at the same time as the last: modes that never agree on

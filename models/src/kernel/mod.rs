@@ -3,14 +3,16 @@
 mod banded;
 mod dormand_prince;
 pub mod drive;
+pub mod elements;
 mod esdirk;
 mod events;
 pub mod friction;
 mod integrate;
 mod local;
+pub mod mechanism;
 mod record;
 
-use mops_core::{Failure, Scalar, Work};
+use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -41,7 +43,7 @@ pub trait Dynamics<S: Scalar> {
     }
 
     /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
-    /// event, whose time moves too. Returns what happened.
+    /// event, whose time moves too. Returns what happened; an empty text where a user need not know.
     fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &'static str {
         ""
     }
@@ -70,6 +72,14 @@ pub trait Dynamics<S: Scalar> {
 
     /// A break was reached (also called once at the start): inputs take their new values.
     fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
+
+    /// Whether it wants to be told of accepted steps.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// A step was accepted: a delay keeps what will come out of it later.
+    fn accepted(&mut self, _step: &Step<Self::State>) {}
 }
 
 /// Accuracy and limits of a simulation.
@@ -108,8 +118,8 @@ impl Tolerance {
     ///
     /// # Errors
     /// A tolerance outside (0, 1), or no steps at all.
-    pub fn check(&self) -> Result<(), mops_core::Mistake> {
-        let wrong = |key: &str, fact: String| mops_core::Mistake::new(key, fact).within("tolerance");
+    pub fn check(&self) -> Result<(), Mistake> {
+        let wrong = |key: &str, fact: String| Mistake::new(key, fact).within("tolerance");
         for (key, value) in [("relative", self.relative), ("absolute", self.absolute)] {
             if !(value > 0.0 && value < 1.0) {
                 return Err(wrong(key, format!("a tolerance lies between 0 and 1, not at {value}")));
@@ -117,6 +127,14 @@ impl Tolerance {
         }
         if self.max_steps == 0 { Err(wrong("max-steps", "a simulation needs steps".into())) } else { Ok(()) }
     }
+}
+
+/// A time that a model's options give under `key`, in s.
+///
+/// # Errors
+/// A quantity that is no time.
+pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, Mistake> {
+    time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| Mistake::new(key, e))
 }
 
 /// What the integrator tells of a simulation: steps, then events.

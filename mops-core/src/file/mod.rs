@@ -1,6 +1,7 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
 //! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
 
+mod entries;
 mod experiment;
 mod schema;
 mod sections;
@@ -11,6 +12,7 @@ mod tree;
 use std::io;
 use std::sync::Arc;
 
+pub use entries::{Entries, Short};
 pub use schema::{describe, schema_of, study_schema, tables};
 
 use crate::catalogue::{Catalogue, SolverChoice};
