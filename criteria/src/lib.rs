@@ -19,6 +19,7 @@ pub mod delay_time;
 pub mod final_value;
 pub mod fit;
 pub mod fit_percent;
+pub mod frequency_fit;
 pub mod gain_margin;
 pub mod h2_norm;
 pub mod hinf_norm;
@@ -82,5 +83,6 @@ pub fn kinds() -> Vec<CriterionKind> {
         CriterionKind::of::<slowest_pole::SlowestPole>(),
         CriterionKind::of::<h2_norm::H2Norm>(),
         CriterionKind::of::<hinf_norm::HinfNorm>(),
+        CriterionKind::of::<frequency_fit::FrequencyFit>(),
     ]
 }

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use crate::kinds;
 
 /// Every kind, with options as they stand in a study file.
-const EXAMPLES: [(&str, &str); 31] = [
+const EXAMPLES: [(&str, &str); 32] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
     ("peak", "{ signal = 'y', of = 'absolute' }"),
@@ -46,6 +46,7 @@ const EXAMPLES: [(&str, &str); 31] = [
     ("slowest-pole", "{ of = 'system' }"),
     ("h2-norm", "{}"),
     ("hinf-norm", "{}"),
+    ("frequency-fit", "{ signal = 'y', input = 'u', absolute = false }"),
 ];
 
 /// Kinds from this one on read linear systems.
@@ -88,8 +89,11 @@ fn every_kind_is_read_from_a_study_file_and_has_a_value() {
     let problem = Problem::new(read_study(&criteria).expect("it is a study").into());
     let evaluation = problem.evaluate(&problem.start());
     assert!(evaluation.failures.is_empty(), "{:?}", evaluation.failures);
-    let measured = ["fit", "normalised-error", "rmse", "fit-percent"].len();
-    assert_eq!(evaluation.readings.iter().flatten().count(), 2 * (EXAMPLES.len() - measured) + measured);
+    // In the case and in both experiments; over time not in the one over frequency; of measurements only where there is one.
+    let measured = ["fit", "normalised-error", "rmse", "fit-percent", "frequency-fit"].len();
+    let linear = EXAMPLES.iter().filter(|(name, _)| is_linear(name)).count() - 1;
+    let simulated = EXAMPLES.len() - linear - measured;
+    assert_eq!(evaluation.readings.iter().flatten().count(), 2 * simulated + 3 * linear + measured);
 }
 
 #[test]
@@ -103,7 +107,7 @@ fn a_criterion_refuses_a_model_of_the_other_sort_and_names_one_that_fits() {
     assert!(wrong.to_string().contains("`linear` is a linear system"), "{wrong}");
     let wrong = read_study("margin = { gain-margin = { input = 'v' }, model = 'linear', usage = 'monitor' }").err();
     let wrong = wrong.expect("no such input");
-    assert!(wrong.to_string().contains(":13:36: the model has no input `v`"), "{wrong}");
+    assert!(wrong.to_string().contains(":14:36: the model has no input `v`"), "{wrong}");
 }
 
 #[test]
@@ -111,7 +115,7 @@ fn a_mistake_in_an_option_is_led_back_to_its_place() {
     let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, model = 'lag', demand = 1 }")
         .err()
         .expect("the unit is wrong");
-    assert!(wrong.to_string().contains(":13:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
+    assert!(wrong.to_string().contains(":14:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
 }
 
 fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {
@@ -122,6 +126,7 @@ fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic>
     let text = format!(
         "[study]\nname = 'test'\n[models]\nlag = {{ lag = {{}} }}\nlinear = {{ linear-lag = {{}} }}\n[tuners]\nT = {{ start = 1, min = 0.5, max = 2 }}\n\
          [cases]\nstep = {{ horizon = 6 }}\n[experiments]\nlog = {{ file = 'log.csv', channels = {{ y = 'y' }} }}\n\
+         sweep = {{ file = 'sweep.csv', frequency = 'f', responses = {{ y = {{ real = 're', imaginary = 'im' }} }} }}\n\
          [criteria]\n{criteria}"
     );
     read(&catalogue, "study.toml", &text, &[], &Data).map(|file| file.study)
@@ -131,7 +136,10 @@ fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic>
 struct Data;
 
 impl Files for Data {
-    fn read(&self, _: &str) -> io::Result<Vec<u8>> {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        if path == "sweep.csv" {
+            return Ok(b"f [Hz],re,im\n0.1,2,-1\n0.2,1,-1\n".to_vec());
+        }
         Ok(b"time [s],y [m]\n0,0\n2,0.8\n4,1.0\n".to_vec())
     }
 

@@ -35,7 +35,7 @@ pub use catalogue::{
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
-pub use experiment::{Channel, Experiment, Hold, Input, Role};
+pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting};

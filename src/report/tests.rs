@@ -75,7 +75,7 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     let values = times.iter().map(|t| 1.0 - (-t / 1.3f64).exp() + 0.01 * (40.0 * t).sin()).collect();
     let channel =
         ChannelDraft { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelDraft::default() };
-    let measured = Measured { channels: vec![channel], role: Role::Calibration, free: Vec::new() };
+    let measured = Measured { channels: vec![channel], role: Role::Calibration, ..Measured::default() };
     let draft = Draft {
         name: name.into(),
         models: vec![("lag".into(), Lag::new().into())],

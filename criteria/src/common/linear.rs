@@ -42,7 +42,8 @@ impl Channel {
         Ok(Self { input, output, signal: model.signals[output].name.clone(), unit })
     }
 
-    fn system(&self, analysis: &Analysis) -> StateSpace {
+    /// The system from the input to the output.
+    pub fn system(&self, analysis: &Analysis) -> StateSpace {
         analysis.linear().expect("checked when the study is built").channel(self.input, self.output)
     }
 }

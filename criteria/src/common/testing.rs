@@ -70,7 +70,10 @@ pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
 /// A case in which `y` was measured.
 pub fn measured(times: &[f64], values: &[f64], noise: Option<f64>) -> Case {
     let channel = Channel { signal: "y".into(), times: times.to_vec(), values: values.to_vec(), noise };
-    Case { experiment: Some(Experiment { channels: vec![channel], role: Role::Calibration }), ..Case::default() }
+    Case {
+        experiment: Some(Experiment { channels: vec![channel], role: Role::Calibration, ..Experiment::default() }),
+        ..Case::default()
+    }
 }
 
 /// A quantity as a user writes it.

@@ -3,6 +3,7 @@
 
 mod entries;
 mod experiment;
+mod frequency;
 mod schema;
 mod sections;
 mod shape;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{Objective, Study, Task};
 use crate::criterion::{CriterionSpec, Usage};
-use crate::experiment::{Input, Role};
+use crate::experiment::{Input, ResponseData, Role};
 use crate::model::Model;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
@@ -168,6 +168,8 @@ pub struct CaseDraft {
 pub struct Measured {
     /// Measured signals.
     pub channels: Vec<ChannelDraft>,
+    /// Measured frequency responses.
+    pub responses: Vec<ResponseData>,
     /// What it is used for.
     pub role: Role,
     /// States whose start values are estimated.
