@@ -13,6 +13,7 @@ mod experiment;
 pub mod expression;
 pub mod file;
 pub mod linear;
+mod linearised;
 mod model;
 mod outcome;
 mod port;
@@ -37,9 +38,10 @@ pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use experiment::{Channel, Experiment, Hold, Input, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
+pub use linearised::{Linearise, Linearised, Resting};
 pub use model::{
-    Analysis, AnalysisKind, Event, Failure, Interface, Job, Model, Parameter, Response, State, Variable, WithTangents,
-    Work,
+    Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
+    Variable, WithTangents, Work,
 };
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,

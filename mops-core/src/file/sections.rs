@@ -8,6 +8,7 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use super::entries::Entries;
 use crate::criterion::Usage;
 use crate::experiment::{Hold, Input, Role};
+use crate::linearised::Linearise;
 use crate::study::{Objective, Task};
 use crate::tuner::Scale;
 use crate::unit::Quantity;
@@ -34,10 +35,40 @@ pub(super) struct ModelCommon {
     /// Values of parameters that neither a tuner nor a case sets.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
+    /// Makes it the linearisation of the model, to be read by criteria of linear systems:
+    /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`; `{}` for all of them.
+    pub linearise: Option<LineariseSection>,
 }
 
 impl ModelCommon {
-    pub const KEYS: &[&str] = &["parameters"];
+    pub const KEYS: &[&str] = &["parameters", "linearise"];
+}
+
+/// Where a model is linearised, and between what.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct LineariseSection {
+    /// Inputs; all where absent.
+    pub inputs: Option<Vec<String>>,
+    /// Signals that are outputs; all where absent.
+    pub outputs: Option<Vec<String>>,
+    /// Values of states and inputs at the operating point; states that are not named have their start value, inputs the
+    /// value that the case gives them at the start.
+    #[serde(default)]
+    pub at: Entries<Quantity>,
+    /// `true` moves the operating point to the nearest equilibrium; what `at` names is held, and so are the inputs.
+    #[serde(default)]
+    pub equilibrium: bool,
+    /// States and inputs that the search for the equilibrium may move although they would be held.
+    #[serde(default)]
+    pub free: Vec<String>,
+}
+
+impl From<LineariseSection> for Linearise {
+    fn from(section: LineariseSection) -> Self {
+        let LineariseSection { inputs, outputs, at, equilibrium, free } = section;
+        Self { inputs, outputs, at: at.0, equilibrium, free }
+    }
 }
 
 /// A quantity that a solver may change; its name is that of a model's parameter.
