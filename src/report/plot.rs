@@ -93,6 +93,8 @@ pub struct Plot {
     pub bands: Vec<Band>,
     /// Shown range of x; that of the curves where absent.
     pub x_range: Option<[f64; 2]>,
+    /// Whether x is logarithmic; points that are not positive are then left out.
+    pub log_x: bool,
     /// Whether y is logarithmic; values that are not positive are then left out.
     pub log_y: bool,
 }

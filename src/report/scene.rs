@@ -58,9 +58,9 @@ impl Scene {
     /// Lays out a plot.
     pub(super) fn of(plot: &Plot) -> Self {
         let mut scene = Self::default();
-        let xs = plot.curves.iter().flat_map(|c| &c.points).filter_map(|p| drawable(p.0, false));
-        let x_range = range_of(xs.chain(plot.x_range.into_iter().flatten()));
-        let x = time_axis(x_range.unwrap_or([0.0, 1.0]));
+        let xs = plot.curves.iter().flat_map(|c| &c.points).filter_map(|p| drawable(p.0, plot.log_x));
+        let given = plot.x_range.into_iter().flatten().filter_map(|x| drawable(x, plot.log_x));
+        let x = x_axis(range_of(xs.chain(given)).unwrap_or([0.0, 1.0]), plot.log_x);
         let y_range = y_range(plot);
         let y = Axis::new(y_range.unwrap_or([0.0, 1.0]), plot.log_y, 7.0);
         let levels: Vec<(f64, &str)> = plot
@@ -154,12 +154,12 @@ impl Scene {
 }
 
 /// The axis along x: fewer ticks where their labels would touch.
-fn time_axis(range: [f64; 2]) -> Axis {
+fn x_axis(range: [f64; 2], log: bool) -> Axis {
     let labels = |axis: &Axis| {
         ADVANCE * (longest(axis.ticks.iter().map(|(_, label)| label.as_str())) + 1.5) * axis.ticks.len() as f64
     };
-    let axis = Axis::new(range, false, 8.0);
-    if labels(&axis) > 0.75 * SIZE[0] { Axis::new(range, false, 4.0) } else { axis }
+    let axis = Axis::new(range, log, 8.0);
+    if labels(&axis) > 0.75 * SIZE[0] { Axis::new(range, log, 4.0) } else { axis }
 }
 
 fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
