@@ -3,6 +3,7 @@
 mod check;
 mod data;
 mod describe;
+mod findings;
 mod list;
 mod new;
 mod progress;

@@ -1,6 +1,6 @@
 //! A study as it is written down, in a file or in Rust: nothing checked yet.
 
-use super::{Objective, Study, Task};
+use super::{Objective, Study, Task, TasksDraft};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::experiment::{Input, Role};
 use crate::model::Model;
@@ -72,6 +72,8 @@ pub struct Draft {
     pub cases: Vec<CaseDraft>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionDraft)>,
+    /// What tasks other than design and calibration are asked.
+    pub tasks: TasksDraft,
 }
 
 impl Draft {
