@@ -98,9 +98,10 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
         run = Run::new(&problem, Budget { evaluations: 1 }, &());
         run.evaluate(&[problem.start()]).expect("a budget of one point suffices for one");
     }
-    let ending = Ending { stop: Stop::Converged, pareto: Pareto::NotShown, seconds: 0.0 };
+    // N.B.: as if it were interrupted, so that no start value is estimated either.
+    let ending = Ending { stop: Stop::Interrupted, pareto: Pareto::NotShown, seconds: 0.0 };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
-    outcome.solver = "none".to_owned();
+    (outcome.solver, outcome.stop) = ("none".to_owned(), Stop::Converged);
     outcome.seconds = begun.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);

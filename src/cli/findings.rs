@@ -35,7 +35,13 @@ fn sentences(words: &[String]) -> String {
 }
 
 fn share(value: f64) -> String {
-    if value.is_finite() { format!("{} %", significant(100.0 * value, 3)) } else { String::new() }
+    if value.abs() < 1e-13 {
+        "0 %".to_owned()
+    } else if value.is_finite() {
+        format!("{} %", significant(100.0 * value, 3))
+    } else {
+        String::new()
+    }
 }
 
 fn known(value: f64) -> String {
@@ -59,21 +65,12 @@ fn sensitivity(found: &SensitivityReport) -> String {
     let header = ["tuner", "value", "unit", "effect", "std. error", "alone", "relative", "factor", ""];
     let mut text = format!("\n{}", table(&header, &[1, 3, 4, 5, 6, 7], rows.collect()));
     let largest = found.relative.eigenvalues.first().copied().unwrap_or(1.0);
-    let own_largest = found.eigenvalues.first().copied().unwrap_or(1.0);
-    let eigen = (0..found.tuners.len()).map(|i| {
-        let (relative, own) = (found.relative.eigenvalues[i], found.eigenvalues[i]);
-        let name = |vector: &[f64]| combination(found, vector).replace('`', "");
-        vec![
-            significant(relative, 5),
-            significant(relative / largest, 2),
-            name(&found.relative.eigenvectors[i]),
-            significant(own, 5),
-            significant(own / own_largest, 2),
-            name(&found.eigenvectors[i]),
-        ]
+    let eigen = found.relative.eigenvalues.iter().zip(&found.relative.eigenvectors).map(|(value, vector)| {
+        let direction = combination(found, vector, 0.1).replace('`', "");
+        vec![significant(*value, 5), significant(value / largest, 2), direction]
     });
-    let header = ["eigenvalue", "share", "direction (relative)", "in own units", "share", "direction (own units)"];
-    text += &format!("\n{}\n{}", table(&header, &[0, 1, 3, 4], eigen.collect()), sentences(&found.words));
+    let header = ["eigenvalue", "share", "direction, relative changes"];
+    text += &format!("\n{}\n{}", table(&header, &[0, 1], eigen.collect()), sentences(&found.words));
     text
 }
 

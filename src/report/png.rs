@@ -57,11 +57,7 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
         }
         Mark::Cell { frame, rgb: [r, g, b] } => {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
-            let (from, to) = (pixel(frame.from), pixel(frame.to));
-            // Both corners are painted: neighbours must not overlap.
-            paper
-                .draw_rect(from, ((to.0 - 1).max(from.0), (to.1 - 1).max(from.1)), &RGBColor(*r, *g, *b), true)
-                .map_err(failed)
+            paper.draw_rect(pixel(frame.from), pixel(frame.to), &RGBColor(*r, *g, *b), true).map_err(failed)
         }
         Mark::Text { text, at, anchor, size, ink, upwards } => {
             let h_pos = match anchor {

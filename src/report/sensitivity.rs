@@ -145,10 +145,10 @@ fn directions(found: &SensitivityReport) -> Markup {
                     tr {
                         td class="number" { (significant(*value, 4)) }
                         td class="number" { (significant(value / largest, 2)) }
-                        td { (rich(&combination(found, vector))) }
+                        td { (rich(&combination(found, vector, 0.01))) }
                         td class="number" { (significant(*own_value, 4)) }
                         td class="number" { (significant(own_value / own_largest, 2)) }
-                        td { (rich(&combination(found, own_vector))) }
+                        td { (rich(&combination(found, own_vector, 0.01))) }
                     }
                 }
             }
@@ -156,10 +156,10 @@ fn directions(found: &SensitivityReport) -> Markup {
     }
 }
 
-/// An eigenvector as a sum; parts below a hundredth are left out.
-pub(crate) fn combination(found: &SensitivityReport, vector: &[f64]) -> String {
+/// An eigenvector as a sum; parts below `least` are left out.
+pub(crate) fn combination(found: &SensitivityReport, vector: &[f64], least: f64) -> String {
     let mut text = String::new();
-    for (tuner, part) in found.tuners.iter().zip(vector).filter(|(_, part)| part.abs() >= 0.01) {
+    for (tuner, part) in found.tuners.iter().zip(vector).filter(|(_, part)| part.abs() >= least) {
         let sign = match (text.is_empty(), *part < 0.0) {
             (true, true) => "-",
             (true, false) => "",

@@ -14,9 +14,10 @@ pub(super) const SCALE_WIDTH: f64 = 84.0;
 const COLOURS: usize = 32;
 const LINES: usize = 8;
 
-/// Heights above this share of all others are drawn as if they were at it: a few points next to a failure would flatten
-/// the rest.
-const HIGHEST: f64 = 0.97;
+/// Heights above this share of all others, or so many decades above the lowest, are drawn as if they were there: what
+/// blows up next to a failure would flatten the rest.
+const HIGHEST: f64 = 0.9;
+const DECADES: f64 = 4.0;
 
 /// Red, green and blue from low to high; their lightness grows evenly, also for readers who see fewer colours.
 /// Source: S. van der Walt, N. Smith, viridis, Matplotlib 1.5 (2015), every 32nd colour.
@@ -51,7 +52,8 @@ impl Surface {
         let mut all: Vec<f64> = self.values.iter().flatten().filter_map(|&v| drawable(v, self.log)).collect();
         all.sort_by(f64::total_cmp);
         let high = all.get(((all.len() as f64 * HIGHEST) as usize).min(all.len().saturating_sub(1)))?;
-        range_of([all[0], *high].into_iter())
+        let high = if self.log { high.min(all[0] + DECADES) } else { *high };
+        range_of([all[0], high].into_iter())
     }
 }
 

@@ -6,8 +6,8 @@ use super::at;
 use crate::report::significant;
 use crate::solve::{Options, Solved, Unsuitable};
 
-/// Points this close to the best, by the whole height of the surface, count as its valley.
-const VALLEY: f64 = 0.01;
+/// Share of all points, the lowest, that count as the valley.
+const VALLEY: f64 = 0.05;
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let task = study.tasks.sweep.clone().expect("a study with this task says what is swept");
@@ -117,20 +117,23 @@ fn words(sweep: &SweepReport) -> Vec<String> {
         number(lowest),
         number(highest)
     )];
-    let level = sweep.best[2] + VALLEY * (highest - sweep.best[2]);
+    let mut sorted = all.clone();
+    sorted.sort_by(f64::total_cmp);
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let level = sorted[(sorted.len() as f64 * VALLEY) as usize];
     let low = |row: usize, column: usize| sweep.objective[row][column] <= level;
     let columns: Vec<usize> =
         (0..sweep.x.values.len()).filter(|&c| (0..sweep.objective.len()).any(|r| low(r, c))).collect();
     let rows: Vec<usize> =
         (0..sweep.objective.len()).filter(|&r| (0..sweep.x.values.len()).any(|c| low(r, c))).collect();
     let range = |axis: &SweepAxis, of: &[usize]| {
-        let [from, to] = [of.first(), of.last()].map(|i| number(axis.values[*i.expect("the best point is low")]));
+        let [from, to] = [of.first(), of.last()].map(|i| number(axis.values[*i.expect("the lowest point is low")]));
         format!("`{}` from {from} to {to}", axis.tuner)
     };
     let along_y = sweep.y.as_ref().map_or_else(String::new, |y| format!(" and {}", range(y, &rows)));
     words.push(format!(
-        "It stays within 1 % of that height above the best over {}{along_y}: what lies in one valley the criteria hardly \
-         tell apart.",
+        "The lowest twentieth of the points, up to an objective of {}, spans {}{along_y}.",
+        number(level),
         range(&sweep.x, &columns)
     ));
     let failed = sweep.objective.iter().flatten().filter(|v| !v.is_finite()).count();

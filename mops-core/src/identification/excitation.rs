@@ -53,7 +53,8 @@ pub struct Excitation {
     pub eigenvalue: f64,
     /// The same of `C_(order + 1)`, the first that counts as zero; none where the order is the largest tested.
     pub next: Option<f64>,
-    /// Smallest eigenvalue of `C_(order + 1)` over the whole record, transients included, as a share of the power.
+    /// Smallest eigenvalue of `C_(order + 1)` over the whole record and from rest, transients included, as a share of the
+    /// power.
     pub transient: Option<f64>,
     /// Share of the power that counts as zero.
     pub zero: f64,
@@ -97,14 +98,16 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
     if samples < LEAST || power == 0.0 || !power.is_finite() {
         return nothing;
     }
-    // Shares of the power, whatever the unit.
-    let u: Vec<f64> = u.iter().map(|v| v / power.sqrt()).collect();
+    // Shares of the power in the windows, whatever the unit.
     let rows = samples - tested + 1;
+    let within = u[tested - 1..].iter().map(|v| v * v).sum::<f64>() / rows as f64;
+    let scale = if within > ROUNDING * power { within.sqrt() } else { power.sqrt() };
+    let u: Vec<f64> = u.iter().map(|v| v / scale).collect();
     let part = |i: usize| covariances(&u[i * rows / PARTS..(i + 1) * rows / PARTS + tested - 1], tested);
     let parts: Vec<DMatrix<f64>> = (0..PARTS).map(part).collect();
     let smallest = |n: usize| smallest(&parts, n);
 
-    let floor = smallest((samples / 10).max(3).min(tested)).0;
+    let floor = smallest((samples / 10).max(3).min(tested));
     let zero = match noise {
         Some(noise) => CLEAR * noise * noise / power,
         None if floor > ROUNDING && floor < NOISE => CLEAR * floor,
@@ -115,7 +118,7 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
     let mut spectrum = Vec::new();
     let mut n = 1;
     while n <= tested {
-        spectrum.push((n, smallest(n).0));
+        spectrum.push((n, smallest(n)));
         n = if n < 24 { n + 1 } else { (n + n / 5).max(n + 1) };
     }
     // The smallest eigenvalue never grows with the order: C_n is a corner of C_(n + 1). So the first order that fails is
@@ -126,19 +129,19 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
             let (mut good, mut bad) = (spectrum[first - 1].0, spectrum[first].0);
             while bad - good > 1 {
                 let middle = usize::midpoint(good, bad);
-                if smallest(middle).0 > zero { good = middle } else { bad = middle }
+                if smallest(middle) > zero { good = middle } else { bad = middle }
             }
             good
         }
-        None if smallest(tested).0 > zero => tested,
+        None if smallest(tested) > zero => tested,
         None => spectrum.last().map_or(0, |(n, _)| *n),
     };
     let next = (order < tested).then(|| smallest(order + 1));
     Excitation {
         order,
-        eigenvalue: if order > 0 { smallest(order).0 } else { 0.0 },
-        next: next.map(|(persisting, _)| persisting),
-        transient: next.map(|(_, whole)| whole),
+        eigenvalue: if order > 0 { smallest(order) } else { 0.0 },
+        next,
+        transient: next.map(|_| from_rest(&u, order + 1)),
         zero,
         spectrum,
         ..nothing
@@ -165,9 +168,15 @@ fn covariances(u: &[f64], n: usize) -> DMatrix<f64> {
     c
 }
 
-/// The smallest eigenvalue of the leading block of order `n`: what of it persists, and all of it.
+/// The smallest eigenvalue of order `n` over all windows, with nothing before the record.
+fn from_rest(u: &[f64], n: usize) -> f64 {
+    let padded: Vec<f64> = std::iter::repeat_n(0.0, n - 1).chain(u.iter().copied()).collect();
+    SymmetricEigen::new(covariances(&padded, n)).eigenvalues.min().max(0.0)
+}
+
+/// What persists of the smallest eigenvalue of the leading block of order `n`.
 #[allow(clippy::cast_precision_loss)]
-fn smallest(parts: &[DMatrix<f64>], n: usize) -> (f64, f64) {
+fn smallest(parts: &[DMatrix<f64>], n: usize) -> f64 {
     let least = |of: &[usize]| -> (f64, DVector<f64>) {
         let sum = of.iter().fold(DMatrix::zeros(n, n), |sum, &i| sum + parts[i].view((0, 0), (n, n)));
         let eigen = SymmetricEigen::new(sum / of.len() as f64);
@@ -185,7 +194,7 @@ fn smallest(parts: &[DMatrix<f64>], n: usize) -> (f64, f64) {
     }
     powers = parts.iter().map(|part| (part.view((0, 0), (n, n)) * &direction).dot(&direction)).collect();
     powers.sort_by(|a, b| b.total_cmp(a));
-    (powers[TRANSIENT].max(0.0), all)
+    powers[TRANSIENT].max(0.0).min(all)
 }
 
 #[cfg(test)]
@@ -223,9 +232,11 @@ mod tests {
         for at in [0, 1, 40, 300, 500] {
             assert_eq!(order(&signal(1000, |t| f64::from(u8::from(t >= at)))), 1, "step at {at}");
         }
+        // A step before the record began leaves its edge to a system that was at rest.
+        assert!(excitation(&[1.0; 1000], None).transient.unwrap() > 1e-4);
         // Without the parts of the record, the edge alone would make the step exciting of any order.
         let step = excitation(&signal(1000, |t| f64::from(u8::from(t >= 300))), None);
-        assert!(step.next == Some(0.0) && step.transient.unwrap() > 1e-4, "{step:?}");
+        assert!(step.next.unwrap() < 1e-12 && step.transient.unwrap() > 1e-4, "{step:?}");
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub struct Local {
     exact: bool,
     /// Whether they are slopes of residuals; else of the scaled criteria that count.
     residuals: bool,
+    /// Which tuners are start values of an experiment.
+    starts: Vec<bool>,
 }
 
 /// Sensitivities of the active tuners; `None` where there is no tuner, no criterion that counts, or no slope.
@@ -65,7 +67,11 @@ pub fn local(problem: &Problem, tuners: &[f64], zero: Option<f64>) -> Option<Loc
         m if residuals && m > n => (found.at.merit.objective / (m - n) as f64).sqrt(),
         _ => f64::NAN,
     };
-    Some(Local { sensitivity: Sensitivity::of(&jacobian, coordinates.collect(), zero), deviation, exact, residuals })
+    let starts = start_parameters(study);
+    let starts =
+        active.iter().map(|tuner| tuner.case.is_some() && starts.contains(&tuner.parameter.as_str())).collect();
+    let sensitivity = Sensitivity::of(&jacobian, coordinates.collect(), zero);
+    Some(Local { sensitivity, deviation, exact, residuals, starts })
 }
 
 /// Derivative of a tuner along its coordinate of the unit box.
@@ -132,7 +138,9 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     let coordinate = &found.coordinates[k];
     let [alone, together] = [found.alone[k], found.together[k]];
     let std_error = local.deviation * together;
-    let relative_error = std_error / coordinate.scale();
+    // A start value near zero is as good as known where it is so by its range.
+    let scale = if local.starts[k] { coordinate.range } else { coordinate.scale() };
+    let relative_error = std_error / scale;
     TunerSensitivity {
         name: coordinate.name.clone(),
         value: coordinate.value,
@@ -198,7 +206,10 @@ fn words(local: &Local, tuners: &[TunerSensitivity], directions: &[DirectionRepo
     for direction in directions {
         let mut sentence = format!("{}.", capital(&direction.words));
         if direction.changes.len() > 1 {
-            sentence += " Hold one of them, or measure something that tells them apart.";
+            sentence += match local.residuals {
+                true => " Hold one of them, or measure something that tells them apart.",
+                false => " There the criteria leave the design free.",
+            };
             if direction.remaining.is_finite() {
                 let remaining = percent(direction.remaining);
                 sentence += &format!(
@@ -208,7 +219,9 @@ fn words(local: &Local, tuners: &[TunerSensitivity], directions: &[DirectionRepo
         }
         words.push(sentence);
     }
-    let known = || tuners.iter().filter(|t| t.relative_error.is_finite());
+    // Start values belong to a recording: nobody asks how far they can be trusted.
+    let asked = || tuners.iter().zip(&local.starts).filter(|(_, start)| !**start).map(|(tuner, _)| tuner);
+    let known = || asked().filter(|t| t.relative_error.is_finite());
     let by_error = |a: &&TunerSensitivity, b: &&TunerSensitivity| a.relative_error.total_cmp(&b.relative_error);
     if let (Some(best), Some(worst), true) = (known().min_by(by_error), known().max_by(by_error), n > 1) {
         words.push(format!(
@@ -219,7 +232,7 @@ fn words(local: &Local, tuners: &[TunerSensitivity], directions: &[DirectionRepo
             percent(worst.relative_error)
         ));
     }
-    let weak: Vec<String> = tuners.iter().filter(|t| t.trust == "weak").map(|t| format!("`{}`", t.name)).collect();
+    let weak: Vec<String> = asked().filter(|t| t.trust == "weak").map(|t| format!("`{}`", t.name)).collect();
     if !weak.is_empty() {
         words.push(format!("Do not trust the numbers of {}: uncertain by more than 10 %.", listed(&weak)));
     }
@@ -254,7 +267,7 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
             verb(least, rho.signum()),
             tuners[least].name
         );
-        if tuners[most].relative_error.is_finite() {
+        if tuners[most].relative_error.is_finite() && !local.starts[most] {
             let held = tuners[most].relative_error * (1.0 - rho * rho).sqrt();
             text += &format!(
                 " With `{}` held, `{}` would be known to {} instead of {}.",
@@ -301,21 +314,25 @@ pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<Excitati
             let variables = study.models.iter().flat_map(|(_, m)| &m.interface().inputs);
             let unit = variables.into_iter().find(|v| v.name == *name).map(|v| v.unit.to_string()).unwrap_or_default();
             let parameters = question.parameters.unwrap_or_else(|| tuners_in(study, index));
-            reports.push(excitation_report(&values, noise, [&case.name, name, &unit], sample_time, parameters));
+            let names = [case.name.as_str(), name, &unit];
+            reports.push(excitation_report(&values, noise, names, sample_time, Some(parameters)));
         }
     }
     reports
 }
 
-/// The report on one signal: `names` are its case or file, its own name and its unit.
+/// The report on one signal: names of its case or file, its own and that of its unit; the time between samples, s; and the
+/// number of parameters that are to be estimated, where there are some.
 pub fn excitation_report(
     values: &[f64],
     noise: Option<f64>,
     [case, input, unit]: [&str; 3],
     sample_time: f64,
-    parameters: usize,
+    parameters: Option<usize>,
 ) -> ExcitationReport {
     let found = excitation(values, noise);
+    let asked = parameters.is_some();
+    let parameters = parameters.unwrap_or(0);
     let suffices = found.suffices(parameters) || found.is_at_least();
     let order = if found.is_at_least() { format!("at least {}", found.order) } else { found.order.to_string() };
     let mut words = format!("`{input}` in `{case}` is persistently exciting of order {order}");
@@ -325,14 +342,15 @@ pub fn excitation_report(
             words += &format!(
                 ": its weakest direction carries {} of its power, the next order {}",
                 percent(found.eigenvalue),
-                if next <= 0.0 { "none".to_owned() } else { percent(next) }
+                if next <= 1e-3 * found.zero { "none".to_owned() } else { percent(next) }
             );
         }
         Some(_) => words += ": it stays excited in no direction",
     }
     words += ". ";
     words += &match (parameters, suffices) {
-        (0, _) => "No tuner depends on it.".to_owned(),
+        (0, _) if asked => "No tuner depends on it.".to_owned(),
+        (0, _) => format!("That suffices for {order} parameters."),
         (_, true) => format!("That suffices for the {}.", counted(parameters, "tuner")),
         (_, false) => {
             let transient = match found.transient {
@@ -364,10 +382,14 @@ pub fn excitation_report(
     }
 }
 
+/// Parameters that set where a simulation begins.
+fn start_parameters(study: &Study) -> Vec<&str> {
+    study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect()
+}
+
 /// Active tuners that act in a case; start values are not excited by inputs and do not count.
 fn tuners_in(study: &Study, case: usize) -> usize {
-    let starts: Vec<&str> =
-        study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect();
+    let starts = start_parameters(study);
     let acts = |t: &&Tuner| t.active && t.case.is_none_or(|c| c == case) && !starts.contains(&t.parameter.as_str());
     study.tuners.iter().filter(acts).count()
 }

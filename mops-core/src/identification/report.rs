@@ -59,7 +59,7 @@ pub struct TunerSensitivity {
     pub std_error: f64,
     /// The same, were all other tuners known.
     pub std_error_alone: f64,
-    /// Standard error as a share of the value.
+    /// Standard error as a share of the value; of a start value, as a share of its range.
     pub relative_error: f64,
     /// How much wider the error is because the others are not known: at least 1.
     pub inflation: f64,

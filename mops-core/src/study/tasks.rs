@@ -256,7 +256,10 @@ fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<Reg
             "input",
             format!("the experiment `{}` has no input `{input}`", study.cases[case].name),
         )
-        .with_help(suggestion(&input, inputs.iter().map(|(known, _)| known.as_str()))));
+        .with_help(match inputs.is_empty() {
+            true => "nothing drives it: give it `inputs`".to_owned(),
+            false => suggestion(&input, inputs.iter().map(|(known, _)| known.as_str())),
+        }));
     }
     if b == 0 {
         return Err(Mistake::new("b", "a model without past inputs has nothing to do with the input")
