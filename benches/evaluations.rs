@@ -28,6 +28,32 @@ fn main() {
     group.finish();
     criterion.final_summary();
     print_ratios();
+    print_slopes();
+}
+
+/// Slopes at the start values, from tangents and from central differences in turn, on one thread; medians.
+fn print_slopes() {
+    let pool = pool(1);
+    for name in STUDIES {
+        let problem = shipped(name);
+        let start = problem.start();
+        let slopes = |exact: bool| {
+            let run = Run::new(&problem, Budget { evaluations: usize::MAX }, &());
+            let mut run = if exact { run } else { run.by_differences() };
+            let begun = Instant::now();
+            let slopes = pool.install(|| run.linearise(&start, 1e-4));
+            assert!(black_box(slopes).is_ok_and(|slopes| slopes.is_some()), "the start values simulate");
+            begun.elapsed().as_secs_f64() * 1e6
+        };
+        let rounds: Vec<[f64; 2]> = (0..101).map(|_| [true, false].map(slopes)).collect();
+        let [exact, differences] = [0, 1].map(|i| median(rounds.iter().map(|round| round[i]).collect()));
+        let ratio = median(rounds.iter().map(|[exact, differences]| differences / exact).collect());
+        println!(
+            "{name:22} slopes along {:2} tuners: {exact:6.0} us from tangents, {differences:6.0} us from differences, \
+             ratio differences / tangents: {ratio:.2}",
+            start.len()
+        );
+    }
 }
 
 /// One thread and two in turn, so that whatever else the machine does meets both alike; medians.

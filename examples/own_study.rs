@@ -75,7 +75,7 @@ impl Simulate for Suspension {
 struct Shaking;
 
 impl CriterionSpec for Shaking {
-    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(self.clone()))
     }
 }

@@ -35,7 +35,7 @@ impl Model for Function {
 struct End(String);
 
 impl CriterionSpec for End {
-    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(self.clone()))
     }
 }
@@ -81,7 +81,7 @@ fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study
 struct Line;
 
 impl CriterionSpec for Line {
-    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(self.clone()))
     }
 }

@@ -1,6 +1,8 @@
 //! Control effort.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -41,7 +43,7 @@ impl CriterionOptions for ControlEffort {
 }
 
 impl CriterionSpec for ControlEffort {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         let offset = optional("offset", self.offset.as_ref(), &signal.unit)?.unwrap_or(0.0);
         Ok(Box::new(Bound { signal, of: self.of, offset }))

@@ -1,6 +1,8 @@
 //! Delay time of a step response.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -32,7 +34,7 @@ impl CriterionOptions for DelayTime {
 }
 
 impl CriterionSpec for DelayTime {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -1,6 +1,8 @@
 //! Value of a signal at the end.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -24,7 +26,7 @@ impl CriterionOptions for FinalValue {
 }
 
 impl CriterionSpec for FinalValue {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
     }
 }

@@ -1,6 +1,8 @@
 //! Fit to a measurement: the integral of the squared residual.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Tangent, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Tangent, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -45,7 +47,7 @@ impl CriterionOptions for Fit {
 }
 
 impl CriterionSpec for Fit {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         if !(self.weight.is_finite() && self.weight > 0.0) {
             return Err(Mistake::new("weight", format!("a weight must be positive, not {}", self.weight)));

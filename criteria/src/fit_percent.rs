@@ -1,6 +1,6 @@
 //! Fit to a measurement, in percent.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -27,7 +27,7 @@ impl CriterionOptions for FitPercent {
 }
 
 impl CriterionSpec for FitPercent {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.name.clone() }))
     }
 

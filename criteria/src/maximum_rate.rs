@@ -1,6 +1,8 @@
 //! Largest rate of change of a signal.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -25,7 +27,7 @@ impl CriterionOptions for MaximumRate {
 }
 
 impl CriterionSpec for MaximumRate {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
     }
 }

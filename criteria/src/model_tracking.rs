@@ -1,6 +1,8 @@
 //! Distance of a step response from that of a reference model.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -56,7 +58,7 @@ impl CriterionOptions for ModelTracking {
 }
 
 impl CriterionSpec for ModelTracking {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: Some(&self.target),

@@ -1,8 +1,8 @@
 //! Fit to a measurement, in units of its noise.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Tangent, Unit, Value,
-    Variable,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Tangent, Unit,
+    Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -34,7 +34,7 @@ impl CriterionOptions for NormalisedError {
 }
 
 impl CriterionSpec for NormalisedError {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?;
         let noise = positive("noise", self.noise.as_ref(), &signal.unit)?;
         Ok(Box::new(Bound { signal: signal.name.clone(), noise }))

@@ -1,7 +1,7 @@
 //! Overshoot of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -39,7 +39,7 @@ impl CriterionOptions for Overshoot {
 }
 
 impl CriterionSpec for Overshoot {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -1,6 +1,8 @@
 //! Largest or smallest value of a signal.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -40,7 +42,7 @@ impl CriterionOptions for Peak {
 }
 
 impl CriterionSpec for Peak {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone(), of: self.of }))
     }
 }

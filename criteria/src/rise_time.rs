@@ -1,6 +1,8 @@
 //! Rise time of a step response.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -36,7 +38,7 @@ impl CriterionOptions for RiseTime {
 }
 
 impl CriterionSpec for RiseTime {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -1,7 +1,7 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Trace, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Trace, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -41,7 +41,7 @@ impl CriterionOptions for SettlingTime {
 }
 
 impl CriterionSpec for SettlingTime {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -1,6 +1,8 @@
 //! Steady-state error.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Unit, Value, Variable};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value, Variable,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -29,7 +31,7 @@ impl CriterionOptions for SteadyStateError {
 }
 
 impl CriterionSpec for SteadyStateError {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         let target = number("target", &self.target, &signal.unit)?;
         let window = positive("window", self.window.as_ref(), &second())?;

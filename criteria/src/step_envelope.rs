@@ -1,7 +1,8 @@
 //! Distance of a response from an envelope.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mistake, Quantity, Trace, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Trace, Unit, Value,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -39,7 +40,7 @@ impl CriterionOptions for StepEnvelope {
 }
 
 impl CriterionSpec for StepEnvelope {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         if self.upper.is_empty() && self.lower.is_empty() {
             return Err(Mistake::here("an envelope has at least one bound")

@@ -1,7 +1,7 @@
 //! Undershoot of a step response: how far it first goes the wrong way.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Mark, Mistake, Quantity, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,7 +38,7 @@ impl CriterionOptions for Undershoot {
 }
 
 impl CriterionSpec for Undershoot {
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

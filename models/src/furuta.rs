@@ -1,15 +1,15 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, State,
-    Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter,
+    Quantity, Scalar, State, Unit, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
-use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
+use crate::kernel::{self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
 ///
@@ -24,7 +24,8 @@ use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, want
 ///
 /// Parameters: `a` pendulum inertia about its joint, `b` inertia of arm and load, `c` coupling (all kg m2), `d` gravity
 /// torque (N m), `ba`, `bp` viscous friction (N m s/rad), `ca`, `cp` Coulomb friction (N m), and the start values `phi0`,
-/// `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`.
+/// `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`. Linearised, the Coulomb friction
+/// is left out.
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`.
 ///
@@ -97,6 +98,7 @@ impl Furuta {
                 state("dtheta", "dtheta0", "dtheta", Some("theta")),
             ],
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
+            ports: Vec::new(),
             horizon,
             analysis: AnalysisKind::Time,
         };
@@ -116,24 +118,49 @@ impl Model for Furuta {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..4].to_vec()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
 }
 
-impl Simulate for Furuta {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let p: [S; 12] = parameters.try_into().expect("the study gives every parameter");
-        let [a, b, c, d, ba, bp, ca, cp, start @ ..] = p;
+impl Equations for Furuta {
+    /// Without Coulomb friction, which has no slope at rest.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let x: [S; 4] = x.try_into().expect("the pendulum has four states");
+        let mut dynamics = Self::dynamics(parameters, Drive::held(u[0]))?;
+        dynamics.coulomb = [S::from(0.0); 2];
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
+}
+
+impl Furuta {
+    /// The equations with given parameters and torque.
+    fn dynamics<'a, S: Scalar>(parameters: &[S], drive: Drive<'a, S>) -> Result<FurutaDynamics<'a, S>, Failure> {
+        let [a, b, c, d, ba, bp, ca, cp, ..] = *parameters else { panic!("the study gives every parameter") };
         let [ab, cc] = [(a * b).value(), (c * c).value()];
         if ab <= cc {
             let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
             return Err(Failure::Undefined(fact));
         }
-        let drive = Drive::new(job.case.input("u"));
-        let mut dynamics =
-            FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] };
-        let output = |dynamics: &FurutaDynamics<'_, S>, signal: usize, t: f64, x: &[S; 4]| {
-            if signal < 4 { x[signal] } else { S::from(dynamics.drive.at(t)) }
-        };
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        Ok(FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] })
+    }
+
+    /// The value of a signal: the states, then the torque.
+    fn signal<S: Scalar>(dynamics: &FurutaDynamics<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
+        if signal < 4 { x[signal] } else { dynamics.drive.at(t) }
+    }
+}
+
+impl Simulate for Furuta {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
+        let start = parameters[8..].try_into().expect("four start values come last");
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
 
@@ -152,7 +179,7 @@ pub struct FurutaDynamics<'a, S> {
     /// Coulomb friction of pendulum and arm, N m.
     pub coulomb: [S; 2],
     /// Torque on the arm, N m.
-    pub drive: Drive<'a>,
+    pub drive: Drive<'a, S>,
     /// How pendulum and arm move.
     pub contact: [Contact; 2],
 }

@@ -1,15 +1,15 @@
 //! A PID controller in a loop with a linear plant.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Input, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar,
-    Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Input, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint,
+    Parameter, Quantity, Scalar, Unit, Variable, WithTangents,
 };
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::{self, Deserializer, Visitor};
 
 use crate::kernel::drive::Drive;
-use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
+use crate::kernel::{self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
+use crate::plant::{Plant, TransferFunction};
 
 /// A PID controller with filtered derivative in a loop with unity feedback and a linear plant `G`:
 ///
@@ -64,65 +64,6 @@ struct StepOptions {
     size: f64,
 }
 
-/// A transfer function, by poles and zeros or by coefficients.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
-struct Plant {
-    /// Real poles, 1/s.
-    poles: Option<Vec<Coefficient>>,
-    /// Real zeros, 1/s.
-    zeros: Vec<Coefficient>,
-    /// `gain (s - z1)(s - z2)... / ((s - p1)(s - p2)...)`.
-    gain: Option<Coefficient>,
-    /// Coefficients of the numerator, falling powers of s.
-    numerator: Option<Vec<Coefficient>>,
-    /// Coefficients of the denominator, falling powers of s.
-    denominator: Option<Vec<Coefficient>>,
-}
-
-/// A number, or the name of a parameter.
-#[derive(Debug, Clone, PartialEq)]
-enum Coefficient {
-    Number(f64),
-    Name(String),
-}
-
-impl<'de> Deserialize<'de> for Coefficient {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrName;
-        impl Visitor<'_> for NumberOrName {
-            type Value = Coefficient;
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a number, or the name of a parameter")
-            }
-            fn visit_f64<E: de::Error>(self, number: f64) -> Result<Coefficient, E> {
-                if number.is_finite() {
-                    Ok(Coefficient::Number(number))
-                } else {
-                    Err(E::custom("a coefficient must be finite"))
-                }
-            }
-            #[allow(clippy::cast_precision_loss)]
-            fn visit_i64<E: de::Error>(self, number: i64) -> Result<Coefficient, E> {
-                Ok(Coefficient::Number(number as f64))
-            }
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Coefficient, E> {
-                Ok(Coefficient::Name(name.to_owned()))
-            }
-        }
-        deserializer.deserialize_any(NumberOrName)
-    }
-}
-
-impl JsonSchema for Coefficient {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Coefficient".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": ["number", "string"], "description": "a number, or the name of a parameter" })
-    }
-}
-
 impl ModelOptions for PidLoopOptions {
     const KIND: &'static str = "pid-loop";
 
@@ -168,7 +109,7 @@ impl ModelOptions for PidLoopOptions {
             }
         };
         let mut names = Vec::new();
-        let plant = TransferFunction::new(&self.plant, &mut names).map_err(|m| m.within("plant"))?;
+        let plant = TransferFunction::new(&self.plant, &CONTROLLER, &mut names).map_err(|m| m.within("plant"))?;
         Ok(Box::new(PidLoop {
             interface: interface(&names, horizon),
             plant,
@@ -210,132 +151,9 @@ fn interface(named: &[String], horizon: f64) -> Interface {
         states: Vec::new(),
         inputs: vec![Variable::new("r", "1", "setpoint"), Variable::new("d", "1", "load at the plant's input")],
         horizon: Some(horizon),
+        ports: Vec::new(),
         analysis: AnalysisKind::Time,
     }
-}
-
-/// A strictly proper transfer function whose coefficients may be parameters.
-#[derive(Debug, Clone)]
-struct TransferFunction {
-    form: Form,
-}
-
-#[derive(Debug, Clone)]
-enum Form {
-    Roots { poles: Vec<Slot>, zeros: Vec<Slot>, gain: Slot },
-    Coefficients { numerator: Vec<Slot>, denominator: Vec<Slot> },
-}
-
-/// A number, or an index into the parameters named in the plant.
-#[derive(Debug, Clone, Copy)]
-enum Slot {
-    Number(f64),
-    Named(usize),
-}
-
-impl Slot {
-    fn value<S: Scalar>(self, named: &[S]) -> S {
-        match self {
-            Self::Number(number) => S::from(number),
-            Self::Named(index) => named[index],
-        }
-    }
-}
-
-impl TransferFunction {
-    fn new(plant: &Plant, names: &mut Vec<String>) -> Result<Self, Mistake> {
-        let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, Mistake> {
-            list.iter().map(|c| slot(c, names).map_err(|m| m.within(key))).collect()
-        };
-        let form = match (&plant.poles, &plant.numerator, &plant.denominator) {
-            (Some(poles), None, None) => {
-                let gain = plant.gain.clone().unwrap_or(Coefficient::Number(1.0));
-                Form::Roots {
-                    poles: slots("poles", poles)?,
-                    zeros: slots("zeros", &plant.zeros)?,
-                    gain: slots("gain", &[gain])?[0],
-                }
-            }
-            (None, Some(numerator), Some(denominator)) => {
-                if plant.gain.is_some() || !plant.zeros.is_empty() {
-                    return Err(Mistake::here("`gain` and `zeros` go with `poles`, not with coefficients"));
-                }
-                Form::Coefficients {
-                    numerator: slots("numerator", numerator)?,
-                    denominator: slots("denominator", denominator)?,
-                }
-            }
-            _ => {
-                return Err(Mistake::here("the plant is given neither by its poles nor by numerator and denominator")
-                    .with_help("as in plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
-            }
-        };
-        let (above, below) = match &form {
-            Form::Roots { poles, zeros, .. } => (zeros.len(), poles.len()),
-            Form::Coefficients { numerator, denominator } => {
-                (numerator.len().saturating_sub(1), denominator.len().saturating_sub(1))
-            }
-        };
-        if above >= below {
-            return Err(Mistake::here(format!(
-                "the plant must be strictly proper, but has order {above} over order {below}"
-            ))
-            .with_help("add the pole of the actuator or the sensor"));
-        }
-        Ok(Self { form })
-    }
-
-    /// Coefficients of rising powers, the denominator's leading one being 1 and left out.
-    fn polynomials<S: Scalar>(&self, named: &[S]) -> Result<(Vec<S>, Vec<S>), Failure> {
-        let values = |slots: &[Slot]| -> Vec<S> { slots.iter().map(|s| s.value(named)).collect() };
-        let (mut numerator, mut denominator) = match &self.form {
-            Form::Roots { poles, zeros, gain } => {
-                let gain = gain.value(named);
-                let numerator = from_roots(&values(zeros)).into_iter().map(|c| gain * c).collect();
-                (numerator, from_roots(&values(poles)))
-            }
-            Form::Coefficients { numerator, denominator } => {
-                let (mut above, mut below) = (values(numerator), values(denominator));
-                above.reverse();
-                below.reverse();
-                (above, below)
-            }
-        };
-        let leading = denominator.pop().unwrap_or(S::from(0.0));
-        if leading.value() == 0.0 {
-            return Err(Failure::Undefined("the leading coefficient of the plant's denominator is 0".into()));
-        }
-        numerator.iter_mut().chain(&mut denominator).for_each(|c| *c = *c / leading);
-        numerator.resize(denominator.len(), S::from(0.0));
-        Ok((numerator, denominator))
-    }
-}
-
-fn slot(coefficient: &Coefficient, names: &mut Vec<String>) -> Result<Slot, Mistake> {
-    match coefficient {
-        Coefficient::Number(number) => Ok(Slot::Number(*number)),
-        Coefficient::Name(name) if CONTROLLER.contains(&name.as_str()) => {
-            Err(Mistake::here(format!("`{name}` is a parameter of the controller"))
-                .with_help("give the plant's parameter another name"))
-        }
-        Coefficient::Name(name) => Ok(Slot::Named(names.iter().position(|known| known == name).unwrap_or_else(|| {
-            names.push(name.clone());
-            names.len() - 1
-        }))),
-    }
-}
-
-/// Coefficients, rising powers, of `(s - r1)(s - r2)...`.
-fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
-    let mut polynomial = vec![S::from(1.0)];
-    for &root in roots {
-        polynomial.push(S::from(0.0));
-        for i in (0..polynomial.len()).rev() {
-            let lower = if i > 0 { polynomial[i - 1] } else { S::from(0.0) };
-            polynomial[i] = lower - root * polynomial[i];
-        }
-    }
-    polynomial
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -367,6 +185,17 @@ impl Model for PidLoop {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        let of_plant = (1..=self.plant.order()).map(|i| Variable::new(format!("x{i}"), "1", "state of the plant"));
+        let integral = Variable::new("integral", "1", "integral part of the controller");
+        let filtered = Variable::new("filtered", "1", "filter of the derivative");
+        of_plant.chain([integral, filtered]).collect()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
 }
 
 impl Simulate for PidLoop {
@@ -391,36 +220,54 @@ impl PidLoop {
     fn simulate_with<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone>(
         &self,
         job: &Job<'_>,
-        (numerator, denominator): (&[S], &[S]),
+        plant: (&[S], &[S]),
         controller: Controller<S>,
         start: X,
     ) -> Result<Recording, Failure> {
+        let setpoint = Drive::new(Some(job.case.input("r").unwrap_or(&self.setpoint)));
+        let load = Drive::new(job.case.input("d").or(self.load.as_ref()));
+        let mut dynamics = self.dynamics(plant, controller, &start, [setpoint, load]);
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Loop::signal)
+    }
+
+    /// The loop with states like `start`.
+    fn dynamics<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone>(
+        &self,
+        (numerator, denominator): (&[S], &[S]),
+        controller: Controller<S>,
+        start: &X,
+        [setpoint, load]: [Drive<'a, S>; 2],
+    ) -> Loop<'a, S, X> {
         let padded = |coefficients: &[S]| {
             let mut padded = start.clone();
             padded.as_mut()[..coefficients.len()].copy_from_slice(coefficients);
             padded
         };
-        let mut dynamics = Loop {
+        Loop {
             numerator: padded(numerator),
             denominator: padded(denominator),
             controller,
             limit: self.limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
-            setpoint: Drive::new(Some(job.case.input("r").unwrap_or(&self.setpoint))),
-            load: Drive::new(job.case.input("d").or(self.load.as_ref())),
+            setpoint,
+            load,
             saturated: 0.0,
             sampled: self.sampling.map(Sampled::new),
-        };
-        let output = |dynamics: &Loop<'_, S, X>, signal: usize, t: f64, x: &X| {
-            let (r, y) = dynamics.compared(t, x);
-            match signal {
-                0 => S::from(r),
-                1 => y,
-                2 => -y + r,
-                3 => dynamics.actuator(r, y, x),
-                _ => S::from(dynamics.load.at(t)),
-            }
-        };
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        }
+    }
+}
+
+impl Equations for PidLoop {
+    /// Within the limits of the actuator.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], inputs: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        if self.sampling.is_some() {
+            return Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into()));
+        }
+        let (controller, named) = parameters.split_at(CONTROLLER.len());
+        let (numerator, denominator) = self.plant.polynomials(named)?;
+        let drives = [Drive::held(inputs[0]), Drive::held(inputs[1])];
+        let x = x.to_vec();
+        let dynamics = self.dynamics((&numerator, &denominator), Controller::new(controller), &x, drives);
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Loop::signal))
     }
 }
 
@@ -499,7 +346,7 @@ impl<S: Scalar> Sampled<S> {
     }
 
     /// Takes the sample and moves the output that are due at `t`.
-    fn pass(&mut self, t: f64, controller: &Controller<S>, limit: [f64; 2], r: f64, y: S) {
+    fn pass(&mut self, t: f64, controller: &Controller<S>, limit: [f64; 2], r: S, y: S) {
         let Sampling { period, delay } = self.sampling;
         let due = |time: f64| time <= t + 1e-12 * period;
         // With a delay the output of an earlier sample is due before this one is taken.
@@ -550,8 +397,8 @@ struct Loop<'a, S, X> {
     denominator: X,
     controller: Controller<S>,
     limit: [f64; 2],
-    setpoint: Drive<'a>,
-    load: Drive<'a>,
+    setpoint: Drive<'a, S>,
+    load: Drive<'a, S>,
     /// -1 at the lower limit, 1 at the upper, 0 between.
     saturated: f64,
     sampled: Option<Sampled<S>>,
@@ -567,13 +414,25 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
 
     /// Setpoint and output of the plant.
     #[inline]
-    fn compared(&self, t: f64, x: &X) -> (f64, S) {
+    fn compared(&self, t: f64, x: &X) -> (S, S) {
         (self.setpoint.at(t), Self::dot(&self.numerator, x))
+    }
+
+    /// The value of a signal.
+    fn signal(&self, signal: usize, t: f64, x: &X) -> S {
+        let (r, y) = self.compared(t, x);
+        match signal {
+            0 => r,
+            1 => y,
+            2 => -y + r,
+            3 => self.actuator(r, y, x),
+            _ => self.load.at(t),
+        }
     }
 
     /// What the continuous controller asks for.
     #[inline]
-    fn wanted(&self, r: f64, y: S, x: &X) -> S {
+    fn wanted(&self, r: S, y: S, x: &X) -> S {
         let Controller { k, nd, wp, wd, .. } = self.controller;
         let [.., integral, filtered] = *x.as_ref() else { unreachable!("the controller has two states") };
         let mut error = wp * r - y;
@@ -585,7 +444,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
 
     /// What the actuator gives.
     #[inline]
-    fn actuator(&self, r: f64, y: S, x: &X) -> S {
+    fn actuator(&self, r: S, y: S, x: &X) -> S {
         match &self.sampled {
             Some(sampled) => sampled.acting,
             None if self.saturated < 0.0 => S::from(self.limit[0]),

@@ -1,9 +1,12 @@
 //! Models against closed forms, published values and an independent integration.
 
+mod furuta_bodies;
+mod state_feedback;
+
 use mops_core::{Case, Input, Job, Model, ModelOptions, Parameter, Response};
 
 use crate::furuta::Furuta;
-use crate::kernel::Tolerance;
+use crate::kernel::{IntegrationMethod, Tolerance};
 use crate::pid_loop::PidLoopOptions;
 
 fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
@@ -24,9 +27,14 @@ fn simulate(model: &dyn Model, case: &Case, parameters: &[f64], horizon: f64) ->
     analysis.response().expect("a simulation").clone()
 }
 
-/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
-/// a millionth of their value.
+/// [`check_tangents_by`] a millionth.
 fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
+    check_tangents_by(1e-6, model, case, parameters, horizon);
+}
+
+/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
+/// the part `step` of their value.
+fn check_tangents_by(step: f64, model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
     let values = values(model, parameters);
     let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
     let finite: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
@@ -38,7 +46,7 @@ fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], ho
     assert_eq!(plain.traces, analysis.response().unwrap().traces, "tangents change no bit");
     let times: Vec<f64> = (0..200).map(|i| horizon * (f64::from(i) + 0.5) / 200.0).collect();
     for (&i, tangent) in finite.iter().zip(&tangents) {
-        let h = if values[i] == 0.0 { 1e-6 } else { 1e-6 * values[i].abs() };
+        let h = if values[i] == 0.0 { step } else { step * values[i].abs() };
         let moved = |by: f64| {
             let mut moved = values.clone();
             moved[i] += by;
@@ -58,7 +66,8 @@ fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], ho
     }
 }
 
-const EXACT: Tolerance = Tolerance { relative: 1e-12, absolute: 1e-14, max_steps: 1_000_000 };
+const EXACT: Tolerance =
+    Tolerance { relative: 1e-12, absolute: 1e-14, max_steps: 1_000_000, method: IntegrationMethod::Explicit };
 
 #[test]
 fn tangents_of_a_furuta_pendulum_that_sticks_agree_with_differences() {
@@ -208,7 +217,7 @@ fn a_sampled_controller_acts_after_its_delay() {
 const FURUTA: [(&str, f64); 4] = [("a", 9.035_24e-4), ("b", 1.133_13e-3), ("c", 6.309_84e-4), ("d", 2.526_663e-2)];
 
 fn furuta(extra: &[(&'static str, f64)], case: &Case, horizon: f64) -> Response {
-    let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 1_000_000 };
+    let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 1_000_000, ..Tolerance::default() };
     let values: Vec<(&str, f64)> = FURUTA.iter().chain(extra).copied().collect();
     respond(&Furuta::new(None, tolerance), case, &values, horizon)
 }
@@ -273,7 +282,7 @@ fn a_stuck_arm_breaks_away_when_the_torque_exceeds_its_friction() {
 #[test]
 fn a_sliding_mass_stops_where_coulomb_friction_says() {
     // With c = 0 and no gravity the arm is alone: constant deceleration ca/b, stop after w^2 b/(2 ca).
-    let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000 };
+    let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000, ..Tolerance::default() };
     let values = [("a", 1.0), ("b", 2.0), ("c", 0.0), ("d", 0.0), ("ca", 0.5), ("dphi0", 1.5)];
     let response = respond(&Furuta::new(None, tolerance), &Case::default(), &values, 10.0);
     assert!((response.trace("phi").unwrap().at(10.0) - 1.5 * 1.5 * 2.0 / (2.0 * 0.5)).abs() < 1e-9);

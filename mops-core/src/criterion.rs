@@ -4,17 +4,22 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
-use crate::model::{Analysis, Variable};
+use crate::model::{Analysis, AnalysisKind, Interface};
 use crate::study::Mistake;
 use crate::unit::Unit;
 
 /// A criterion as the study gives it: names and quantities not yet checked against a model.
 pub trait CriterionSpec: Send + Sync {
-    /// Checks names and units against the signals of the model it reads.
+    /// What it reads; a study refuses it for a model that gives something else.
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Time
+    }
+
+    /// Checks names and units against what the model it reads offers.
     ///
     /// # Errors
     /// An unknown signal, a quantity in a wrong unit, an impossible option; the mistake names the option.
-    fn bind(&self, signals: &[Variable]) -> Result<Box<dyn Criterion>, Mistake>;
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake>;
 
     /// Whether it compares with a measurement, so that it applies only to cases that have one.
     fn needs_measurement(&self) -> Option<&str> {

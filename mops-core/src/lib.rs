@@ -10,12 +10,14 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod experiment;
-mod expression;
+pub mod expression;
 pub mod file;
 pub mod identification;
 pub mod linear;
+mod linearised;
 mod model;
 mod outcome;
+mod port;
 mod problem;
 mod random;
 mod run;
@@ -37,14 +39,16 @@ pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use experiment::{Channel, Experiment, Hold, Input, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
+pub use linearised::{Linearise, Linearised, Resting};
 pub use model::{
-    Analysis, AnalysisKind, Event, Failure, Interface, Job, Model, Parameter, Response, State, Variable, WithTangents,
-    Work,
+    Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
+    Variable, WithTangents, Work,
 };
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
+pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};

@@ -2,10 +2,12 @@
 
 use std::fmt;
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::case::Case;
 use crate::linear::StateSpace;
+use crate::port::Port;
 use crate::trace::Trace;
 use crate::unit::Unit;
 
@@ -86,6 +88,8 @@ pub struct Interface {
     pub states: Vec<State>,
     /// What experiments and cases can drive; 0 where nothing does.
     pub inputs: Vec<Variable>,
+    /// Places where a missing effect may act.
+    pub ports: Vec<Port>,
     /// End of the simulation, s, where no experiment gives one.
     pub horizon: Option<f64>,
     /// What its analyses are: criteria refuse a model of the other sort.
@@ -134,6 +138,39 @@ pub trait Model: Send + Sync {
     fn tangents(&self, _job: &Job<'_>, _seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         None
     }
+
+    /// The states of the model's equations, where it offers [`Model::local`]; the start value of each is the parameter that
+    /// [`Interface::states`] names, else 0.
+    fn equation_states(&self) -> Vec<Variable> {
+        Vec::new()
+    }
+
+    /// The equations at an operating point, to linearise the model there. `None`: it has none that can be linearised.
+    fn local(&self, _at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        None
+    }
+}
+
+/// Where the equations of a model are looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct OperatingPoint<'a> {
+    /// Values of the parameters, in the order of [`Interface::parameters`].
+    pub parameters: &'a [f64],
+    /// Values of the states, in the order of [`Model::equation_states`].
+    pub states: &'a [f64],
+    /// Values of the inputs, in the order of [`Interface::inputs`].
+    pub inputs: &'a [f64],
+}
+
+/// The equations of a model at an operating point, with their exact slopes: what a linear system is made of.
+#[derive(Debug, Clone)]
+pub struct Local {
+    /// Rates of change of the states.
+    pub rates: Vec<f64>,
+    /// Values of the signals, in the order of [`Interface::signals`].
+    pub signals: Vec<f64>,
+    /// Derivative of the rates, then of the signals (rows), by the states, then by the inputs (columns).
+    pub slopes: DMatrix<f64>,
 }
 
 /// An analysis, and its derivatives: one analysis of the same form per direction.
@@ -262,7 +299,9 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Diverged(t) => write!(f, "diverged at {t:.4} s"),
-            Self::StepLimit(t) => write!(f, "took too many steps, the last at {t:.4} s"),
+            Self::StepLimit(t) => {
+                write!(f, "took too many steps, the last at {t:.4} s: stiff equations, or too tight a tolerance")
+            }
             Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
             Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
         }

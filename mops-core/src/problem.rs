@@ -26,8 +26,10 @@ pub struct Problem {
     /// Values of the tuners that are not active.
     base: Vec<f64>,
     shape: Shape,
-    /// Jobs that are run.
+    /// Jobs of the problem.
     jobs: Vec<usize>,
+    /// Those of them that a solver's points need: the others are only watched.
+    counting: Vec<usize>,
 }
 
 /// What a point is worth.
@@ -125,16 +127,22 @@ impl Problem {
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
         });
-        problem.jobs.retain(|&job| problem.study.jobs[job].case == case);
+        let here = |job: &usize| problem.study.jobs[*job].case == case;
+        problem.jobs.retain(here);
+        problem.counting.retain(here);
         problem
     }
 
     fn with(study: Arc<Study>, active: Vec<usize>, base: Vec<f64>, usage: impl Fn(&Row, &Study) -> Usage) -> Self {
         let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, &study), row.weight)).collect();
         let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
-        let jobs = (0..study.jobs.len()).collect();
+        let jobs: Vec<usize> = (0..study.jobs.len()).collect();
         let shape = Shape { spacing, rows, objective: study.objective, residuals: 0 };
-        let mut problem = Self { study, active, base, shape, jobs };
+        let counts = |job: &usize| {
+            (study.rows.iter().zip(&shape.rows)).any(|(row, (usage, _))| row.job == *job && *usage != Usage::Monitor)
+        };
+        let counting = jobs.iter().copied().filter(counts).collect();
+        let mut problem = Self { study, active, base, shape, jobs, counting };
         problem.shape.residuals = problem.count_residuals();
         problem
     }
@@ -187,19 +195,19 @@ impl Problem {
         values
     }
 
-    /// Evaluates a point of the unit box; its simulations run in parallel.
+    /// Evaluates a point of the unit box; its simulations run in parallel. Cases that are only watched are left out.
     pub fn evaluate(&self, point: &[f64]) -> Evaluation {
-        self.evaluate_tuners(point.to_vec(), self.tuners_at(point))
+        self.evaluate_tuners(point.to_vec(), self.tuners_at(point), &self.counting)
     }
 
-    /// Evaluates given values of all tuners, which need not lie within their bounds.
+    /// Evaluates given values of all tuners, which need not lie within their bounds, in every case.
     pub fn evaluate_at(&self, tuners: &[f64]) -> Evaluation {
-        self.evaluate_tuners(self.point_of(tuners), tuners.to_vec())
+        self.evaluate_tuners(self.point_of(tuners), tuners.to_vec(), &self.jobs)
     }
 
-    /// Number of simulations that one evaluation takes.
+    /// Number of simulations that the evaluation of a point takes.
     pub fn simulations(&self) -> usize {
-        self.jobs.len()
+        self.counting.len()
     }
 
     /// The analysis of one job with every signal, to look at; `horizon` in s where another is wanted.
@@ -218,14 +226,14 @@ impl Problem {
         })
     }
 
-    fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>) -> Evaluation {
+    fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize]) -> Evaluation {
         let study = &self.study;
         let values: Vec<Result<Vec<RowValue>, Failure>> =
-            self.jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
+            jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
         let mut readings = vec![None; study.rows.len()];
         let mut residuals = vec![Vec::new(); study.rows.len()];
         let mut failures = Vec::new();
-        for (&job, result) in self.jobs.iter().zip(values) {
+        for (&job, result) in jobs.iter().zip(values) {
             match result {
                 Ok(values) => {
                     for (row, value) in values {
@@ -273,13 +281,9 @@ impl Problem {
             return None;
         }
         let study = &self.study;
-        let counts = |job: usize| {
-            (study.rows.iter().zip(&self.shape.rows)).any(|(r, (u, _))| r.job == job && *u != Usage::Monitor)
-        };
-        let jobs: Vec<usize> = self.jobs.iter().copied().filter(|&job| counts(job)).collect();
         let moves = self.tuner_slopes(&at.tuners);
         let of_jobs: Vec<Option<Vec<RowSlopes>>> =
-            jobs.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
+            self.counting.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
         let n = self.active.len();
         let mut rows = vec![vec![0.0; n]; study.rows.len()];
         let mut residuals = vec![vec![Vec::new(); study.rows.len()]; n];

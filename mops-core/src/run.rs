@@ -190,7 +190,7 @@ impl Oracle for Run<'_> {
                 new.push(i);
             }
         }
-        let left = self.budget.evaluations.saturating_sub(self.archive.len() + self.linearisations);
+        let left = self.budget.evaluations.saturating_sub(self.archive.len());
         let within_budget = new.len() <= left;
         new.truncate(left);
         // A small batch at a time, so that an interrupt is heard soon; the results are folded in order, so that
@@ -227,7 +227,8 @@ impl Oracle for Run<'_> {
             if self.watch.wants_stop() {
                 return Err(Halt::Interrupted);
             }
-            if self.archive.len() + self.linearisations >= self.budget.evaluations {
+            // Slopes are no points, but a run that does nothing else must end as well.
+            if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }
             if let Some(slopes) = self.problem.slopes(&at, differences::step(reach)) {

@@ -33,6 +33,8 @@ pub trait Scalar:
     fn value(self) -> f64;
     /// Its tangents, [`Scalar::DIRECTIONS`] of them.
     fn tangents(&self) -> &[f64];
+    /// Sets one of its tangents.
+    fn set_tangent(&mut self, direction: usize, tangent: f64);
     /// `f(self)`, given the value and the derivative of `f` at [`Scalar::value`].
     #[must_use]
     fn chain(self, value: f64, derivative: f64) -> Self;
@@ -103,6 +105,8 @@ impl Scalar for f64 {
         &[]
     }
     #[inline]
+    fn set_tangent(&mut self, _: usize, _: f64) {}
+    #[inline]
     fn chain(self, value: f64, _: f64) -> f64 {
         value
     }
@@ -147,6 +151,10 @@ impl<const N: usize> Scalar for Dual<N> {
     #[inline]
     fn tangents(&self) -> &[f64] {
         &self.tangent
+    }
+    #[inline]
+    fn set_tangent(&mut self, direction: usize, tangent: f64) {
+        self.tangent[direction] = tangent;
     }
     #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {

@@ -12,7 +12,8 @@ use crate::sqp::SqpOptions;
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
 /// numbers or lists, else `sqp`; from several starts: the study's own, and the best points of a sample of the box. Where
 /// the objective is no sum of squares a pattern search follows from the best point found, because an optimum may lie on a
-/// jump (of a settling time, say), where slopes lead no further.
+/// jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the best point
+/// until nothing changes.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -53,6 +54,9 @@ impl Solver for Auto {
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         let mut global = Multistart::new(choose(oracle.shape()), self.options.starts);
+        if oracle.shape().residuals > 0 {
+            global = global.until_nothing_changes();
+        }
         global.begin(oracle, start)?;
         self.stage = Some(Stage::Global(global));
         Ok(())
@@ -82,7 +86,7 @@ impl Solver for Auto {
 
 fn choose(shape: &Shape) -> Box<dyn Solver> {
     // The starts are counted here, not in the chosen solver.
-    let least_squares = LevenbergMarquardtOptions { starts: 1, ..Default::default() }.build();
+    let least_squares = LevenbergMarquardtOptions::default().from_one_start();
     let sqp = SqpOptions::default().build();
     let choices = [least_squares, sqp, PatternSearchOptions::default().build()];
     choices.into_iter().find(|solver| solver.accepts(shape).is_ok()).expect("pattern search accepts every problem")

@@ -13,7 +13,8 @@ use crate::start::usable_start;
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
 /// Bounds are kept by an active set: tuners at a bound that the step would leave are held, and the rest solved again.
-/// Runs from the study's start, then from the best points of a sample of the box.
+/// Runs from the study's start, then from the best points of a sample of the box, then from points around the best one
+/// found, in rounds until two of them improve it by less than a thousandth.
 ///
 /// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by
 /// H. B. Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
@@ -38,8 +39,15 @@ impl SolverOptions for LevenbergMarquardtOptions {
     const KIND: &'static str = "levenberg-marquardt";
 
     fn build(&self) -> Box<dyn Solver> {
-        let local = Local { options: self.clone(), state: None };
-        Box::new(LevenbergMarquardt { starts: Multistart::new(Box::new(local), self.starts) })
+        let local = self.from_one_start();
+        Box::new(LevenbergMarquardt { starts: Multistart::new(local, self.starts).until_nothing_changes() })
+    }
+}
+
+impl LevenbergMarquardtOptions {
+    /// The method itself, without further starts.
+    pub(crate) fn from_one_start(&self) -> Box<dyn Solver> {
+        Box::new(Local { options: self.clone(), state: None })
     }
 }
 

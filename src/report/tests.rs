@@ -50,7 +50,7 @@ impl Model for Lag {
 struct End;
 
 impl CriterionSpec for End {
-    fn bind(&self, _: &[Variable]) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         Ok(Box::new(*self))
     }
 }

@@ -1,12 +1,18 @@
 //! Closed forms as simulations, for the tests of all criteria.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionSpec, Experiment, Quantity, Response, Role, Trace, Value, Variable,
+    Analysis, Case, Channel, Criterion, CriterionSpec, Experiment, Interface, Quantity, Response, Role, Trace, Value,
+    Variable,
 };
 
 /// Signals of the model of all tests.
 pub fn signals() -> Vec<Variable> {
     [("y", "m"), ("u", "V"), ("phi", "rad")].map(|(name, unit)| Variable::new(name, unit, "")).to_vec()
+}
+
+/// The model of all tests.
+fn model() -> Interface {
+    Interface { signals: signals(), ..Interface::default() }
 }
 
 /// A function over [0, `end`] as a trace of `segments` equal segments.
@@ -54,7 +60,7 @@ pub fn quantity(text: &str) -> Quantity {
 
 /// The criterion, bound to the model of all tests.
 pub fn bound(spec: &dyn CriterionSpec) -> Box<dyn Criterion> {
-    spec.bind(&signals()).expect("the options are right")
+    spec.bind(&model()).expect("the options are right")
 }
 
 /// The value of a criterion.
@@ -79,7 +85,7 @@ pub fn undefined_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) 
 
 /// The mistake in the options of a criterion.
 pub fn mistake(spec: &dyn CriterionSpec) -> String {
-    spec.bind(&signals()).err().expect("the options are wrong").to_string()
+    spec.bind(&model()).err().expect("the options are wrong").to_string()
 }
 
 /// Two numbers agree within `tolerance`.

@@ -1,16 +1,17 @@
 //! An input as a simulation meets it: smooth within a step, with its jumps at breaks.
 
-use mops_core::{Hold, Input};
+use mops_core::{Hold, Input, Scalar};
 
 /// An input with its present value and slope.
 ///
 /// A step of the integrator ends where the input jumps and evaluates it there from the left; only
-/// [`Drive::pass_break`] moves on to the value from the right.
+/// [`Drive::pass_break`] moves on to the value from the right. Inputs of a case are numbers; over a scalar with tangents
+/// a drive can be held at a value with tangents, to differentiate by the input.
 #[derive(Debug, Clone)]
-pub struct Drive<'a> {
+pub struct Drive<'a, S = f64> {
     input: Option<&'a Input>,
     since: f64,
-    value: f64,
+    value: S,
     slope: f64,
     /// What goes on top of the value where the input is a sine.
     sine: Option<Sine>,
@@ -33,17 +34,24 @@ impl Sine {
     }
 }
 
-impl<'a> Drive<'a> {
+impl<S: Scalar> Drive<'_, S> {
+    /// A drive that stays at a value.
+    pub fn held(value: S) -> Self {
+        Self { input: None, since: 0.0, value, slope: 0.0, sine: None }
+    }
+}
+
+impl<'a, S: Scalar> Drive<'a, S> {
     /// A drive at time 0; nothing drives where `input` is absent.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: 0.0, slope: 0.0, sine: None };
+        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, sine: None };
         drive.pass_break(0.0);
         drive
     }
 
     /// The value at `t`.
     #[inline]
-    pub fn at(&self, t: f64) -> f64 {
+    pub fn at(&self, t: f64) -> S {
         match &self.sine {
             Some(sine) => self.value + sine.at(t),
             None => self.value + self.slope * (t - self.since),
@@ -70,18 +78,19 @@ impl<'a> Drive<'a> {
         self.slope = 0.0;
         match input {
             Input::Sine { amplitude, frequency, phase, offset } => {
-                self.value = *offset;
+                self.value = S::from(*offset);
                 let angular = std::f64::consts::TAU * frequency;
                 self.sine = Some(Sine { amplitude: *amplitude, angular, phase: *phase });
             }
             Input::Sampled { hold: Hold::First, .. } => {
-                self.value = input.at(t);
+                let value = input.at(t);
+                self.value = S::from(value);
                 let next = input.next_break(t);
                 if next.is_finite() {
-                    self.slope = (input.at(next) - self.value) / (next - t);
+                    self.slope = (input.at(next) - value) / (next - t);
                 }
             }
-            _ => self.value = input.at(t),
+            _ => self.value = S::from(input.at(t)),
         }
     }
 }
@@ -93,7 +102,7 @@ mod tests {
     #[test]
     fn a_jump_waits_for_its_break() {
         let input = Input::Step { time: 1.0, before: 2.0, after: 3.0 };
-        let mut drive = Drive::new(Some(&input));
+        let mut drive: Drive<'_> = Drive::new(Some(&input));
         assert_eq!((drive.at(1.0), drive.next_break(0.0)), (2.0, 1.0));
         drive.pass_break(1.0);
         assert_eq!((drive.at(1.0), drive.next_break(1.0)), (3.0, f64::INFINITY));
@@ -102,6 +111,6 @@ mod tests {
     #[test]
     fn first_order_hold_is_a_straight_line() {
         let input = Input::Sampled { times: vec![0.0, 2.0], values: vec![1.0, 5.0], hold: Hold::First };
-        assert_eq!(Drive::new(Some(&input)).at(0.5), 2.0);
+        assert_eq!(Drive::<f64>::new(Some(&input)).at(0.5), 2.0);
     }
 }

@@ -1,7 +1,9 @@
 //! Dry friction of coupled joints: which stick, which slide, decided by the balance of torques.
 //!
-//! `M q'' = f - tau`, with `tau_i = T_i` where joint i slides forward, `-T_i` backward, and `|tau_i| <= T_i` where it is
-//! stuck and `q''_i = 0`. No smoothed sign: a stuck joint stays exactly where it is.
+//! `M q'' = f - tau`, with `tau_i = T_i` where joint i slides forward, `-T_i` backward, and `tau_i` within its limit where
+//! it is stuck and `q''_i = 0`. No smoothed sign: a stuck joint stays exactly where it is.
+
+use mops_core::Scalar;
 
 /// How a joint with dry friction moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,98 +27,131 @@ impl Contact {
         }
     }
 
-    fn of(direction: f64) -> Self {
+    pub(super) fn of(direction: f64) -> Self {
         if direction >= 0.0 { Self::Forward } else { Self::Backward }
     }
 }
 
-/// Accelerations and the friction torques that hold stuck joints, for given contacts.
+/// Accelerations, and friction torques of all joints, for given contacts; `sliding` are the torques of joints that slide.
 ///
 /// Rows and columns of stuck joints are taken out of `M q'' = f - tau`; what is left is solved by elimination, which
 /// needs no pivoting because a mass matrix is positive definite.
-pub fn balance<const N: usize>(
-    mass: &[[f64; N]; N],
-    force: &[f64; N],
-    limit: &[f64; N],
+pub fn balance<S: Scalar, const N: usize>(
+    mass: &[[S; N]; N],
+    force: &[S; N],
+    sliding: &[S; N],
     contact: &[Contact; N],
-) -> ([f64; N], [f64; N]) {
-    let stuck = |i: usize| limit[i] > 0.0 && contact[i] == Contact::Stuck;
+) -> ([S; N], [S; N]) {
+    let stuck = |i: usize| contact[i] == Contact::Stuck;
     let mut matrix = *mass;
-    let mut acceleration = [0.0; N];
+    let mut acceleration = *force;
     for i in 0..N {
-        acceleration[i] = force[i] - limit[i] * contact[i].sign();
+        acceleration[i] -= sliding[i] * contact[i].sign();
         if stuck(i) {
-            acceleration[i] = 0.0;
+            acceleration[i] = S::from(0.0);
             for j in 0..N {
-                matrix[i][j] = 0.0;
-                matrix[j][i] = 0.0;
+                matrix[i][j] = S::from(0.0);
+                matrix[j][i] = S::from(0.0);
             }
-            matrix[i][i] = 1.0;
+            matrix[i][i] = S::from(1.0);
         }
     }
     for pivot in 0..N {
         for row in pivot + 1..N {
             let factor = matrix[row][pivot] / matrix[pivot][pivot];
             for column in pivot..N {
-                matrix[row][column] -= factor * matrix[pivot][column];
+                let above = matrix[pivot][column];
+                matrix[row][column] -= factor * above;
             }
-            acceleration[row] -= factor * acceleration[pivot];
+            let above = acceleration[pivot];
+            acceleration[row] -= factor * above;
         }
     }
     for row in (0..N).rev() {
         for column in row + 1..N {
-            acceleration[row] -= matrix[row][column] * acceleration[column];
+            let known = acceleration[column];
+            acceleration[row] -= matrix[row][column] * known;
         }
-        acceleration[row] /= matrix[row][row];
+        acceleration[row] = acceleration[row] / matrix[row][row];
     }
     let torque = std::array::from_fn(|i| {
         if stuck(i) {
-            force[i] - (0..N).map(|j| mass[i][j] * acceleration[j]).sum::<f64>()
+            (0..N).fold(force[i], |left, j| left - mass[i][j] * acceleration[j])
         } else {
-            limit[i] * contact[i].sign()
+            sliding[i] * contact[i].sign()
         }
     });
     (acceleration, torque)
 }
 
-/// The contacts that agree with the torques: joints that move slide the way they move; each of those at rest is stuck if
-/// the torque it takes is within its limit, else it slides the way it accelerates.
-///
-/// For a positive definite mass matrix exactly one choice agrees (a linear complementarity problem with a P-matrix:
-/// R. Cottle, J.-S. Pang, R. Stone, The Linear Complementarity Problem (1992), theorem 3.3.7), so that trying all finds it.
+/// The contacts of joints whose break-away torque is their sliding torque `limit`; see [`Moment::contacts`].
 pub fn contacts<const N: usize>(
     mass: &[[f64; N]; N],
     force: &[f64; N],
     limit: &[f64; N],
     speed: &[f64; N],
 ) -> [Contact; N] {
-    const CHOICES: [Contact; 3] = [Contact::Stuck, Contact::Forward, Contact::Backward];
-    let resting: Vec<usize> = (0..N).filter(|&i| speed[i] == 0.0 && limit[i] > 0.0).collect();
-    let moving: [Contact; N] = std::array::from_fn(|i| Contact::of(speed[i]));
-    let mut best = (f64::INFINITY, moving);
-    #[allow(clippy::cast_possible_truncation)]
-    for code in 0..3_usize.pow(resting.len() as u32) {
-        let mut contact = moving;
-        let mut digits = code;
-        for &i in &resting {
-            contact[i] = CHOICES[digits % 3];
-            digits /= 3;
+    Moment { mass, force, sliding: limit, limit, speed }.contacts(&[Contact::Stuck; N], None)
+}
+
+/// Joints at one moment.
+#[derive(Debug)]
+pub struct Moment<'a, const N: usize> {
+    /// Mass matrix.
+    pub mass: &'a [[f64; N]; N],
+    /// Torques on the joints without dry friction.
+    pub force: &'a [f64; N],
+    /// Friction torques of the joints if they slide, at their present speeds.
+    pub sliding: &'a [f64; N],
+    /// Torque up to which a joint at rest sticks: at least the sliding torque at rest; 0 where it never sticks.
+    pub limit: &'a [f64; N],
+    /// Speeds.
+    pub speed: &'a [f64; N],
+}
+
+impl<const N: usize> Moment<'_, N> {
+    /// The contacts that agree with the torques: joints that move slide the way they move; each of those at rest is
+    /// stuck if the torque it takes is within its limit, else it slides the way it accelerates. The joint `released` has
+    /// just exceeded its limit and does not stick again.
+    ///
+    /// Where break-away takes as much as sliding, exactly one choice agrees for a positive definite mass matrix (a linear
+    /// complementarity problem with a P-matrix: R. Cottle, J.-S. Pang, R. Stone, The Linear Complementarity Problem
+    /// (1992), theorem 3.3.7). Where it takes more, several may: of them the one nearest to `wish`, the contacts so far.
+    pub fn contacts(&self, wish: &[Contact; N], released: Option<usize>) -> [Contact; N] {
+        const CHOICES: [Contact; 3] = [Contact::Forward, Contact::Backward, Contact::Stuck];
+        let resting: Vec<usize> = (0..N).filter(|&i| self.speed[i] == 0.0).collect();
+        let moving: [Contact; N] = std::array::from_fn(|i| Contact::of(self.speed[i]));
+        let largest = self.limit.iter().chain(self.force).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        // Rounding leaves the right choice at about 1e-16 where two of them meet.
+        let rounding = 1e-12 * largest;
+        let mut best = (f64::INFINITY, moving);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+        for code in 0..3_usize.pow(resting.len() as u32) {
+            let mut contact = moving;
+            let mut digits = code;
+            for &i in &resting {
+                contact[i] = CHOICES[digits % 3];
+                digits /= 3;
+            }
+            let sticks = |i: usize| contact[i] == Contact::Stuck;
+            if resting.iter().any(|&i| sticks(i) && (self.limit[i] == 0.0 || released == Some(i))) {
+                continue;
+            }
+            let (acceleration, torque) = balance(self.mass, self.force, self.sliding, &contact);
+            let excess = resting.iter().map(|&i| match contact[i] {
+                Contact::Stuck => torque[i].abs() - self.limit[i],
+                sliding => -sliding.sign() * acceleration[i] * self.mass[i][i],
+            });
+            let excess = excess.fold(0.0, f64::max);
+            let departures = resting.iter().filter(|&&i| contact[i] != wish[i]).count();
+            // Those that agree count by their departures, fewer than N + 1; all others come after them.
+            let rank = if excess <= rounding { departures as f64 } else { N as f64 + 1.0 + excess / largest };
+            if rank < best.0 {
+                best = (rank, contact);
+            }
         }
-        let (acceleration, torque) = balance(mass, force, limit, &contact);
-        // How far the choice is from agreeing; rounding leaves the right one at about 1e-16 where two of them meet.
-        let discord = resting.iter().map(|&i| match contact[i] {
-            Contact::Stuck => torque[i].abs() / limit[i] - 1.0,
-            sliding => -sliding.sign() * acceleration[i] * mass[i][i] / limit[i],
-        });
-        let discord = discord.fold(f64::NEG_INFINITY, f64::max).max(0.0);
-        if discord < best.0 {
-            best = (discord, contact);
-        }
-        if discord == 0.0 {
-            break;
-        }
+        best.1
     }
-    best.1
 }
 
 #[cfg(test)]
@@ -155,6 +190,16 @@ mod tests {
                 assert!(contact[i] != Contact::Stuck || q[i] == 0.0);
             }
         }
+    }
+
+    #[test]
+    fn a_joint_between_sliding_and_break_away_keeps_doing_what_it_did() {
+        let (force, sliding, limit) = ([1.5, 0.0], [1.0, 1.0], [2.0, 2.0]);
+        let moment = Moment { mass: &MASS, force: &force, sliding: &sliding, limit: &limit, speed: &[0.0, 0.0] };
+        let slides = [Contact::Forward, Contact::Stuck];
+        assert_eq!(moment.contacts(&[Contact::Stuck; 2], None), [Contact::Stuck; 2]);
+        assert_eq!(moment.contacts(&slides, None), slides);
+        assert_eq!(moment.contacts(&[Contact::Stuck; 2], Some(0)), slides);
     }
 
     #[test]

@@ -1,15 +1,23 @@
 //! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
 
-pub mod dormand_prince;
+mod banded;
+mod dormand_prince;
 pub mod drive;
+pub mod elements;
+mod esdirk;
+mod events;
 pub mod friction;
+mod integrate;
+mod local;
+pub mod mechanism;
 mod record;
 
-use mops_core::{Failure, Scalar, Work};
+use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use dormand_prince::{Step, integrate};
+pub use integrate::{Step, integrate};
+pub use local::{Equations, local, rates_and_signals};
 pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
@@ -35,7 +43,7 @@ pub trait Dynamics<S: Scalar> {
     }
 
     /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
-    /// event, whose time moves too. Returns what happened.
+    /// event, whose time moves too. Returns what happened; an empty text where a user need not know.
     fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &'static str {
         ""
     }
@@ -50,8 +58,28 @@ pub trait Dynamics<S: Scalar> {
         f64::INFINITY
     }
 
+    /// The places of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
+    /// method solves with the band that they span.
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        None
+    }
+
+    /// Tells every entry of the Jacobian `df/dx` as row, column and value, and returns `true`; `false` where the
+    /// implementor has no exact one, and differences must do.
+    fn jacobian(&self, _t: f64, _x: &Self::State, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        false
+    }
+
     /// A break was reached (also called once at the start): inputs take their new values.
     fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
+
+    /// Whether it wants to be told of accepted steps.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// A step was accepted: a delay keeps what will come out of it later.
+    fn accepted(&mut self, _step: &Step<Self::State>) {}
 }
 
 /// Accuracy and limits of a simulation.
@@ -64,11 +92,24 @@ pub struct Tolerance {
     pub absolute: f64,
     /// Largest number of steps; a simulation that needs more is a failure.
     pub max_steps: usize,
+    /// The method of integration.
+    pub method: IntegrationMethod,
+}
+
+/// A method of integration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum IntegrationMethod {
+    /// Dormand-Prince 5(4): for models whose fastest motion is of interest.
+    #[default]
+    Explicit,
+    /// ESDIRK 4(3), L-stable: for models with motions much faster than what is of interest (heat, reactions, stiff contacts).
+    Stiff,
 }
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self { relative: 1e-8, absolute: 1e-10, max_steps: 100_000 }
+        Self { relative: 1e-8, absolute: 1e-10, max_steps: 100_000, method: IntegrationMethod::Explicit }
     }
 }
 
@@ -77,8 +118,8 @@ impl Tolerance {
     ///
     /// # Errors
     /// A tolerance outside (0, 1), or no steps at all.
-    pub fn check(&self) -> Result<(), mops_core::Mistake> {
-        let wrong = |key: &str, fact: String| mops_core::Mistake::new(key, fact).within("tolerance");
+    pub fn check(&self) -> Result<(), Mistake> {
+        let wrong = |key: &str, fact: String| Mistake::new(key, fact).within("tolerance");
         for (key, value) in [("relative", self.relative), ("absolute", self.absolute)] {
             if !(value > 0.0 && value < 1.0) {
                 return Err(wrong(key, format!("a tolerance lies between 0 and 1, not at {value}")));
@@ -86,6 +127,14 @@ impl Tolerance {
         }
         if self.max_steps == 0 { Err(wrong("max-steps", "a simulation needs steps".into())) } else { Ok(()) }
     }
+}
+
+/// A time that a model's options give under `key`, in s.
+///
+/// # Errors
+/// A quantity that is no time.
+pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, Mistake> {
+    time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| Mistake::new(key, e))
 }
 
 /// What the integrator tells of a simulation: steps, then events.

@@ -1,6 +1,7 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
 //! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
 
+mod entries;
 mod experiment;
 mod schema;
 mod sections;
@@ -12,12 +13,15 @@ mod tree;
 use std::io;
 use std::sync::Arc;
 
+pub use entries::{Entries, Short};
 pub use schema::{describe, schema_of, study_schema, tables};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::criterion::Usage;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::expression::Expression;
+use crate::linearised::Linearised;
+use crate::model::{AnalysisKind, Interface};
 use crate::study::{CaseDraft, CriterionDraft, Draft, ModelDraft, Study, TunerDraft};
 use crate::unit::{Quantity, Unit};
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
@@ -137,7 +141,12 @@ fn kind<'t, 'k, K>(
 fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diagnostic> {
     let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
-    let model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
+    let mut model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
+    if let Some(section) = common.linearise {
+        let place = node.child("linearise").expect("it was just read");
+        let linearised = Linearised::new(model.into(), &section.into()).map_err(|mistake| place.locate(&mistake))?;
+        model = Box::new(linearised);
+    }
     Ok(ModelDraft { model, parameters: common.parameters.0 })
 }
 
@@ -219,11 +228,12 @@ struct Located {
 }
 
 impl crate::criterion::CriterionSpec for Located {
-    fn bind(
-        &self,
-        signals: &[crate::model::Variable],
-    ) -> Result<Box<dyn crate::criterion::Criterion>, crate::study::Mistake> {
-        self.inner.bind(signals).map_err(|mistake| mistake.within(self.kind))
+    fn reads(&self) -> AnalysisKind {
+        self.inner.reads()
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn crate::criterion::Criterion>, crate::study::Mistake> {
+        self.inner.bind(model).map_err(|mistake| mistake.within(self.kind))
     }
 
     fn needs_measurement(&self) -> Option<&str> {

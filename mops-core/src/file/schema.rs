@@ -4,8 +4,9 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
+use super::entries::Entries;
 use super::sections::{
-    CaseOptions, CriterionCommon, Entries, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
+    CaseOptions, CriterionCommon, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
 };
 use super::tasks::{ExcitationSection, SensitivitySection, SweepSection};
 use crate::catalogue::Catalogue;

@@ -1,13 +1,14 @@
 //! What may stand in the tables of a study file. The documentation of each key is what `mops schema` gives to editors.
 
 use std::fmt;
-use std::marker::PhantomData;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 
+use super::entries::Entries;
 use crate::criterion::Usage;
 use crate::experiment::{Hold, Input, Role};
+use crate::linearised::Linearise;
 use crate::study::{Objective, Task};
 use crate::tuner::Scale;
 use crate::unit::Quantity;
@@ -34,10 +35,40 @@ pub(super) struct ModelCommon {
     /// Values of parameters that neither a tuner nor a case sets.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
+    /// Makes it the linearisation of the model, to be read by criteria of linear systems:
+    /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`; `{}` for all of them.
+    pub linearise: Option<LineariseSection>,
 }
 
 impl ModelCommon {
-    pub const KEYS: &[&str] = &["parameters"];
+    pub const KEYS: &[&str] = &["parameters", "linearise"];
+}
+
+/// Where a model is linearised, and between what.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct LineariseSection {
+    /// Inputs; all where absent.
+    pub inputs: Option<Vec<String>>,
+    /// Signals that are outputs; all where absent.
+    pub outputs: Option<Vec<String>>,
+    /// Values of states and inputs at the operating point; states that are not named have their start value, inputs the
+    /// value that the case gives them at the start.
+    #[serde(default)]
+    pub at: Entries<Quantity>,
+    /// `true` moves the operating point to the nearest equilibrium; what `at` names is held, and so are the inputs.
+    #[serde(default)]
+    pub equilibrium: bool,
+    /// States and inputs that the search for the equilibrium may move although they would be held.
+    #[serde(default)]
+    pub free: Vec<String>,
+}
+
+impl From<LineariseSection> for Linearise {
+    fn from(section: LineariseSection) -> Self {
+        let LineariseSection { inputs, outputs, at, equilibrium, free } = section;
+        Self { inputs, outputs, at: at.0, equilibrium, free }
+    }
 }
 
 /// A quantity that a solver may change; its name is that of a model's parameter.
@@ -243,48 +274,6 @@ pub(super) struct SolverCommon {
 
 impl SolverCommon {
     pub const KEYS: &[&str] = &["max-evaluations"];
-}
-
-/// A table with any keys, in the order of the file.
-#[derive(Debug)]
-pub(super) struct Entries<T>(pub Vec<(String, T)>);
-
-impl<T> Default for Entries<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
-
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct InOrder<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for InOrder<T> {
-            type Value = Entries<T>;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table")
-            }
-            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Entries<T>, M::Error> {
-                let mut entries = Vec::new();
-                while let Some(entry) = map.next_entry()? {
-                    entries.push(entry);
-                }
-                Ok(Entries(entries))
-            }
-        }
-        deserializer.deserialize_map(InOrder(PhantomData))
-    }
-}
-
-impl<T: JsonSchema> JsonSchema for Entries<T> {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        format!("EntriesOf{}", T::schema_name()).into()
-    }
-    fn inline_schema() -> bool {
-        true
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "object", "additionalProperties": generator.subschema_for::<T>() })
-    }
 }
 
 /// A text, or a table: `"column"` is short for `{ column = "column" }`.

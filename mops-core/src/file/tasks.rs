@@ -1,9 +1,8 @@
 //! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use schemars::JsonSchema;
 
-use super::sections::Entries;
+use super::entries::{Entries, Short};
 use super::tree::Node;
 use super::{Diagnostic, read_seconds};
 use crate::study::{AxisDraft, ExcitationDraft, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft};
@@ -64,9 +63,9 @@ pub(super) struct SensitivitySection {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SweepSection {
     /// The tuner along x: its name, or a table with `tuner`, `min`, `max`, `points`.
-    pub x: AxisSection,
+    pub x: Short<AxisTable>,
     /// The tuner along y; without it the sweep is a line.
-    pub y: Option<AxisSection>,
+    pub y: Option<Short<AxisTable>>,
     /// Where the other tuners stand: `optimum` (the default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
@@ -86,35 +85,9 @@ pub(super) struct AxisTable {
     pub points: Option<usize>,
 }
 
-/// The name of a tuner, or a table: `"k"` is short for `{ tuner = "k" }`.
-#[derive(Debug)]
-pub(super) struct AxisSection(AxisTable);
-
-impl<'de> Deserialize<'de> for AxisSection {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
-            type Value = AxisSection;
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the name of a tuner, or a table with `tuner`")
-            }
-            fn visit_str<E>(self, tuner: &str) -> Result<AxisSection, E> {
-                Ok(AxisSection(AxisTable { tuner: tuner.to_owned(), min: None, max: None, points: None }))
-            }
-            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<AxisSection, M::Error> {
-                AxisTable::deserialize(serde::de::value::MapAccessDeserializer::new(map)).map(AxisSection)
-            }
-        }
-        deserializer.deserialize_any(Either)
-    }
-}
-
-impl JsonSchema for AxisSection {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "AxisSection".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "anyOf": [{ "type": "string" }, generator.subschema_for::<AxisTable>()] })
+impl From<String> for AxisTable {
+    fn from(tuner: String) -> Self {
+        Self { tuner, min: None, max: None, points: None }
     }
 }
 
@@ -146,7 +119,7 @@ pub(super) fn read(root: &Node<'_>) -> Result<TasksDraft, Diagnostic> {
     if let Some(node) = root.child("sweep") {
         let section: SweepSection = node.read()?;
         let points = if section.y.is_some() { 41 } else { 201 };
-        let axis = |AxisSection(axis): AxisSection| AxisDraft {
+        let axis = |Short(axis): Short<AxisTable>| AxisDraft {
             tuner: axis.tuner,
             min: axis.min,
             max: axis.max,

@@ -254,7 +254,9 @@ impl<'t> Node<'t> {
         }
         // A message that ends with the key is about this name, not about the value under it.
         let names_key = mistake.path.last().is_some_and(|key| mistake.message.ends_with(&format!("`{key}`")));
-        let diagnostic = if node.key.is_empty() {
+        let diagnostic = if let Some(span) = &mistake.span {
+            node.diagnostic_within(span.clone(), mistake.message.clone())
+        } else if node.key.is_empty() {
             Diagnostic::new(mistake.message.clone()).at(self.source, 0..0)
         } else if node.value().is_table() || names_key {
             node.key_diagnostic(mistake.message.clone())

@@ -1,6 +1,40 @@
-//! Linear time-invariant systems.
+//! Linear time-invariant systems: poles, zeros, frequency responses, norms, margins, and the design of state feedback.
+//!
+//! Pure computation on small dense matrices. What a user can ask for and has no answer is an error of one sentence.
+
+mod controllability;
+mod eigen;
+mod equilibrium;
+mod lyapunov;
+mod margins;
+mod norms;
+mod place;
+mod response;
+mod riccati;
+mod schur;
+mod system;
+#[cfg(test)]
+mod testing;
+mod transfer;
+mod zeros;
 
 use nalgebra::DMatrix;
+
+pub use controllability::check_controllable;
+pub use eigen::eigenvalues;
+pub use equilibrium::{Balance, equilibrium};
+pub use lyapunov::{h2_norm, lyapunov};
+pub use margins::{Crossing, Loop};
+pub use norms::{Peak, hinf_norm, peak_gain};
+pub use place::place;
+pub use response::FrequencyResponse;
+pub use riccati::{lqr, riccati};
+pub use schur::Schur;
+pub use transfer::TransferFunction;
+pub use zeros::zeros;
+
+/// A complex number.
+pub type Complex = nalgebra::Complex<f64>;
 
 /// A linear time-invariant system with named states, inputs and outputs:
 ///

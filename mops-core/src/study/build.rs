@@ -9,7 +9,7 @@ use crate::criterion::{Criterion, Demand, Usage};
 use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment, Input};
 use crate::expression::Expression;
-use crate::model::{Interface, Model, Parameter, Variable};
+use crate::model::{AnalysisKind, Interface, Model, Parameter, Variable};
 use crate::tuner::{Grid, Scale, Tuner};
 use crate::unit::{Quantity, Unit};
 
@@ -563,8 +563,10 @@ fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> Result<(), 
                 .with_help(format!("add {}", known.join(" or "))));
         }
     };
-    let signals = study.models[model].1.interface().signals.clone();
-    let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(&signals)?);
+    let interface = study.models[model].1.interface();
+    check_sort(draft.criterion.reads(), interface.analysis, &study.models, model)?;
+    let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(interface)?);
+    let signals = interface.signals.clone();
     let unit = criterion.unit();
     let demand = demand(&draft, &unit)?;
     if !(draft.weight.is_finite() && draft.weight > 0.0) {
@@ -584,6 +586,28 @@ fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> Result<(), 
         });
     }
     Ok(())
+}
+
+/// Refuses a criterion for a model whose analyses it cannot read.
+fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: usize) -> Result<(), Mistake> {
+    if reads == gives {
+        return Ok(());
+    }
+    let name = &models[model].0;
+    let fact = match gives {
+        AnalysisKind::Time => format!("this criterion reads a linear system, but `{name}` is simulated over time"),
+        AnalysisKind::Linear => format!("this criterion reads a simulation over time, but `{name}` is a linear system"),
+    };
+    let other = models.iter().find(|(_, model)| model.interface().analysis == reads);
+    let way_out = match (other, reads) {
+        (Some((other, _)), _) => format!("read another model: model = \"{other}\""),
+        (None, AnalysisKind::Linear) => {
+            "add a model that is linear: `linearise = { ... }` beside the kind makes one of a simulated model"
+                .to_owned()
+        }
+        (None, AnalysisKind::Time) => "add a model that is simulated".to_owned(),
+    };
+    Err(Mistake::here(fact).with_help(way_out))
 }
 
 fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake> {
@@ -677,10 +701,14 @@ fn job(
 fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), Mistake> {
     let JobPlan { model, case, .. } = study.jobs[index];
     let interface = study.models[model].1.interface();
-    let horizon = study.cases[case].horizon.or(interface.horizon).ok_or_else(|| {
-        Mistake::here(format!("nothing says how long `{}` is simulated", study.cases[case].name))
-            .with_help("give the case or the model a `horizon`")
-    })?;
+    let horizon = match (study.cases[case].horizon.or(interface.horizon), interface.analysis) {
+        (Some(horizon), _) => horizon,
+        (None, AnalysisKind::Linear) => 0.0,
+        (None, AnalysisKind::Time) => {
+            let fact = format!("nothing says how long `{}` is simulated", study.cases[case].name);
+            return Err(Mistake::here(fact).with_help("give the case or the model a `horizon`"));
+        }
+    };
     let parameters = sources(study, interface, fixed, case)?;
     let job = &mut study.jobs[index];
     (job.horizon, job.parameters) = (horizon, parameters);

@@ -1,5 +1,7 @@
 //! A study as it is written down, in a file or in Rust: nothing checked yet.
 
+use std::ops::Range;
+
 use super::{Objective, Study, Task, TasksDraft};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::experiment::{Input, Role};
@@ -16,23 +18,32 @@ pub struct Mistake {
     pub message: String,
     /// The way out.
     pub help: Option<String>,
+    /// Bytes of the text under the last key, where the mistake is in a part of it.
+    pub span: Option<Range<usize>>,
 }
 
 impl Mistake {
     /// A mistake at a key.
     pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { path: vec![key.into()], message: message.into(), help: None }
+        Self { path: vec![key.into()], message: message.into(), help: None, span: None }
     }
 
     /// A mistake in the thing itself rather than under one of its keys.
     pub fn here(message: impl Into<String>) -> Self {
-        Self { path: Vec::new(), message: message.into(), help: None }
+        Self { path: Vec::new(), message: message.into(), help: None, span: None }
     }
 
     /// Adds the way out.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
+        self
+    }
+
+    /// Narrows the place to these bytes of the text under the key.
+    #[must_use]
+    pub fn at(mut self, span: Range<usize>) -> Self {
+        self.span = Some(span);
         self
     }
 

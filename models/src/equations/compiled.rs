@@ -1,0 +1,179 @@
+//! A model ready to run: one tape for the derivatives, and small ones for guards, resets and signals.
+
+use mops_core::Mistake;
+
+use super::graph::{Id, Op};
+use super::program::{Layout, Program, compile};
+use super::system::{Contact, System};
+
+/// Where a signal comes from.
+#[derive(Debug)]
+pub enum Signal {
+    /// It is a state.
+    State(usize),
+    /// It is an input.
+    Input(usize),
+    /// It is computed.
+    Tape(Program),
+}
+
+/// A condition that switches branches.
+#[derive(Debug)]
+pub struct Switch {
+    /// Mode: 1 while it holds.
+    pub mode: usize,
+    /// Whether equality does not count.
+    pub strict: bool,
+    /// Whether the branches differ where they meet.
+    pub jumps: bool,
+    /// Gives the difference of the sides of the condition, and its right side.
+    pub sides: Program,
+}
+
+/// Dry friction.
+#[derive(Debug)]
+pub struct Joint {
+    /// States and modes.
+    pub contact: Contact,
+    /// Gives the torque that holds it, what breaks it away, friction while it slides, and its acceleration.
+    pub balance: Program,
+    /// What is reported where it comes to rest.
+    pub sticks: &'static str,
+    /// What is reported where it breaks away.
+    pub slides: &'static str,
+}
+
+/// An event of the user's.
+#[derive(Debug)]
+pub struct Happening {
+    /// Its name.
+    pub name: &'static str,
+    /// Gives its guard.
+    pub guard: Program,
+    /// Gives the new values of these states.
+    pub resets: (Vec<usize>, Program),
+}
+
+/// A compiled model.
+#[derive(Debug)]
+pub struct Compiled {
+    /// Number of states.
+    pub states: usize,
+    /// Number of parameters of the equations, without those that only are start values.
+    pub parameters: usize,
+    /// Registers.
+    pub layout: Layout,
+    /// Runs once in a simulation, when parameters are known.
+    pub setup: Program,
+    /// Gives the derivatives.
+    pub derivative: Program,
+    /// Signals.
+    pub signals: Vec<Signal>,
+    /// Conditions.
+    pub switches: Vec<Switch>,
+    /// Joints with dry friction.
+    pub joints: Vec<Joint>,
+    /// Events.
+    pub happenings: Vec<Happening>,
+    /// Gives the start values that are expressions; their states.
+    pub starts: (Vec<usize>, Program),
+    /// Gives the entries of matrices; their sizes.
+    pub matrices: Vec<Program>,
+    /// Which state a derivative depends on: derivative, state.
+    pub pattern: Vec<(usize, usize)>,
+}
+
+/// A text that lives as long as the program: events are named by it, and a study is built once.
+fn lasting(text: String) -> &'static str {
+    Box::leak(text.into_boxed_str())
+}
+
+impl Compiled {
+    /// Compiles a model whose states have these names.
+    ///
+    /// # Errors
+    /// A model with more than 65536 numbers at a time.
+    pub fn new(system: &System, names: &[&str], inputs: usize, parameters: usize) -> Result<Self, Mistake> {
+        let graph = &system.graph;
+        let mut wanted: Vec<Vec<Id>> = vec![system.derivatives.clone()];
+        let mut graph = graph.clone();
+        for switch in &system.switches {
+            wanted.push(vec![graph.sub(switch.left, switch.right), switch.right]);
+        }
+        for c in &system.contacts {
+            wanted.push(vec![c.torque, c.limit, c.coulomb, system.derivatives[c.velocity]]);
+        }
+        for happening in &system.happenings {
+            wanted.push(vec![happening.guard]);
+            wanted.push(happening.resets.iter().map(|(_, id)| *id).collect());
+        }
+        let starts: Vec<(usize, Id)> =
+            system.starts.iter().enumerate().filter_map(|(s, start)| Some((s, (*start)?))).collect();
+        wanted.push(starts.iter().map(|(_, id)| *id).collect());
+        wanted.extend(system.matrices.iter().cloned());
+        wanted.extend(system.signals.iter().map(|&id| vec![id]));
+
+        let too_large = |_| {
+            Mistake::new("states", "the model needs more than 65536 numbers at a time")
+                .with_help("a model of this size is written in Rust")
+        };
+        let mut layout = Layout::new(parameters, names.len(), inputs, system.modes).map_err(too_large)?;
+        let (setup, programs) = compile(&graph, &mut layout, &wanted).map_err(too_large)?;
+        let mut programs = programs.into_iter();
+        let mut next = || programs.next().expect("there is a tape for everything wanted");
+        let derivative = next();
+        let switches =
+            system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
+        let switches = switches.collect();
+        let joint = |contact: &Contact, balance| Joint {
+            contact: *contact,
+            balance,
+            sticks: lasting(format!("{} sticks", names[contact.position])),
+            slides: lasting(format!("{} slides", names[contact.position])),
+        };
+        let joints = system.contacts.iter().map(|contact| joint(contact, next())).collect();
+        let happening = |h: &super::system::Happening, guard, resets| Happening {
+            name: lasting(h.name.clone()),
+            guard,
+            resets: (h.resets.iter().map(|(state, _)| *state).collect(), resets),
+        };
+        let happenings = system
+            .happenings
+            .iter()
+            .map(|h| {
+                let guard = next();
+                happening(h, guard, next())
+            })
+            .collect();
+        let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
+        let matrices = system.matrices.iter().map(|_| next()).collect();
+        let signals = system
+            .signals
+            .iter()
+            .map(|&id| {
+                let tape = next();
+                match graph.op(id) {
+                    Op::State(state) => Signal::State(state),
+                    Op::Input(input) => Signal::Input(input),
+                    _ => Signal::Tape(tape),
+                }
+            })
+            .collect();
+        let rows = system.derivatives.iter().enumerate();
+        let pattern = rows.flat_map(|(row, &id)| graph.states_of(id).into_iter().map(move |s| (row, s))).collect();
+        Ok(Self {
+            states: names.len(),
+            parameters,
+            layout,
+            setup,
+            derivative,
+            signals,
+            switches,
+            joints,
+            happenings,
+            starts,
+            matrices,
+            pattern,
+        })
+    }
+}

@@ -1,0 +1,383 @@
+//! What the tables say, with every family unrolled and every expression read.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use mops_core::expression::{Equation, equation};
+use mops_core::{Mistake, Quantity, Unit, suggestion};
+
+use super::key::{Index, Key, member};
+use super::options::{EquationsOptions, Formula};
+
+/// An expression or equation, with the way to its place in the study.
+#[derive(Debug, Clone)]
+pub struct Text {
+    /// Keys from the options down.
+    pub path: Vec<String>,
+    /// What it says.
+    pub equation: Arc<Equation>,
+    /// Name and value of the index, in a family.
+    pub index: Option<(String, i64)>,
+}
+
+/// A state, an input or a signal.
+#[derive(Debug, Clone)]
+pub struct Declared {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: Unit,
+    /// What it is.
+    pub about: String,
+    /// Section and key under which it stands.
+    pub path: Vec<String>,
+}
+
+/// A parameter.
+#[derive(Debug, Clone)]
+pub struct Settable {
+    /// Name, unit, meaning.
+    pub quantity: Declared,
+    /// Value where the study gives none.
+    pub default: Option<f64>,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+}
+
+/// Friction of a joint.
+#[derive(Debug, Clone)]
+pub struct Friction {
+    /// Its position or its speed.
+    pub of: String,
+    /// Where it stands.
+    pub path: Vec<String>,
+    /// Dry friction.
+    pub coulomb: Option<Text>,
+    /// Viscous friction.
+    pub viscous: Option<Text>,
+    /// Break-away over sliding friction.
+    pub peak: Option<Text>,
+}
+
+/// Something that happens when its guard becomes negative.
+#[derive(Debug, Clone)]
+pub struct When {
+    /// Name.
+    pub name: String,
+    /// Its guard.
+    pub guard: Text,
+    /// New values of states.
+    pub resets: Vec<(String, Text)>,
+}
+
+/// A model as it is written, checked as far as one table at a time tells.
+#[derive(Debug, Clone, Default)]
+pub struct Definition {
+    /// States, in order.
+    pub states: Vec<Declared>,
+    /// Inputs, in order.
+    pub inputs: Vec<Declared>,
+    /// Parameters, in order.
+    pub parameters: Vec<Settable>,
+    /// Constants, in the unit they are written in.
+    pub constants: Vec<(String, f64, Vec<String>)>,
+    /// Named expressions.
+    pub lets: Vec<(String, Text)>,
+    /// Derivatives by state.
+    pub der: BTreeMap<String, Text>,
+    /// Entries of the mass matrix: row, column.
+    pub mass: Vec<(String, String, Text)>,
+    /// Further signals.
+    pub outputs: Vec<(Declared, Text)>,
+    /// Values at the start, by state.
+    pub start: BTreeMap<String, Text>,
+    /// Friction elements.
+    pub friction: Vec<Friction>,
+    /// Events.
+    pub when: Vec<When>,
+    /// Names of joints: name, position, where it stands.
+    pub ports: Vec<(String, String, Vec<String>)>,
+    /// Terms that are added to the model: effects that act at its ports.
+    pub terms: Vec<Term>,
+}
+
+/// A term that acts at a port.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// Where.
+    pub target: Target,
+    /// What is added, in the quantities of the model.
+    pub value: Text,
+}
+
+/// Where a term is added.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Target {
+    /// To the right-hand side of a state's equation, before the mass matrix is solved.
+    Equation(String),
+    /// To an input, wherever it acts.
+    Input(String),
+    /// To a signal, where it is read.
+    Signal(String),
+}
+
+/// Puts a mistake under these keys.
+pub fn under(path: &[String], mistake: Mistake) -> Mistake {
+    path.iter().rev().fold(mistake, |mistake, key| mistake.within(key))
+}
+
+fn path(keys: &[&str]) -> Vec<String> {
+    keys.iter().map(|key| (*key).to_owned()).collect()
+}
+
+impl Text {
+    /// Reads a formula that stands under these keys.
+    pub(super) fn read(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
+        let read = equation(&formula.0);
+        let equation =
+            read.map_err(|wrong| under(&path, Mistake::here(wrong.message).with_help(HELP).at(wrong.span)))?;
+        Ok(Self { path, equation: Arc::new(equation), index })
+    }
+
+    /// An expression that may not be an equation.
+    fn expression(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
+        let text = Self::read(path, formula, index)?;
+        match &text.equation.left {
+            Some(left) => Err(under(
+                &text.path,
+                Mistake::here("an equation stands where an expression is expected")
+                    .with_help("only `der` takes equations; a comparison is written `>=` or `<=`")
+                    .at(left.span.start..text.equation.right.span.end),
+            )),
+            None => Ok(text),
+        }
+    }
+}
+
+const HELP: &str = "`mops describe equations` tells how expressions are written";
+
+impl Definition {
+    /// Reads the tables.
+    ///
+    /// # Errors
+    /// The first key, unit or expression that is wrong, with its place.
+    pub fn read(options: &EquationsOptions) -> Result<Self, Mistake> {
+        let mut d = Self::default();
+        for (key, state) in &options.states.0 {
+            d.states.extend(declared("states", key, &state.0.unit, state.0.about.as_deref())?);
+        }
+        if d.states.is_empty() {
+            return Err(Mistake::new("states", "the model has no state").with_help("as in states = { x = \"m\" }"));
+        }
+        for (key, input) in &options.inputs.0 {
+            d.inputs.extend(declared("inputs", key, &input.0.unit, input.0.about.as_deref())?);
+        }
+        for (key, parameter) in &options.parameters.0 {
+            let parameter = &parameter.0;
+            for quantity in declared("parameters", key, &parameter.unit, parameter.about.as_deref())? {
+                let value = |name: &str, given: &Option<Quantity>| {
+                    let value = given.as_ref().map(|q| q.to(&quantity.unit)).transpose();
+                    value.map_err(|why| under(&path(&["parameters", key, name]), Mistake::here(why)))
+                };
+                let default = value("default", &parameter.default)?;
+                let min = value("min", &parameter.min)?.unwrap_or(f64::NEG_INFINITY);
+                let max = value("max", &parameter.max)?.unwrap_or(f64::INFINITY);
+                d.parameters.push(Settable { quantity, default, range: [min, max] });
+            }
+        }
+        for (key, constant) in &options.constants.0 {
+            let place = path(&["constants", key]);
+            let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
+            d.constants.extend(names.into_iter().map(|name| (name, constant.number, place.clone())));
+        }
+        for (key, output) in &options.outputs.0 {
+            let unit = output.0.unit.as_deref().unwrap_or("1");
+            let [declared] = <[Declared; 1]>::try_from(declared("outputs", key, unit, output.0.about.as_deref())?)
+                .map_err(|_| under(&path(&["outputs", key]), Mistake::here("an output is one signal")))?;
+            let text = Text::expression(declared.path.clone(), &output.0.value, None)?;
+            d.outputs.push((declared, text));
+        }
+        d.read_definitions(options)?;
+        d.read_mass(options)?;
+        d.read_elements(options)?;
+        Ok(d)
+    }
+
+    fn state_names(&self) -> Vec<String> {
+        self.states.iter().map(|state| state.name.clone()).collect()
+    }
+
+    fn read_definitions(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+        for (key, formula) in &options.definitions.0 {
+            let place = path(&["let", key]);
+            let parsed = Key::parse(key).map_err(|m| under(&place, m))?;
+            let names = parsed.declared().map_err(|m| under(&place, m))?;
+            let first = match parsed.index {
+                Index::Range(_, from, _) => from,
+                _ => 0,
+            };
+            for (name, k) in names.into_iter().zip(first..) {
+                let index = match &parsed.index {
+                    Index::Range(Some(index), ..) => Some((index.clone(), k)),
+                    _ => None,
+                };
+                self.lets.push((name, Text::expression(place.clone(), formula, index)?));
+            }
+        }
+        let states = self.state_names();
+        let states: Vec<&str> = states.iter().map(String::as_str).collect();
+        self.der = by_state("der", &options.der.0, &states, Text::read)?;
+        self.start = by_state("start", &options.start.0, &states, |path, formula, index| {
+            let key = path.last().and_then(|key| Key::parse(key).ok());
+            let family = |name: &str| name.split('[').next().map(str::to_owned);
+            let state = self.states.iter().find(|s| family(&s.name) == key.as_ref().map(|key| key.name.clone()));
+            let plain = state.and_then(|s| Quantity::parse(&formula.0).ok().map(|q| (s, q)));
+            match plain.filter(|_| has_unit(&formula.0)) {
+                Some((state, quantity)) => {
+                    let value = quantity.to(&state.unit).map_err(|why| under(&path, Mistake::here(why)))?;
+                    Text::expression(path, &Formula(format!("{value:?}")), index)
+                }
+                None => Text::expression(path, formula, index),
+            }
+        })?;
+        for state in &self.states {
+            if !self.der.contains_key(&state.name) {
+                return Err(under(
+                    &state.path,
+                    Mistake::here(format!("nothing gives the derivative of `{}`", state.name))
+                        .with_help(format!("add it to `der`, as in \"{}\" = \"...\"", state.name)),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn read_mass(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+        let states = self.state_names();
+        for (key, formula) in &options.mass.0 {
+            let place = path(&["mass", key]);
+            let (row, column) = key.split_once(',').ok_or_else(|| {
+                under(&place, Mistake::here(format!("the key `{key}` does not name a row and a column")))
+                    .with_help("write two states with a comma between them: \"w,w\" = \"J\"")
+            })?;
+            let (row, column) = (row.trim().to_owned(), column.trim().to_owned());
+            for name in [&row, &column] {
+                if !states.contains(name) {
+                    return Err(under(&place, Mistake::here(format!("the model has no state `{name}`")))
+                        .with_help(suggestion(name, states.iter().map(String::as_str))));
+                }
+            }
+            self.mass.push((row, column, Text::expression(place, formula, None)?));
+        }
+        Ok(())
+    }
+
+    fn read_elements(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+        for (of, friction) in &options.friction.0 {
+            let read = |key: &str, formula: &Option<Formula>| {
+                formula.as_ref().map(|f| Text::expression(path(&["friction", of, key]), f, None)).transpose()
+            };
+            self.friction.push(Friction {
+                of: of.clone(),
+                path: path(&["friction", of]),
+                coulomb: read("coulomb", &friction.coulomb)?,
+                viscous: read("viscous", &friction.viscous)?,
+                peak: read("peak", &friction.peak)?,
+            });
+        }
+        let states = self.state_names();
+        for (name, when) in &options.when.0 {
+            let guard = Text::expression(path(&["when", name, "guard"]), &when.guard, None)?;
+            let mut resets = Vec::new();
+            for (state, formula) in &when.reset.0 {
+                let place = path(&["when", name, "reset", state]);
+                if !states.contains(state) {
+                    return Err(under(&place, Mistake::here(format!("the model has no state `{state}`")))
+                        .with_help(suggestion(state, states.iter().map(String::as_str))));
+                }
+                resets.push((state.clone(), Text::expression(place, formula, None)?));
+            }
+            self.when.push(When { name: name.clone(), guard, resets });
+        }
+        for (name, port) in &options.ports.0 {
+            self.ports.push((name.clone(), port.joint.clone(), path(&["ports", name, "joint"])));
+        }
+        Ok(())
+    }
+}
+
+/// `3 rad` and `20 degC`, not `2*m`.
+fn has_unit(text: &str) -> bool {
+    text.trim().split_once(' ').is_some_and(|(number, unit)| {
+        number.parse::<f64>().is_ok() && unit.trim_start().starts_with(char::is_alphabetic)
+    })
+}
+
+fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, Mistake> {
+    let place = path(&[section, key]);
+    let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
+    let unit = Unit::parse(unit).map_err(|why| {
+        under(&place, Mistake::here(why))
+            .with_help("units are s, m, kg, rad, N, V, A, K and products such as \"kg m2\"")
+    })?;
+    let declare = |name| {
+        let about = about.unwrap_or_default().to_owned();
+        Declared { name, unit: unit.clone(), about, path: place.clone() }
+    };
+    Ok(names.into_iter().map(declare).collect())
+}
+
+/// Texts by state: those with a key of their own first, then what a key says of all that are left.
+fn by_state(
+    section: &str,
+    entries: &[(String, Formula)],
+    states: &[&str],
+    read: impl Fn(Vec<String>, &Formula, Option<(String, i64)>) -> Result<Text, Mistake>,
+) -> Result<BTreeMap<String, Text>, Mistake> {
+    let mut texts: BTreeMap<String, Text> = BTreeMap::new();
+    let mut rest = Vec::new();
+    for (key, formula) in entries {
+        let place = path(&[section, key]);
+        let parsed = Key::parse(key).map_err(|m| under(&place, m))?;
+        let members: Vec<(String, Option<(String, i64)>)> = match &parsed.index {
+            Index::None => vec![(parsed.name.clone(), None)],
+            Index::One(k) => vec![(member(&parsed.name, *k), None)],
+            Index::Range(index, from, to) => {
+                let one = |k| (member(&parsed.name, k), index.clone().map(|index| (index, k)));
+                (*from..=*to).map(one).collect()
+            }
+            Index::Rest(index) => {
+                rest.push((parsed.name.clone(), index.clone(), place, formula));
+                continue;
+            }
+        };
+        for (name, index) in members {
+            if !states.contains(&name.as_str()) {
+                return Err(under(&place, Mistake::here(format!("the model has no state `{name}`")))
+                    .with_help(suggestion(&name, states.iter().copied())));
+            }
+            let text = read(place.clone(), formula, index)?;
+            if texts.insert(name.clone(), text).is_some() {
+                return Err(under(&place, Mistake::here(format!("`{name}` is defined twice")))
+                    .with_help("let the members of each key be different ones"));
+            }
+        }
+    }
+    for (family, index, place, formula) in rest {
+        let all = states.iter().filter_map(|state| {
+            let inner = state.strip_prefix(family.as_str())?.strip_prefix('[')?.strip_suffix(']')?;
+            Some((*state, inner.parse::<i64>().ok()?))
+        });
+        let all: Vec<(&str, i64)> = all.collect();
+        if all.is_empty() {
+            return Err(under(&place, Mistake::here(format!("the model has no states `{family}[..]`")))
+                .with_help(format!("declare them, as in states = {{ \"{family}[1..100]\" = \"K\" }}")));
+        }
+        for (name, k) in all {
+            if !texts.contains_key(name) {
+                texts.insert(name.to_owned(), read(place.clone(), formula, Some((index.clone(), k)))?);
+            }
+        }
+    }
+    Ok(texts)
+}

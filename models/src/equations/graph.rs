@@ -1,0 +1,341 @@
+//! Equations as a graph without repetition: constants folded, common subexpressions shared, products in one order.
+
+use std::collections::HashMap;
+
+use mops_core::expression::{Comparison, Function, functions};
+
+/// A node of the graph; nodes come after those they are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Id(u32);
+
+/// What a node computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// A number, by its bits.
+    Constant(u64),
+    /// A parameter of the model.
+    Parameter(usize),
+    /// A state.
+    State(usize),
+    /// An input.
+    Input(usize),
+    /// Time, s.
+    Time,
+    /// A number that events change: 1 or 0 of a switch, the direction of a contact.
+    Mode(usize),
+    /// `a + b`.
+    Add(Id, Id),
+    /// `a - b`.
+    Sub(Id, Id),
+    /// `a b`.
+    Mul(Id, Id),
+    /// `a / b`.
+    Div(Id, Id),
+    /// `a^b`.
+    Power(Id, Id),
+    /// A smooth function of one argument.
+    Function(Function, Id),
+    /// Angle of the point (second, first).
+    Atan2(Id, Id),
+    /// 1 where the comparison holds, as it stands, else 0.
+    Holds(Comparison, Id, Id),
+    /// The second where the first is positive, else the third.
+    Choose(Id, Id, Id),
+    /// One unknown of a block of linear equations.
+    Solution(usize, usize),
+}
+
+/// On what a node depends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Nothing: it is a number.
+    Constant,
+    /// Parameters: it is computed once in a simulation.
+    Parameter,
+    /// States, inputs, time or modes.
+    Variable,
+}
+
+/// `matrix unknowns = right`, row by row.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Coefficients, row by row.
+    pub matrix: Vec<Id>,
+    /// Right-hand sides.
+    pub right: Vec<Id>,
+}
+
+/// All nodes.
+#[derive(Debug, Clone, Default)]
+pub struct Graph {
+    nodes: Vec<(Op, Level)>,
+    known: HashMap<Op, Id>,
+    /// Blocks of linear equations.
+    pub blocks: Vec<Block>,
+}
+
+impl Graph {
+    /// What a node computes.
+    pub fn op(&self, id: Id) -> Op {
+        self.nodes[id.0 as usize].0
+    }
+
+    /// On what it depends.
+    pub fn level(&self, id: Id) -> Level {
+        self.nodes[id.0 as usize].1
+    }
+
+    /// The nodes that a node is made of.
+    pub fn operands(&self, id: Id) -> Vec<Id> {
+        match self.op(id) {
+            Op::Constant(_) | Op::Parameter(_) | Op::State(_) | Op::Input(_) | Op::Time | Op::Mode(_) => Vec::new(),
+            Op::Function(_, a) => vec![a],
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::Power(a, b) => vec![a, b],
+            Op::Atan2(a, b) | Op::Holds(_, a, b) => vec![a, b],
+            Op::Choose(a, b, c) => vec![a, b, c],
+            Op::Solution(block, _) => {
+                self.blocks[block].matrix.iter().chain(&self.blocks[block].right).copied().collect()
+            }
+        }
+    }
+
+    /// The number, if it is one.
+    pub fn constant(&self, id: Id) -> Option<f64> {
+        if let Op::Constant(bits) = self.op(id) { Some(f64::from_bits(bits)) } else { None }
+    }
+
+    /// Whether it is this number.
+    pub fn is(&self, id: Id, number: f64) -> bool {
+        self.constant(id) == Some(number)
+    }
+
+    /// A node without rewriting.
+    pub fn add_op(&mut self, op: Op) -> Id {
+        if let Some(&id) = self.known.get(&op) {
+            return id;
+        }
+        let level = match op {
+            Op::Constant(_) => Level::Constant,
+            Op::Parameter(_) => Level::Parameter,
+            Op::State(_) | Op::Input(_) | Op::Time | Op::Mode(_) | Op::Solution(..) => Level::Variable,
+            _ => Level::Constant,
+        };
+        let id = Id(u32::try_from(self.nodes.len()).expect("a model has fewer nodes"));
+        self.nodes.push((op, level));
+        let below = self.operands(id).into_iter().map(|o| self.level(o)).max().unwrap_or(level);
+        self.nodes[id.0 as usize].1 = level.max(below);
+        self.known.insert(op, id);
+        id
+    }
+
+    /// A number.
+    pub fn number(&mut self, value: f64) -> Id {
+        // -0.0 and 0.0 are one number here.
+        self.add_op(Op::Constant((value + 0.0).to_bits()))
+    }
+
+    fn fold(&mut self, a: Id, b: Id, f: impl Fn(f64, f64) -> f64) -> Option<Id> {
+        let value = f(self.constant(a)?, self.constant(b)?);
+        Some(self.number(value))
+    }
+
+    /// `a + b`.
+    pub fn add(&mut self, a: Id, b: Id) -> Id {
+        if self.is(a, 0.0) {
+            return b;
+        }
+        if self.is(b, 0.0) {
+            return a;
+        }
+        match (self.negated(a), self.negated(b)) {
+            (_, Some(b)) => self.sub(a, b),
+            (Some(a), None) => self.sub(b, a),
+            _ => self.fold(a, b, |a, b| a + b).unwrap_or_else(|| self.add_op(Op::Add(a, b))),
+        }
+    }
+
+    /// `a - b`.
+    pub fn sub(&mut self, a: Id, b: Id) -> Id {
+        if self.is(b, 0.0) {
+            return a;
+        }
+        if self.is(a, 0.0) {
+            return self.negative(b);
+        }
+        if a == b {
+            return self.number(0.0);
+        }
+        match self.negated(b) {
+            Some(b) => self.add(a, b),
+            None => self.fold(a, b, |a, b| a - b).unwrap_or_else(|| self.add_op(Op::Sub(a, b))),
+        }
+    }
+
+    /// `x` where the node is `-x`.
+    fn negated(&mut self, id: Id) -> Option<Id> {
+        match self.op(id) {
+            Op::Mul(minus, x) if self.is(minus, -1.0) => Some(x),
+            _ => None,
+        }
+    }
+
+    /// `-a`.
+    pub fn negative(&mut self, a: Id) -> Id {
+        let minus = self.number(-1.0);
+        self.mul(minus, a)
+    }
+
+    /// `a b`: factors that only depend on parameters are brought together, the others stand in one order, those with
+    /// most work in them first, so that products share what they have in common.
+    pub fn mul(&mut self, a: Id, b: Id) -> Id {
+        let mut factors = Vec::new();
+        self.factors(a, &mut factors);
+        self.factors(b, &mut factors);
+        let (mut variable, fixed): (Vec<Id>, Vec<Id>) =
+            factors.into_iter().partition(|&f| self.level(f) == Level::Variable);
+        let (numbers, mut fixed): (Vec<Id>, Vec<Id>) =
+            fixed.into_iter().partition(|&f| self.level(f) == Level::Constant);
+        let number: f64 = numbers.iter().filter_map(|&n| self.constant(n)).product();
+        if number == 0.0 {
+            return self.number(0.0);
+        }
+        fixed.sort_unstable();
+        variable.sort_unstable_by(|a, b| b.cmp(a));
+        let product = |graph: &mut Self, list: Vec<Id>| list.into_iter().reduce(|a, b| graph.add_op(Op::Mul(a, b)));
+        let number = (number != 1.0).then(|| self.number(number));
+        let fixed = product(self, fixed);
+        let fixed = product(self, number.into_iter().chain(fixed).collect());
+        let variable = product(self, variable);
+        product(self, fixed.into_iter().chain(variable).collect()).unwrap_or_else(|| self.number(1.0))
+    }
+
+    /// `a b` as it stands: a factor that is computed anyway stays one.
+    pub fn times(&mut self, a: Id, b: Id) -> Id {
+        if self.constant(a).or(self.constant(b)).is_some() { self.mul(a, b) } else { self.add_op(Op::Mul(a, b)) }
+    }
+
+    fn factors(&self, id: Id, into: &mut Vec<Id>) {
+        match self.op(id) {
+            Op::Mul(a, b) => {
+                self.factors(a, into);
+                self.factors(b, into);
+            }
+            _ => into.push(id),
+        }
+    }
+
+    /// `a / b`: by a number or a parameter it is a product with the inverse, which is computed once.
+    pub fn div(&mut self, a: Id, b: Id) -> Id {
+        if self.is(b, 1.0) {
+            return a;
+        }
+        let (up, down) = (self.level(a), self.level(b));
+        if up == Level::Variable && down < Level::Variable {
+            let one = self.number(1.0);
+            let inverse = self.div(one, b);
+            return self.mul(a, inverse);
+        }
+        self.fold(a, b, |a, b| a / b).unwrap_or_else(|| self.add_op(Op::Div(a, b)))
+    }
+
+    /// `a^b`; small whole powers are products.
+    pub fn power(&mut self, a: Id, b: Id) -> Id {
+        let one = self.number(1.0);
+        match self.constant(b) {
+            Some(exponent) if exponent.fract() == 0.0 && exponent.abs() <= 4.0 => {
+                let times = |graph: &mut Self, count: i32| (0..count).fold(one, |product, _| graph.mul(product, a));
+                #[allow(clippy::cast_possible_truncation)]
+                let product = times(self, exponent.abs() as i32);
+                if exponent < 0.0 { self.div(one, product) } else { product }
+            }
+            Some(0.5) => self.function(Function::Sqrt, a),
+            _ => self.fold(a, b, functions::power).unwrap_or_else(|| self.add_op(Op::Power(a, b))),
+        }
+    }
+
+    /// A smooth function of one argument.
+    pub fn function(&mut self, function: Function, a: Id) -> Id {
+        match (function, self.constant(a)) {
+            (_, Some(value)) => self.number(function.evaluate(&[value])),
+            (Function::Tan, None) => {
+                let (sin, cos) = (self.function(Function::Sin, a), self.function(Function::Cos, a));
+                self.div(sin, cos)
+            }
+            _ => self.add_op(Op::Function(function, a)),
+        }
+    }
+
+    /// Angle of the point (second, first).
+    pub fn atan2(&mut self, a: Id, b: Id) -> Id {
+        self.fold(a, b, f64::atan2).unwrap_or_else(|| self.add_op(Op::Atan2(a, b)))
+    }
+
+    /// 1 where the comparison holds, else 0.
+    pub fn holds(&mut self, comparison: Comparison, a: Id, b: Id) -> Id {
+        let folded = self.fold(a, b, |a, b| f64::from(u8::from(comparison.holds(a, b))));
+        folded.unwrap_or_else(|| self.add_op(Op::Holds(comparison, a, b)))
+    }
+
+    /// `a` where `condition` is positive, else `b`.
+    pub fn choose(&mut self, condition: Id, a: Id, b: Id) -> Id {
+        match self.constant(condition) {
+            _ if a == b => a,
+            Some(value) => {
+                if value > 0.0 {
+                    a
+                } else {
+                    b
+                }
+            }
+            None => self.add_op(Op::Choose(condition, a, b)),
+        }
+    }
+
+    /// The states that a node depends on, in order.
+    pub fn states_of(&self, id: Id) -> Vec<usize> {
+        let mut states = std::collections::BTreeSet::new();
+        let mut seen = vec![false; self.nodes.len()];
+        let mut stack = vec![id];
+        while let Some(id) = stack.pop() {
+            if std::mem::replace(&mut seen[id.0 as usize], true) {
+                continue;
+            }
+            if let Op::State(state) = self.op(id) {
+                states.insert(state);
+            }
+            stack.extend(self.operands(id));
+        }
+        states.into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_twice_is_one_node_in_whatever_order() {
+        let mut g = Graph::default();
+        let (x, y) = (g.add_op(Op::State(0)), g.add_op(Op::State(1)));
+        let (a, two) = (g.add_op(Op::Parameter(0)), g.number(2.0));
+        let sin = g.function(Function::Sin, x);
+        let one = [two, a, y, sin].into_iter().reduce(|p, f| g.mul(p, f)).unwrap();
+        let other = [sin, two, y, a].into_iter().reduce(|p, f| g.mul(p, f)).unwrap();
+        assert_eq!(one, other);
+        let Op::Mul(hoisted, _) = g.op(one) else { panic!("a product") };
+        assert_eq!(g.level(hoisted), Level::Parameter);
+    }
+
+    #[test]
+    fn numbers_are_folded_and_nothing_is_added_or_multiplied_in_vain() {
+        let mut g = Graph::default();
+        let x = g.add_op(Op::State(0));
+        let (zero, one, three) = (g.number(0.0), g.number(1.0), g.number(3.0));
+        assert_eq!([g.add(x, zero), g.mul(one, x), g.div(x, one), g.power(x, one)], [x; 4]);
+        assert_eq!([g.mul(x, zero), g.sub(x, x)], [zero; 2]);
+        let nine = g.mul(three, three);
+        assert_eq!(g.constant(nine), Some(9.0));
+        let minus = g.negative(x);
+        assert_eq!([g.add(x, minus), g.negative(minus)], [zero, x]);
+    }
+}

@@ -1,0 +1,127 @@
+//! Keys of the tables: names, and families such as `T[1..100]`, `T[i]`, `T[i=2..99]`.
+
+use mops_core::Mistake;
+
+/// A key of a table of declarations or definitions.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    /// The name before the bracket.
+    pub name: String,
+    /// What stands in the bracket.
+    pub index: Index,
+}
+
+/// What stands in the bracket of a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Index {
+    /// There is no bracket.
+    None,
+    /// One member.
+    One(i64),
+    /// Members from the first to the second, with the name of the index if it has one.
+    Range(Option<String>, i64, i64),
+    /// Every member that nothing else speaks of.
+    Rest(String),
+}
+
+/// Largest number of members of a family.
+const LARGEST: i64 = 10_000;
+
+impl Key {
+    /// Reads a key.
+    ///
+    /// # Errors
+    /// A name that an expression could not use, or a bracket that is none of the forms.
+    pub fn parse(key: &str) -> Result<Self, Mistake> {
+        let (name, bracket) = match key.split_once('[') {
+            None => (key, None),
+            Some((name, rest)) => (name, Some(rest.strip_suffix(']').ok_or_else(|| wrong_bracket(key))?)),
+        };
+        if !is_name(name) {
+            return Err(Mistake::here(format!("an expression cannot use the name `{name}`"))
+                .with_help("names are made of letters, digits and `_`, and begin with a letter"));
+        }
+        if RESERVED.contains(&name) {
+            return Err(Mistake::here(format!("`{name}` has a meaning of its own in expressions"))
+                .with_help("take another name"));
+        }
+        let index = match bracket {
+            None => Index::None,
+            Some(text) => index(text.trim()).ok_or_else(|| wrong_bracket(key))?,
+        };
+        match index {
+            Index::Range(_, from, to) if from > to || to - from >= LARGEST => Err(Mistake::here(format!(
+                "a family has between 1 and {LARGEST} members, not those from {from} to {to}"
+            ))
+            .with_help("as in \"T[1..100]\"")),
+            index => Ok(Self { name: name.to_owned(), index }),
+        }
+    }
+
+    /// The quantities that a declaration stands for.
+    pub fn declared(&self) -> Result<Vec<String>, Mistake> {
+        match &self.index {
+            Index::None => Ok(vec![self.name.clone()]),
+            Index::One(k) => Ok(vec![member(&self.name, *k)]),
+            Index::Range(_, from, to) => Ok((*from..=*to).map(|k| member(&self.name, k)).collect()),
+            Index::Rest(_) => Err(Mistake::here(format!("how many members `{}` has must be said here", self.name))
+                .with_help(format!("as in \"{}[1..100]\"", self.name))),
+        }
+    }
+}
+
+/// Names that expressions understand otherwise.
+const RESERVED: [&str; 6] = ["time", "pi", "and", "or", "not", "der"];
+
+/// `T[3]`.
+pub fn member(name: &str, index: i64) -> String {
+    format!("{name}[{index}]")
+}
+
+fn is_name(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next().is_some_and(|c| c.is_alphabetic() || c == '_') && letters.all(|c| c.is_alphanumeric() || c == '_')
+}
+
+fn wrong_bracket(key: &str) -> Mistake {
+    Mistake::here(format!("the bracket in `{key}` is not understood")).with_help(
+        "declare a family as \"T[1..100]\"; define \"T[1]\", \"T[i=2..99]\", or \"T[i]\" for all that are left",
+    )
+}
+
+fn index(text: &str) -> Option<Index> {
+    let range = |text: &str| {
+        let (from, to) = text.split_once("..")?;
+        Some((from.trim().parse::<i64>().ok()?, to.trim().parse::<i64>().ok()?))
+    };
+    if let Ok(one) = text.parse() {
+        return Some(Index::One(one));
+    }
+    if let Some((name, text)) = text.split_once('=') {
+        let (from, to) = range(text)?;
+        return is_name(name.trim()).then(|| Index::Range(Some(name.trim().to_owned()), from, to));
+    }
+    if let Some((from, to)) = range(text) {
+        return Some(Index::Range(None, from, to));
+    }
+    is_name(text).then(|| Index::Rest(text.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_a_name_or_a_family() {
+        let of = |key: &str| Key::parse(key).unwrap().index;
+        assert_eq!(of("phi"), Index::None);
+        assert_eq!(of("T[3]"), Index::One(3));
+        assert_eq!(of("T[1..100]"), Index::Range(None, 1, 100));
+        assert_eq!(of("T[ i = 2 .. 99 ]"), Index::Range(Some("i".into()), 2, 99));
+        assert_eq!(of("T[i]"), Index::Rest("i".into()));
+        assert_eq!(Key::parse("T[1..3]").unwrap().declared().unwrap(), ["T[1]", "T[2]", "T[3]"]);
+        for wrong in ["phi-dot", "2x", "T[", "T[1..]", "T[i..3]", "T[3..1]", "time"] {
+            assert!(Key::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,525 @@
+//! From expressions to the graph: names looked up, derivatives kept apart, kinks and jumps made into switches.
+
+use std::collections::{BTreeMap, HashMap};
+
+use mops_core::expression::{Comparison, Form, Function, Node, Operator};
+use mops_core::{Mistake, suggestion};
+
+use super::definition::{Definition, Text, under};
+use super::graph::{Graph, Id, Level, Op};
+use super::key::member;
+
+/// What an expression comes to: `rest + sum over states of rate * x'`.
+#[derive(Debug, Clone)]
+pub struct Affine {
+    /// What stands without a derivative.
+    pub rest: Id,
+    /// Factors of the derivatives.
+    pub rates: BTreeMap<usize, Id>,
+}
+
+impl Affine {
+    fn of(rest: Id) -> Self {
+        Self { rest, rates: BTreeMap::new() }
+    }
+}
+
+/// A condition that decides over a branch, and the mode in which it holds.
+#[derive(Debug, Clone, Copy)]
+pub struct Switch {
+    /// The mode, 1 while the condition holds.
+    pub mode: usize,
+    /// The condition is `left > right`, or `left >= right`.
+    pub left: Id,
+    /// What it is compared with.
+    pub right: Id,
+    /// Whether equality does not count.
+    pub strict: bool,
+    /// Whether the branches differ where they meet.
+    pub jumps: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Meaning {
+    State(usize),
+    Input(usize),
+    Parameter(usize),
+    Constant(f64),
+    Let(usize),
+}
+
+/// How kinks are evaluated: by their mode, so that a step sees one smooth branch, or as they stand. The latter holds
+/// inside roots, logarithms, powers and divisors, whose branches do not go on beyond the kink: `sqrt(max(h, 0))`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Kinks {
+    ByMode,
+    AsTheyStand,
+}
+
+#[derive(Debug, Clone)]
+enum Visit {
+    Open,
+    Done(Affine),
+}
+
+/// Builds the graph of a definition.
+pub struct Lowering<'d> {
+    definition: &'d Definition,
+    names: HashMap<&'d str, Meaning>,
+    lets: HashMap<(usize, Kinks), Visit>,
+    /// The graph so far.
+    pub graph: Graph,
+    /// Switches so far.
+    pub switches: Vec<Switch>,
+    /// Number of modes so far.
+    pub modes: usize,
+    /// What stands for each input.
+    inputs: Vec<Id>,
+}
+
+impl<'d> Lowering<'d> {
+    /// Gathers all names.
+    ///
+    /// # Errors
+    /// A name that is given twice.
+    pub fn new(definition: &'d Definition) -> Result<Self, Mistake> {
+        let d = definition;
+        let mut names: HashMap<&str, (Meaning, &str)> = HashMap::new();
+        let states = d.states.iter().enumerate().map(|(i, q)| (&q.name, Meaning::State(i), "a state", &q.path));
+        let inputs = d.inputs.iter().enumerate().map(|(i, q)| (&q.name, Meaning::Input(i), "an input", &q.path));
+        let parameters = d.parameters.iter().enumerate();
+        let parameters =
+            parameters.map(|(i, p)| (&p.quantity.name, Meaning::Parameter(i), "a parameter", &p.quantity.path));
+        let constants =
+            d.constants.iter().map(|(name, value, path)| (name, Meaning::Constant(*value), "a constant", path));
+        let lets =
+            d.lets.iter().enumerate().map(|(i, (name, text))| (name, Meaning::Let(i), "a definition", &text.path));
+        for (name, meaning, what, path) in states.chain(inputs).chain(parameters).chain(constants).chain(lets) {
+            if let Some((_, first)) = names.insert(name, (meaning, what)) {
+                let fact = if first == what { format!("{what} twice") } else { format!("both {first} and {what}") };
+                return Err(under(path, Mistake::here(format!("`{name}` is {fact}")).with_help("take another name")));
+            }
+        }
+        for (output, _) in &d.outputs {
+            if let Some((Meaning::State(_) | Meaning::Input(_), what)) = names.get(output.name.as_str()) {
+                return Err(under(
+                    &output.path,
+                    Mistake::here(format!("`{}` is both {what} and an output", output.name)),
+                )
+                .with_help("states and inputs are signals already"));
+            }
+        }
+        let mut lowering = Self {
+            definition,
+            names: names.into_iter().map(|(name, (meaning, _))| (name, meaning)).collect(),
+            lets: HashMap::new(),
+            graph: Graph::default(),
+            switches: Vec::new(),
+            modes: 0,
+            inputs: Vec::new(),
+        };
+        lowering.inputs = (0..d.inputs.len()).map(|i| lowering.graph.add_op(Op::Input(i))).collect();
+        Ok(lowering)
+    }
+
+    /// Lets a term act on an input, wherever the input stands from now on.
+    pub fn add_to_input(&mut self, input: usize, term: Id) {
+        self.inputs[input] = self.graph.add(self.inputs[input], term);
+    }
+
+    /// A new mode.
+    pub fn mode(&mut self) -> (usize, Id) {
+        self.modes += 1;
+        (self.modes - 1, self.graph.add_op(Op::Mode(self.modes - 1)))
+    }
+
+    /// An expression, or the difference of the sides of an equation, oriented so that derivatives stand on the left:
+    /// `left - right`.
+    pub fn text(&mut self, text: &Text) -> Result<Affine, Mistake> {
+        let right = self.node(text, &text.equation.right, Kinks::ByMode)?;
+        let Some(left) = &text.equation.left else { return Ok(right) };
+        let left = self.node(text, left, Kinks::ByMode)?;
+        let (a, b) = if left.rates.is_empty() { (right, left) } else { (left, right) };
+        Ok(self.sum(a, b, -1.0))
+    }
+
+    /// An expression without derivatives.
+    pub fn value(&mut self, text: &Text) -> Result<Id, Mistake> {
+        let affine = self.text(text)?;
+        self.without_rates(text, &text.equation.right, affine, "here")
+    }
+
+    /// An expression of parameters alone; `what` it gives, for the message.
+    pub fn fixed(&mut self, text: &Text, what: &str) -> Result<Id, Mistake> {
+        let value = self.value(text)?;
+        if self.graph.level(value) < Level::Variable {
+            return Ok(value);
+        }
+        let mut variable = None;
+        text.equation.right.walk(&mut |node| {
+            if let Form::Name(name) = &node.form
+                && matches!(
+                    self.names.get(name.as_str()),
+                    Some(Meaning::State(_) | Meaning::Input(_) | Meaning::Let(_)) | None
+                )
+            {
+                variable = variable.take().or(Some(node.span.clone()));
+            }
+        });
+        let span = variable.unwrap_or_else(|| text.equation.right.span.clone());
+        Err(under(
+            &text.path,
+            Mistake::here(format!("{what} may depend on parameters and constants only"))
+                .with_help("states, inputs and time change during a simulation")
+                .at(span),
+        ))
+    }
+
+    fn without_rates(&self, text: &Text, node: &Node, affine: Affine, place: &str) -> Result<Id, Mistake> {
+        if affine.rates.is_empty() {
+            return Ok(affine.rest);
+        }
+        Err(under(
+            &text.path,
+            Mistake::here(format!("a derivative cannot stand {place}"))
+                .with_help("equations must be linear in the derivatives; write what is meant without them")
+                .at(node.span.clone()),
+        ))
+    }
+
+    fn sum(&mut self, a: Affine, b: Affine, sign: f64) -> Affine {
+        let add = |graph: &mut Graph, a, b| if sign > 0.0 { graph.add(a, b) } else { graph.sub(a, b) };
+        let rest = add(&mut self.graph, a.rest, b.rest);
+        let mut rates = a.rates;
+        for (state, factor) in b.rates {
+            let before = rates.get(&state).copied().unwrap_or_else(|| self.graph.number(0.0));
+            rates.insert(state, add(&mut self.graph, before, factor));
+        }
+        Affine { rest, rates }
+    }
+
+    fn scaled(&mut self, a: Affine, f: impl Fn(&mut Graph, Id) -> Id) -> Affine {
+        let rest = f(&mut self.graph, a.rest);
+        Affine { rest, rates: a.rates.into_iter().map(|(state, rate)| (state, f(&mut self.graph, rate))).collect() }
+    }
+
+    fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
+        let wrong = |fact: String, help: String| {
+            Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
+        };
+        Ok(match &node.form {
+            Form::Number(value) => Affine::of(self.graph.number(*value)),
+            Form::Name(name) => match &text.index {
+                Some((index, k)) if index == name => {
+                    #[allow(clippy::cast_precision_loss)]
+                    let k = *k as f64;
+                    Affine::of(self.graph.number(k))
+                }
+                _ => self.quantity(text, node, name, kinks)?,
+            },
+            Form::Member(name, index) => {
+                let full = member(name, self.index(text, index)?);
+                self.quantity(text, node, &full, kinks)?
+            }
+            Form::Rate(of) => {
+                let name = match &of.form {
+                    Form::Name(name) => name.clone(),
+                    Form::Member(name, index) => member(name, self.index(text, index)?),
+                    _ => unreachable!("the reader takes derivatives of names only"),
+                };
+                let states = || self.definition.states.iter().map(|s| s.name.as_str());
+                let Some(state) = states().position(|state| state == name) else {
+                    return wrong(
+                        format!("`{name}` is not a state, it has no derivative"),
+                        suggestion(&name, states()),
+                    );
+                };
+                Affine { rest: self.graph.number(0.0), rates: BTreeMap::from([(state, self.graph.number(1.0))]) }
+            }
+            Form::Negative(a) => {
+                let a = self.node(text, a, kinks)?;
+                self.scaled(a, Graph::negative)
+            }
+            Form::Binary(operator, a, b) => return self.binary(text, *operator, [a, b], kinks),
+            Form::Call(function, arguments) => Affine::of(self.call(text, *function, arguments, kinks)?),
+            Form::Compare(..) | Form::And(..) | Form::Or(..) | Form::Not(_) => {
+                unreachable!("the reader lets conditions stand in `if` only")
+            }
+        })
+    }
+
+    fn binary(&mut self, text: &Text, operator: Operator, [a, b]: [&Node; 2], kinks: Kinks) -> Result<Affine, Mistake> {
+        let inner = if matches!(operator, Operator::Divide) { Kinks::AsTheyStand } else { kinks };
+        Ok(match operator {
+            Operator::Add | Operator::Subtract => {
+                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, kinks)?);
+                self.sum(x, y, if operator == Operator::Add { 1.0 } else { -1.0 })
+            }
+            Operator::Multiply => {
+                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, kinks)?);
+                let (x, y) = if y.rates.is_empty() {
+                    (x, y.rest)
+                } else {
+                    (y, self.without_rates(text, a, x, "in both factors of a product")?)
+                };
+                self.scaled(x, |graph, x| graph.mul(x, y))
+            }
+            Operator::Divide => {
+                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, inner)?);
+                let y = self.without_rates(text, b, y, "in a divisor")?;
+                self.scaled(x, |graph, x| graph.div(x, y))
+            }
+            Operator::Power => {
+                let exponent = self.node(text, b, kinks)?;
+                let exponent = self.without_rates(text, b, exponent, "in an exponent")?;
+                let whole = self.graph.constant(exponent).is_some_and(|e| e.fract() == 0.0 && e > 0.0);
+                let base = self.node(text, a, if whole { kinks } else { Kinks::AsTheyStand })?;
+                if self.graph.is(exponent, 1.0) {
+                    return Ok(base);
+                }
+                let base = self.without_rates(text, a, base, "in a power")?;
+                Affine::of(self.graph.power(base, exponent))
+            }
+        })
+    }
+
+    fn index(&self, text: &Text, node: &Node) -> Result<i64, Mistake> {
+        let mut unknown = None;
+        let value = node.evaluate(&|name: &str| match (&text.index, self.names.get(name)) {
+            #[allow(clippy::cast_precision_loss)]
+            (Some((index, k)), _) if index == name => *k as f64,
+            (_, Some(Meaning::Constant(value))) => *value,
+            _ => f64::NAN,
+        });
+        node.walk(&mut |n| {
+            if let Form::Name(name) = &n.form
+                && text.index.as_ref().is_none_or(|(index, _)| index != name)
+                && !matches!(self.names.get(name.as_str()), Some(Meaning::Constant(_)))
+            {
+                unknown = unknown.take().or(Some(name.clone()));
+            }
+        });
+        #[allow(clippy::cast_possible_truncation)]
+        match unknown {
+            None if value.fract() == 0.0 && value.abs() < 1e9 => Ok(value as i64),
+            None => Err(under(
+                &text.path,
+                Mistake::here(format!("an index must be a whole number, not {value}"))
+                    .with_help("as in \"T[i]\" = \"T[i-1] - T[i]\"")
+                    .at(node.span.clone()),
+            )),
+            Some(name) => Err(under(
+                &text.path,
+                Mistake::here(format!("an index is made of numbers and constants, `{name}` is neither"))
+                    .with_help("the index of a family stands in its key, as in \"T[i]\" = \"T[i-1] - T[i]\"")
+                    .at(node.span.clone()),
+            )),
+        }
+    }
+
+    fn quantity(&mut self, text: &Text, node: &Node, name: &str, kinks: Kinks) -> Result<Affine, Mistake> {
+        if name == "time" {
+            return Ok(Affine::of(self.graph.add_op(Op::Time)));
+        }
+        let Some(meaning) = self.names.get(name) else {
+            let mut known: Vec<&str> = self.names.keys().copied().filter(|name| !name.contains('[')).collect();
+            known.extend(["time", "pi"]);
+            known.sort_unstable();
+            let family = format!("{name}[");
+            let (fact, help) = if self.names.keys().any(|known| known.starts_with(&family)) {
+                (format!("`{name}` is a family"), format!("name one of its members, as in `{name}[1]`"))
+            } else if name.contains('[') {
+                let where_ = text.index.as_ref().map_or(String::new(), |(index, k)| format!(" (where {index} is {k})"));
+                (
+                    format!("there is no `{name}`{where_}"),
+                    "give the members at the ends equations of their own, as in \"T[1]\" = \"...\"".to_owned(),
+                )
+            } else {
+                (format!("there is no quantity `{name}` in the model"), suggestion(name, known.iter().copied()))
+            };
+            return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
+        };
+        Ok(match *meaning {
+            Meaning::State(i) => Affine::of(self.graph.add_op(Op::State(i))),
+            Meaning::Input(i) => Affine::of(self.inputs[i]),
+            Meaning::Parameter(i) => Affine::of(self.graph.add_op(Op::Parameter(i))),
+            Meaning::Constant(value) => Affine::of(self.graph.number(value)),
+            Meaning::Let(i) => match self.lets.get(&(i, kinks)) {
+                Some(Visit::Done(affine)) => affine.clone(),
+                Some(Visit::Open) => {
+                    return Err(under(
+                        &text.path,
+                        Mistake::here(format!("`{name}` is defined by itself"))
+                            .with_help("definitions may stand in any order, but not in a circle")
+                            .at(node.span.clone()),
+                    ));
+                }
+                None => {
+                    self.lets.insert((i, kinks), Visit::Open);
+                    let definition: &'d Definition = self.definition;
+                    let text = &definition.lets[i].1;
+                    let affine = self.node(text, &text.equation.right, kinks)?;
+                    self.lets.insert((i, kinks), Visit::Done(affine.clone()));
+                    affine
+                }
+            },
+        })
+    }
+
+    fn call(&mut self, text: &Text, function: Function, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
+        let inner = match function {
+            Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => Kinks::AsTheyStand,
+            _ => kinks,
+        };
+        if function == Function::If {
+            return self.pieces(text, arguments, kinks);
+        }
+        let mut values = Vec::with_capacity(arguments.len());
+        for argument in arguments {
+            let affine = self.node(text, argument, inner)?;
+            let place = format!("in `{}`", function.name());
+            values.push(self.without_rates(text, argument, affine, &place)?);
+        }
+        let x = values[0];
+        let one = self.graph.number(1.0);
+        let zero = self.graph.number(0.0);
+        Ok(match function {
+            Function::Atan2 => self.graph.atan2(x, values[1]),
+            Function::Abs => {
+                let positive = self.at_least(x, zero, kinks);
+                let minus = self.graph.negative(x);
+                self.graph.choose(positive, x, minus)
+            }
+            Function::Sign if self.graph.level(x) < Level::Variable => {
+                let minus = self.graph.number(-1.0);
+                let (up, down) =
+                    (self.graph.holds(Comparison::Greater, x, zero), self.graph.holds(Comparison::Less, x, zero));
+                let below = self.graph.choose(down, minus, zero);
+                self.graph.choose(up, one, below)
+            }
+            Function::Sign => {
+                let minus = self.graph.number(-1.0);
+                let positive = self.condition(Comparison::AtLeast, x, zero, true, Kinks::ByMode);
+                self.graph.choose(positive, one, minus)
+            }
+            Function::Min | Function::Max => {
+                let mut best = x;
+                for &other in &values[1..] {
+                    let (a, b) = if function == Function::Max { (best, other) } else { (other, best) };
+                    let first = self.at_least(a, b, kinks);
+                    best = self.graph.choose(first, best, other);
+                }
+                best
+            }
+            Function::Clip | Function::Deadzone => {
+                let (low, high) = (values[1], values[2]);
+                let (above, below) = (self.at_least(x, low, kinks), self.at_least(high, x, kinks));
+                let (inside, over, under) = if function == Function::Clip {
+                    (x, high, low)
+                } else {
+                    (zero, self.graph.sub(x, high), self.graph.sub(x, low))
+                };
+                let upper = self.graph.choose(below, inside, over);
+                self.graph.choose(above, upper, under)
+            }
+            Function::Table => self.table(x, &values[1..], kinks),
+            smooth => self.graph.function(smooth, x),
+        })
+    }
+
+    /// `table(x, x1, y1, ..)`: the line that holds is found from the left.
+    fn table(&mut self, x: Id, points: &[Id], kinks: Kinks) -> Id {
+        let lines = points.len() / 2 - 1;
+        let mut value = None;
+        for k in (0..lines).rev() {
+            let [x1, y1, x2, y2] = [points[2 * k], points[2 * k + 1], points[2 * k + 2], points[2 * k + 3]];
+            let (rise, run) = (self.graph.sub(y2, y1), self.graph.sub(x2, x1));
+            let slope = self.graph.div(rise, run);
+            let (step, offset) = (self.graph.mul(slope, x), self.graph.mul(slope, x1));
+            let level = self.graph.sub(y1, offset);
+            let line = self.graph.add(step, level);
+            value = Some(match value {
+                None => line,
+                Some(further) => {
+                    let here = self.at_least(x2, x, kinks);
+                    self.graph.choose(here, line, further)
+                }
+            });
+        }
+        value.expect("the reader asks for two points")
+    }
+
+    /// `if(condition, a, .., otherwise)`.
+    fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
+        let branch = |lowering: &mut Self, node: &Node| {
+            let affine = lowering.node(text, node, kinks)?;
+            lowering.without_rates(text, node, affine, "in `if`")
+        };
+        let (otherwise, pairs) = arguments.split_last().expect("the reader asks for three arguments");
+        let mut value = branch(self, otherwise)?;
+        for pair in pairs.chunks_exact(2).rev() {
+            let here = branch(self, &pair[1])?;
+            value = self.decide(text, &pair[0], here, value)?;
+        }
+        Ok(value)
+    }
+
+    /// `a` where the condition holds, else `b`.
+    fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, Mistake> {
+        match &condition.form {
+            Form::Compare(comparison, left, right) => {
+                let mut side = |node: &Node| {
+                    let affine = self.node(text, node, Kinks::ByMode)?;
+                    self.without_rates(text, node, affine, "in a condition")
+                };
+                let (left, right) = (side(left)?, side(right)?);
+                let condition = self.condition(*comparison, left, right, true, Kinks::ByMode);
+                Ok(self.graph.choose(condition, a, b))
+            }
+            Form::And(first, second) => {
+                let inner = self.decide(text, second, a, b)?;
+                self.decide(text, first, inner, b)
+            }
+            Form::Or(first, second) => {
+                let inner = self.decide(text, second, a, b)?;
+                self.decide(text, first, a, inner)
+            }
+            Form::Not(inner) => self.decide(text, inner, b, a),
+            _ => unreachable!("the reader asks for a condition"),
+        }
+    }
+
+    /// The kink where `a` and `b` meet: positive where `a >= b`.
+    fn at_least(&mut self, a: Id, b: Id, kinks: Kinks) -> Id {
+        self.condition(Comparison::AtLeast, a, b, false, kinks)
+    }
+
+    /// A node that is positive where the condition holds; a switch, unless only parameters decide.
+    fn condition(&mut self, comparison: Comparison, a: Id, b: Id, jumps: bool, kinks: Kinks) -> Id {
+        if self.graph.level(a).max(self.graph.level(b)) < Level::Variable {
+            return self.graph.holds(comparison, a, b);
+        }
+        let (left, right, strict) = match comparison {
+            Comparison::Greater => (a, b, true),
+            Comparison::AtLeast => (a, b, false),
+            Comparison::Less => (b, a, true),
+            Comparison::AtMost => (b, a, false),
+        };
+        let same = |s: &&mut Switch| s.left == left && s.right == right && (s.strict == strict || !jumps);
+        let mode = match self.switches.iter_mut().find(same) {
+            Some(switch) => {
+                switch.jumps |= jumps;
+                switch.mode
+            }
+            None => {
+                let (mode, _) = self.mode();
+                self.switches.push(Switch { mode, left, right, strict, jumps });
+                mode
+            }
+        };
+        match kinks {
+            Kinks::ByMode => self.graph.add_op(Op::Mode(mode)),
+            Kinks::AsTheyStand => self.graph.holds(comparison, a, b),
+        }
+    }
+}

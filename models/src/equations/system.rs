@@ -1,0 +1,369 @@
+//! The whole model as a graph: rows solved for the derivatives, friction, events, signals and start values.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mops_core::{Mistake, suggestion};
+
+use super::definition::{Definition, Target, Text, under};
+use super::graph::{Block, Graph, Id, Op};
+use super::lower::{Affine, Lowering, Switch};
+
+/// One equation: `sum of coefficients * derivatives = force`.
+#[derive(Debug, Clone)]
+struct Row {
+    coefficients: BTreeMap<usize, Id>,
+    force: Id,
+}
+
+/// Dry friction of a joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Contact {
+    /// The position, as a state.
+    pub position: usize,
+    /// The speed, as a state.
+    pub velocity: usize,
+    /// Mode: 1 forward, -1 backward, 0 stuck.
+    pub direction: usize,
+    /// Mode: 1 while stuck.
+    pub stuck: usize,
+    /// Friction while it slides.
+    pub coulomb: Id,
+    /// What breaks it away.
+    pub limit: Id,
+    /// What holds it while it is stuck.
+    pub torque: Id,
+}
+
+/// Something that happens when the guard becomes negative.
+#[derive(Debug, Clone)]
+pub struct Happening {
+    /// Its name.
+    pub name: String,
+    /// Its guard.
+    pub guard: Id,
+    /// New values of states.
+    pub resets: Vec<(usize, Id)>,
+}
+
+/// A model as a graph.
+#[derive(Debug)]
+pub struct System {
+    /// All nodes.
+    pub graph: Graph,
+    /// Conditions that switch branches.
+    pub switches: Vec<Switch>,
+    /// Number of modes.
+    pub modes: usize,
+    /// Derivatives of the states.
+    pub derivatives: Vec<Id>,
+    /// Signals: states, outputs, inputs.
+    pub signals: Vec<Id>,
+    /// Joints with dry friction.
+    pub contacts: Vec<Contact>,
+    /// Events.
+    pub happenings: Vec<Happening>,
+    /// Start values, where the study gives an expression.
+    pub starts: Vec<Option<Id>>,
+    /// Joints: position and speed.
+    pub joints: Vec<(usize, usize)>,
+    /// Matrices of equations that are solved together, row by row.
+    pub matrices: Vec<Vec<Id>>,
+}
+
+impl System {
+    /// Puts a definition together.
+    ///
+    /// # Errors
+    /// Names that are not there, definitions in a circle, equations that do not determine the derivatives.
+    pub fn new(definition: &Definition) -> Result<Self, Mistake> {
+        let d = definition;
+        let mut l = Lowering::new(d)?;
+        let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
+        for term in &d.terms {
+            if let Target::Input(input) = &term.target {
+                let value = l.value(&term.value)?;
+                let input = d.inputs.iter().position(|i| i.name == *input).expect("the port is one of the model's");
+                l.add_to_input(input, value);
+            }
+        }
+        let mut rows: Vec<Row> =
+            (0..d.states.len()).map(|s| row(&mut l, d, s, &d.der[&d.states[s].name])).collect::<Result<_, _>>()?;
+        let massive: BTreeSet<usize> = d.mass.iter().map(|(row, ..)| state(row)).collect();
+        for &row in &massive {
+            let text = &d.der[&d.states[row].name];
+            if text.equation.left.is_some() || rows[row].coefficients.len() > 1 {
+                let fact = "the equation contains derivatives and has a row in `mass` too";
+                return Err(
+                    under(&text.path, Mistake::here(fact)).with_help("write the derivatives in one place or the other")
+                );
+            }
+            rows[row].coefficients.clear();
+        }
+        for (row, column, text) in &d.mass {
+            let value = l.value(text)?;
+            rows[state(row)].coefficients.insert(state(column), value);
+        }
+        for row in &mut rows {
+            row.coefficients.retain(|_, c| !l.graph.is(*c, 0.0));
+        }
+        let joints = joints(&l.graph, &rows);
+        for term in &d.terms {
+            if let Target::Equation(name) = &term.target {
+                let value = l.value(&term.value)?;
+                let row = &mut rows[state(name)];
+                row.force = l.graph.add(row.force, value);
+            }
+        }
+        let mut contacts = friction(&mut l, d, &joints, &mut rows)?;
+        let mut matrices = Vec::new();
+        let derivatives = solve(&mut l.graph, d, &rows, &contacts, &mut matrices)?;
+        for contact in &mut contacts {
+            let row = &rows[contact.velocity];
+            let mut torque = row.force;
+            for (&column, &coefficient) in &row.coefficients {
+                let part = l.graph.mul(coefficient, derivatives[column]);
+                torque = l.graph.sub(torque, part);
+            }
+            contact.torque = torque;
+        }
+        let mut signals: Vec<Id> = (0..d.states.len()).map(|s| l.graph.add_op(Op::State(s))).collect();
+        for (_, text) in &d.outputs {
+            let affine = l.text(text)?;
+            signals.push(with_rates(&mut l.graph, affine, &derivatives));
+        }
+        signals.extend((0..d.inputs.len()).map(|i| l.graph.add_op(Op::Input(i))));
+        let outputs = d.outputs.iter().map(|(o, _)| &o.name);
+        let names: Vec<&String> =
+            d.states.iter().map(|s| &s.name).chain(outputs).chain(d.inputs.iter().map(|i| &i.name)).collect();
+        for term in &d.terms {
+            if let Target::Signal(name) = &term.target {
+                let value = l.value(&term.value)?;
+                let signal = names.iter().position(|n| *n == name).expect("the port is one of the model's");
+                signals[signal] = l.graph.add(signals[signal], value);
+            }
+        }
+        let mut happenings = Vec::new();
+        for when in &d.when {
+            let affine = l.text(&when.guard)?;
+            let guard = with_rates(&mut l.graph, affine, &derivatives);
+            let mut resets = Vec::new();
+            for (name, text) in &when.resets {
+                let affine = l.text(text)?;
+                resets.push((state(name), with_rates(&mut l.graph, affine, &derivatives)));
+            }
+            happenings.push(Happening { name: when.name.clone(), guard, resets });
+        }
+        let start = |l: &mut Lowering<'_>, s: usize| {
+            let name = &d.states[s].name;
+            d.start.get(name).map(|text| l.fixed(text, &format!("the start value of `{name}`"))).transpose()
+        };
+        let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
+        let Lowering { graph, switches, modes, .. } = l;
+        Ok(Self { graph, switches, modes, derivatives, signals, contacts, happenings, starts, joints, matrices })
+    }
+}
+
+/// A value in which derivatives stand for themselves.
+fn with_rates(graph: &mut Graph, affine: Affine, derivatives: &[Id]) -> Id {
+    affine.rates.into_iter().fold(affine.rest, |sum, (state, rate)| {
+        let part = graph.mul(rate, derivatives[state]);
+        graph.add(sum, part)
+    })
+}
+
+fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Result<Row, Mistake> {
+    let affine = l.text(text)?;
+    let one = l.graph.number(1.0);
+    if text.equation.left.is_none() {
+        let mut coefficients: BTreeMap<usize, Id> = BTreeMap::from([(state, one)]);
+        for (column, rate) in affine.rates {
+            let before = coefficients.get(&column).copied().unwrap_or_else(|| l.graph.number(0.0));
+            coefficients.insert(column, l.graph.sub(before, rate));
+        }
+        return Ok(Row { coefficients, force: affine.rest });
+    }
+    if affine.rates.is_empty() {
+        let name = &d.states[state].name;
+        return Err(under(&text.path, Mistake::here("the equation contains no derivative")).with_help(format!(
+            "`{name}'` stands for the derivative of `{name}`; without `=` it is what the text gives"
+        )));
+    }
+    Ok(Row { coefficients: affine.rates, force: l.graph.negative(affine.rest) })
+}
+
+/// Pairs of states of which the first has the second as its derivative.
+fn joints(graph: &Graph, rows: &[Row]) -> Vec<(usize, usize)> {
+    let pair = |(position, row): (usize, &Row)| {
+        let alone = row.coefficients.len() == 1 && row.coefficients.get(&position).is_some_and(|&c| graph.is(c, 1.0));
+        match graph.op(row.force) {
+            Op::State(velocity) if alone && velocity != position => Some((position, velocity)),
+            _ => None,
+        }
+    };
+    rows.iter().enumerate().filter_map(pair).collect()
+}
+
+fn friction(
+    l: &mut Lowering<'_>,
+    d: &Definition,
+    joints: &[(usize, usize)],
+    rows: &mut [Row],
+) -> Result<Vec<Contact>, Mistake> {
+    let mut contacts: Vec<Contact> = Vec::new();
+    for friction in &d.friction {
+        let names = |s: usize| d.states[s].name.as_str();
+        let joint = joints.iter().find(|&&(q, v)| names(q) == friction.of || names(v) == friction.of);
+        let Some(&(position, velocity)) = joint else {
+            return Err(under(
+                &friction.path,
+                Mistake::here(format!("friction needs a joint, and `{}` is none", friction.of)),
+            )
+            .with_help(match joints.is_empty() {
+                true => "a joint is a state whose derivative is another state, as in der = { q = \"v\" }".to_owned(),
+                false => suggestion(&friction.of, joints.iter().map(|&(q, _)| names(q))),
+            }));
+        };
+        if let Some(viscous) = &friction.viscous {
+            let factor = l.value(viscous)?;
+            let speed = l.graph.add_op(Op::State(velocity));
+            let force = l.graph.mul(factor, speed);
+            rows[velocity].force = l.graph.sub(rows[velocity].force, force);
+        }
+        let Some(coulomb) = &friction.coulomb else { continue };
+        if contacts.iter().any(|c| c.velocity == velocity) {
+            return Err(under(&friction.path, Mistake::here(format!("`{}` has dry friction twice", friction.of)))
+                .with_help("position and speed name the same joint: keep one of them"));
+        }
+        let coulomb = l.value(coulomb)?;
+        let limit = match &friction.peak {
+            Some(peak) => {
+                let peak = l.value(peak)?;
+                l.graph.mul(coulomb, peak)
+            }
+            None => coulomb,
+        };
+        let ((direction, _), (stuck, _)) = (l.mode(), l.mode());
+        contacts.push(Contact { position, velocity, direction, stuck, coulomb, limit, torque: coulomb });
+    }
+    Ok(contacts)
+}
+
+/// The derivatives: rows that have derivatives in common are solved together.
+fn solve(
+    graph: &mut Graph,
+    d: &Definition,
+    rows: &[Row],
+    contacts: &[Contact],
+    matrices: &mut Vec<Vec<Id>>,
+) -> Result<Vec<Id>, Mistake> {
+    let zero = graph.number(0.0);
+    let mut derivatives = vec![zero; rows.len()];
+    for group in groups(rows) {
+        if let Some(lost) = undetermined(rows, &group) {
+            let name = &d.states[lost].name;
+            return Err(under(
+                &d.der[name].path,
+                Mistake::here(format!("nothing determines the derivative of `{name}`")),
+            )
+            .with_help("let as many equations contain it as there are derivatives in them"));
+        }
+        let n = group.len();
+        let mut matrix = vec![zero; n * n];
+        let mut right = vec![zero; n];
+        for (i, &state) in group.iter().enumerate() {
+            let contact = contacts.iter().find(|c| c.velocity == state);
+            right[i] = rows[state].force;
+            for (j, column) in group.iter().enumerate() {
+                matrix[i * n + j] = rows[state].coefficients.get(column).copied().unwrap_or(zero);
+            }
+            if let Some(contact) = contact {
+                let direction = graph.add_op(Op::Mode(contact.direction));
+                let stuck = graph.add_op(Op::Mode(contact.stuck));
+                let held = graph.mul(contact.coulomb, direction);
+                let sliding = graph.sub(right[i], held);
+                right[i] = graph.choose(stuck, zero, sliding);
+                for j in 0..n {
+                    let unit = graph.number(if i == j { 1.0 } else { 0.0 });
+                    matrix[i * n + j] = graph.choose(stuck, unit, matrix[i * n + j]);
+                }
+            }
+        }
+        let solved = match n {
+            1 => vec![graph.div(right[0], matrix[0])],
+            2 => two(graph, &matrix, &right).to_vec(),
+            _ => {
+                graph.blocks.push(Block { matrix: matrix.clone(), right });
+                (0..n).map(|k| graph.add_op(Op::Solution(graph.blocks.len() - 1, k))).collect()
+            }
+        };
+        matrices.push(matrix);
+        for (&state, value) in group.iter().zip(solved) {
+            derivatives[state] = value;
+        }
+    }
+    Ok(derivatives)
+}
+
+/// Two equations, by their determinant.
+fn two(graph: &mut Graph, matrix: &[Id], right: &[Id]) -> [Id; 2] {
+    let mut cross = |a, b, c, d| {
+        let (ab, cd) = (graph.times(a, b), graph.times(c, d));
+        graph.sub(ab, cd)
+    };
+    let determinant = cross(matrix[0], matrix[3], matrix[1], matrix[2]);
+    let first = cross(matrix[3], right[0], matrix[1], right[1]);
+    let second = cross(matrix[0], right[1], matrix[2], right[0]);
+    let one = graph.number(1.0);
+    let inverse = graph.div(one, determinant);
+    [graph.times(first, inverse), graph.times(second, inverse)]
+}
+
+/// States whose rows share derivatives, in order.
+fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
+    let mut group: Vec<usize> = (0..rows.len()).collect();
+    fn root(group: &[usize], mut s: usize) -> usize {
+        while group[s] != s {
+            s = group[s];
+        }
+        s
+    }
+    for (state, row) in rows.iter().enumerate() {
+        for &column in row.coefficients.keys() {
+            let (a, b) = (root(&group, state), root(&group, column));
+            group[a.max(b)] = a.min(b);
+        }
+    }
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for state in 0..rows.len() {
+        groups.entry(root(&group, state)).or_default().push(state);
+    }
+    groups.into_values().collect()
+}
+
+/// A state of the group for whose derivative no equation is left, whatever the numbers; by augmenting paths.
+fn undetermined(rows: &[Row], group: &[usize]) -> Option<usize> {
+    fn assign(
+        rows: &[Row],
+        column: usize,
+        group: &[usize],
+        seen: &mut Vec<usize>,
+        taken: &mut BTreeMap<usize, usize>,
+    ) -> bool {
+        for &row in group {
+            if rows[row].coefficients.contains_key(&column) && !seen.contains(&row) {
+                seen.push(row);
+                let free = match taken.get(&row) {
+                    None => true,
+                    Some(&other) => assign(rows, other, group, seen, taken),
+                };
+                if free {
+                    taken.insert(row, column);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+    let mut taken = BTreeMap::new();
+    group.iter().copied().find(|&column| !assign(rows, column, group, &mut Vec::new(), &mut taken))
+}

@@ -1,0 +1,464 @@
+//! Models from text against an independent integration, closed forms and compiled models.
+
+use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
+
+use super::{Equations, EquationsOptions, Target};
+
+const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
+
+fn read(text: &str) -> Result<Equations, Mistake> {
+    Equations::new(&toml::from_str::<EquationsOptions>(text).unwrap_or_else(|e| panic!("{e}\n{text}")))
+}
+
+fn model(text: &str) -> Equations {
+    read(&format!("{text}{TIGHT}")).unwrap_or_else(|mistake| panic!("{mistake}\n{text}"))
+}
+
+fn values(model: &Equations, given: &[(&str, f64)]) -> Vec<f64> {
+    let value = |p: &mops_core::Parameter| {
+        let given = given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, v)| *v);
+        given.or(p.default).unwrap_or_else(|| panic!("{} has no value", p.variable.name))
+    };
+    for (name, _) in given {
+        assert!(model.interface().parameters.iter().any(|p| p.variable.name == *name), "no parameter {name}");
+    }
+    model.interface().parameters.iter().map(value).collect()
+}
+
+fn attempt(model: &Equations, inputs: &[(&str, Input)], given: &[(&str, f64)], end: f64) -> Result<Response, Failure> {
+    let inputs = inputs.iter().map(|(name, input)| ((*name).to_owned(), input.clone())).collect();
+    let case = Case { inputs, ..Case::default() };
+    let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
+    let job = Job { case: &case, parameters: &values(model, given), signals: &signals, horizon: end };
+    let Analysis::Time(response) = model.analyse(&job)? else { panic!("a simulation") };
+    Ok(response)
+}
+
+fn respond(model: &Equations, inputs: &[(&str, Input)], given: &[(&str, f64)], end: f64) -> Response {
+    attempt(model, inputs, given, end).expect("it simulates")
+}
+
+fn at(response: &Response, signal: &str, t: f64) -> f64 {
+    response.trace(signal).unwrap_or_else(|| panic!("no signal {signal}")).at(t)
+}
+
+fn sine(amplitude: f64, angular: f64, offset: f64) -> Input {
+    Input::Sine { amplitude, frequency: angular / std::f64::consts::TAU, phase: 0.0, offset }
+}
+
+/// One plant of `tests/equations`: its text, what drives it, values of parameters, the end, the states there.
+type Plant = (&'static str, Vec<(&'static str, Input)>, Vec<(&'static str, f64)>, f64, &'static [f64]);
+
+macro_rules! text {
+    ($name:literal) => {
+        include_str!(concat!("../../tests/equations/", $name, ".toml"))
+    };
+}
+
+/// The last states are those that `tests/equations/reference.py` prints.
+#[rustfmt::skip]
+fn plants() -> Vec<Plant> {
+    vec![
+        (text!("furuta-free"), vec![("u", sine(0.05, 4.0, 0.0))],
+            vec![("b", 0.0075), ("c", 0.0036), ("d", 0.21), ("bp", 2e-4), ("ba", 9e-4), ("th0", 2.0), ("ph0", 0.3)],
+            3.0, &[3.7431043318, 5.7152360653, 4.4469232724, 1.704247677]),
+        (text!("furuta-driven"), vec![("u", sine(0.05, 4.0, 0.0))],
+            vec![("a", 0.00614), ("b", 0.0118), ("c", 0.00233), ("d", 0.137), ("bp", 5e-4), ("ba", 1.5e-3), ("th0", 3.2), ("thd0", 0.5), ("phd0", -1.0)],
+            3.0, &[2.9368409441, 0.62482343323, -0.0070260250304, -0.79610725078]),
+        (text!("servo"), vec![("i", sine(2.0, 3.0, 0.0))],
+            vec![("J", 2.8e-3), ("b", 7e-4), ("q0", 0.2), ("w0", -1.0)], 4.0, &[31.013125906, -6.770044775]),
+        (text!("spring"), vec![("u", sine(3.0, 10.0, 0.0))],
+            vec![("m", 0.8), ("c", 0.64), ("k", 127.0), ("x0", 0.01), ("v0", 0.5)], 3.0, &[-0.05789980177, -0.031249271441]),
+        (text!("tanks"), vec![("u", sine(2.0, 0.1, 5.0))],
+            vec![("kp", 19.5), ("a1", 1.12), ("a2", 0.468), ("h10", 8.9), ("h20", 8.0)], 120.0, &[1.8866588958, 20.151717135]),
+        (text!("pendulum"), vec![], vec![("L", 0.444), ("b", 0.138), ("th0", 1.1)], 5.0, &[-0.74596138245, 0.83689455346]),
+        (text!("pendulum-height"), vec![],
+            vec![("L", 0.2), ("b", 0.204), ("th0", 0.9), ("w0", 0.3)], 5.0, &[-0.40622404271, -2.3412278909]),
+        (text!("axis"), vec![("u", sine(5.0, 2.0, 0.0))],
+            vec![("m", 1.48), ("b", 5.92), ("v0", 0.1)], 4.0, &[0.32933137636, 0.71764076787]),
+        (text!("ball"), vec![], vec![("b", 0.0944), ("y0", 1.2), ("v0", 8.5)], 1.5, &[2.5551717626, -6.3429282144]),
+        (text!("room"), vec![("P", Input::Constant(1.5)), ("To", sine(3.0, 7e-5, 5.0))],
+            vec![("C", 1320.0), ("R", 5.89), ("eta", 0.484), ("T0", 18.0)], 86400.0, &[7.5120213086]),
+    ]
+}
+
+#[test]
+fn ten_plants_written_by_hand_agree_with_an_independent_integration() {
+    for (text, inputs, given, end, states) in plants() {
+        let model = model(text);
+        let response = respond(&model, &inputs, &given, end);
+        for (state, expected) in model.interface().states.iter().zip(states) {
+            let last = response.trace(&state.name).unwrap().last();
+            assert!(
+                (last - expected).abs() < 1e-7 * expected.abs().max(1.0),
+                "{} {last} {expected}\n{text}",
+                state.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_tape_of_the_furuta_pendulum_is_about_as_short_as_its_equations() {
+    for text in [text!("furuta-free"), text!("furuta-driven")] {
+        let instructions = model(text).instructions();
+        assert!(instructions <= 24, "{instructions}");
+    }
+}
+
+#[test]
+fn tangents_agree_with_central_differences() {
+    for (text, inputs, given, end, _) in plants() {
+        let model = model(text);
+        let inputs = inputs.iter().map(|(name, input)| ((*name).to_owned(), input.clone())).collect();
+        let case = Case { inputs, ..Case::default() };
+        let parameters = values(&model, &given);
+        let signals: Vec<usize> = (0..model.interface().states.len()).collect();
+        let seeds: Vec<Vec<f64>> = (0..parameters.len())
+            .map(|i| (0..parameters.len()).map(|j| f64::from(u8::from(i == j))).collect())
+            .collect();
+        let analyse = |parameters: &[f64]| {
+            let job = Job { case: &case, parameters, signals: &signals, horizon: end };
+            model.analyse(&job).expect("it simulates")
+        };
+        let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: end };
+        let (value, tangents) = model.tangents(&job, &seeds).unwrap().unwrap();
+        for (i, tangent) in tangents.iter().enumerate() {
+            let h = 1e-5 * parameters[i].abs().max(1e-2);
+            let moved = |sign: f64| {
+                let mut p = parameters.clone();
+                p[i] += sign * h;
+                analyse(&p)
+            };
+            let (up, down) = (moved(1.0), moved(-1.0));
+            for state in &model.interface().states {
+                let last = |a: &Analysis| a.trace(&state.name).last();
+                assert_eq!(last(&value), last(&analyse(&parameters)), "tangents change no value");
+                let difference = (last(&up) - last(&down)) / (2.0 * h);
+                let close = 1e-4 * difference.abs().max(1e-3 / h * 1e-4).max(1e-4);
+                assert!(
+                    (last(tangent) - difference).abs() < close,
+                    "{} {i}: {} {difference}\n{text}",
+                    state.name,
+                    last(tangent)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn it_is_the_compiled_model_to_the_tolerance_dry_friction_included() {
+    use crate::furuta::Furuta;
+    use crate::kernel::Tolerance;
+    let friction = "\n[friction]\nth = { viscous = 'bp', coulomb = 'cp' }\nphd = { viscous = 'ba', coulomb = 'ca' }\n";
+    let text = text!("furuta-driven")
+        .replace(" - bp*thd\"", "\"")
+        .replace(" - ba*phd\"", "\"")
+        .replace("ba = \"N m s/rad\"", "ba = \"N m s/rad\", ca = \"N m\", cp = \"N m\"");
+    let ours = model(&format!("{text}{friction}"));
+    let torque = sine(0.012, 4.0, 0.0);
+    let p = [
+        ("a", 0.0044),
+        ("b", 0.0118),
+        ("c", 0.0036),
+        ("d", 0.105),
+        ("ba", 2e-3),
+        ("bp", 3e-4),
+        ("ca", 0.01),
+        ("cp", 2e-3),
+    ];
+    let given: Vec<(&str, f64)> = p.iter().copied().chain([("th0", 2.2), ("thd0", 1.78)]).collect();
+    let response = respond(&ours, &[("u", torque.clone())], &given, 6.0);
+    let compiled = Furuta::new(None, Tolerance { relative: 1e-10, absolute: 1e-12, ..Tolerance::default() });
+    let case = Case { inputs: vec![("u".into(), torque)], ..Case::default() };
+    let parameters: Vec<f64> = p.iter().map(|(_, v)| *v).chain([0.0, 0.0, 2.2, 1.78]).collect();
+    let job = Job { case: &case, parameters: &parameters, signals: &[0, 2], horizon: 6.0 };
+    let reference = compiled.analyse(&job).unwrap();
+    let sticks = |events: &[mops_core::Event]| events.iter().filter(|e| e.what.contains("sticks")).count();
+    assert!(sticks(&response.events) >= 3, "{:?}", response.events);
+    assert_eq!(response.events.len(), reference.response().unwrap().events.len());
+    for (mine, its) in response.events.iter().zip(&reference.response().unwrap().events) {
+        assert!((mine.time - its.time).abs() < 1e-7, "{mine:?} {its:?}");
+    }
+    for t in [0.5, 2.0, 4.0, 6.0] {
+        assert!((at(&response, "ph", t) - reference.trace("phi").at(t)).abs() < 1e-8);
+        assert!((at(&response, "th", t) - reference.trace("theta").at(t)).abs() < 1e-8);
+    }
+}
+
+#[test]
+fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
+    // Position x, force of the spring k x, belt at speed w under the block; x is measured against the belt's start, so the
+    // speed relative to the belt is u = v - w. Stuck while k |x| <= peak c, then a sine about x = c/k until u is 0 again.
+    let (m, k, c, peak, w) = (1.0_f64, 4.0_f64, 2.0_f64, 1.5_f64, 0.3_f64);
+    let text = "
+        states = { x = 'm', s = 'm', u = 'm/s' }
+        parameters = { m = 'kg', k = 'N/m', c = 'N', w = 'm/s' }
+        der = { s = 'u', x = 'u + w', u = \"m*u' = -k*x\" }
+        friction.s = { coulomb = 'c', peak = 1.5 }
+        start = { x = '-c/k' }";
+    let model = model(text);
+    let response = respond(&model, &[], &[("m", m), ("k", k), ("c", c), ("w", w)], 20.0);
+    let slides: Vec<f64> = response.events.iter().filter(|e| e.what == "s slides").map(|e| e.time).collect();
+    // The belt carries the block in +x until the spring pulls with peak c; then x = c/k + A cos(angular t - start).
+    let angular = (k / m).sqrt();
+    let above = (peak - 1.0) * c / k; // break-away above the centre of the sine, which is at x = c/k
+    let start = (w / angular).atan2(above);
+    // Speed of x: -A angular sin(angular t - start); equal to w at t = 0 and at angular t = 2 start + pi.
+    let slip = (2.0 * start + std::f64::consts::PI) / angular;
+    let stick = 2.0 * above / w;
+    assert!(slides.len() > 3, "{:?}", response.events);
+    for pair in slides[1..].windows(2) {
+        assert!((pair[1] - pair[0] - (slip + stick)).abs() < 1e-8, "{} {}", pair[1] - pair[0], slip + stick);
+    }
+}
+
+#[test]
+fn no_step_crosses_a_kink_and_a_kink_costs_one_event() {
+    // x' = max(sin t, 0): x = 1 - cos t up to pi, then 2 to 2 pi.
+    let rectifier = model("states = { x = '1' }\nder = { x = 'max(sin(time), 0)' }");
+    let response = respond(&rectifier, &[], &[], 20.0);
+    for t in [1.0_f64, 3.0, 4.0, 6.0] {
+        let exact = if t < std::f64::consts::PI { 1.0 - t.cos() } else { 2.0 };
+        assert!((at(&response, "x", t) - exact).abs() < 1e-9, "{t}");
+    }
+    assert!(response.work.steps < 400, "{:?}", response.work);
+    // Saturation and dead zone by the area under them.
+    let clipped = model("states = { x = '1' }\nder = { x = 'clip(time - 1, -0.5, 0.5) + deadzone(time, -1, 2)' }");
+    let response = respond(&clipped, &[], &[], 3.0);
+    // clip: -0.5 to 0.5 s, line to 1.5 s, 0.5 to 3 s; deadzone: (t - 2) from 2 s.
+    let exact = -0.5 * 0.5 + 0.0 + 0.5 * 1.5 + 0.5;
+    assert!((at(&response, "x", 3.0) - exact).abs() < 1e-10, "{} {exact}", at(&response, "x", 3.0));
+}
+
+#[test]
+fn a_tank_runs_empty_stays_empty_and_fills_again() {
+    let inflow = Input::Step { time: 60.0, before: 0.0, after: 5.0 };
+    let model = model(text!("tanks"));
+    let given = [("kp", 19.5), ("a1", 1.12), ("a2", 0.468), ("h10", 8.9), ("h20", 0.0)];
+    let response = respond(&model, &[("u", inflow)], &given, 100.0);
+    // sqrt(h) falls by a1/A1 sqrt(g/2) a second: empty after 95/1.12 sqrt(2 8.9/981) = 11.43 s.
+    let empty = 95.0 / 1.12 * (2.0 * 8.9_f64 / 981.0).sqrt();
+    let half = 8.9 * (1.0 - 5.0 / empty).powi(2);
+    assert!((at(&response, "h1", 5.0) - half).abs() < 1e-8);
+    for t in [empty + 0.1, 30.0, 59.0] {
+        assert!(at(&response, "h1", t).abs() < 1e-7, "{t}: {}", at(&response, "h1", t));
+    }
+    assert!(at(&response, "h1", 100.0) > 1.0);
+    assert!(response.work.steps + response.work.rejected < 2000, "{:?}", response.work);
+}
+
+#[test]
+fn a_noisy_input_at_a_kink_costs_steps_in_proportion_to_its_samples() {
+    // A tank held at empty by an inflow that comes and goes each second.
+    let times: Vec<f64> = (0..200).map(f64::from).collect();
+    let levels: Vec<f64> = (0..200).map(|k| f64::from(k * 7919 % 13) * 0.02).collect();
+    let inflow = Input::Sampled { times, values: levels, hold: mops_core::Hold::Zero };
+    let model = model(text!("tanks"));
+    let given = [("kp", 19.5), ("a1", 1.12), ("a2", 0.468)];
+    let response = respond(&model, &[("u", inflow)], &given, 200.0);
+    assert!(response.work.steps < 100 * 200, "{:?}", response.work);
+}
+
+#[test]
+fn a_ball_bounces_by_its_rule() {
+    let text = "
+        states = { h = 'm', v = 'm/s' }
+        parameters = { e = '1' }
+        constants = { g = '9.81 m/s2' }
+        der = { h = 'v', v = '-g' }
+        start = { h = 1 }
+        when.bounce = { guard = 'h', reset = { v = '-e*v' } }";
+    let response = respond(&model(text), &[], &[("e", 0.8)], 2.0);
+    let fall = (2.0 / 9.81_f64).sqrt();
+    let exact = [fall, fall * 2.6, fall * 3.88];
+    let bounces: Vec<f64> = response.events.iter().filter(|e| e.what == "bounce").map(|e| e.time).collect();
+    assert_eq!(bounces.len(), 3, "{bounces:?}");
+    for (t, exact) in bounces.iter().zip(exact) {
+        assert!((t - exact).abs() < 1e-10, "{t} {exact}");
+    }
+}
+
+#[test]
+fn an_event_happens_once_until_its_guard_was_positive_again() {
+    // A thermostat: below 19 the heater goes on, above 21 off; the level of the heater is a state that events set.
+    let text = "
+        states = { T = 'K', heat = 'K/s' }
+        der = { T = '-0.1*(T - 10) + heat', heat = 0 }
+        start = { T = 20 }
+        when.on  = { guard = 'T - 19', reset = { heat = 2 } }
+        when.off = { guard = '21 - T', reset = { heat = 0 } }";
+    let response = respond(&model(text), &[], &[], 30.0);
+    let names: Vec<&str> = response.events.iter().map(|e| e.what.as_str()).collect();
+    assert!(names.len() > 6, "{names:?}");
+    for (k, name) in names.iter().enumerate() {
+        assert_eq!(*name, if k % 2 == 0 { "on" } else { "off" }, "{names:?}");
+    }
+    assert!((response.events[0].time - 10.0 * (10.0_f64 / 9.0).ln()).abs() < 1e-9);
+}
+
+#[test]
+fn jumps_are_exact_and_dry_friction_as_a_sign_is_a_failure_that_says_so() {
+    let jump = model(
+        "states = { x = '1' }\nparameters = { when_ = 's' }\nder = { x = 'if(time >= when_, 3, time < 0.5, 1, 0)' }",
+    );
+    let response = respond(&jump, &[], &[("when_", 1.25)], 2.0);
+    assert!((at(&response, "x", 2.0) - (0.5 + 3.0 * 0.75)).abs() < 1e-12, "{}", at(&response, "x", 2.0));
+    let chatter = model("states = { x = '1' }\nstart = { x = 1 }\nder = { x = '-sign(x)' }");
+    let failure = attempt(&chatter, &[], &[], 2.0).unwrap_err();
+    assert!(failure.to_string().contains("friction"), "{failure}");
+}
+
+#[test]
+fn a_mass_matrix_of_three_is_solved_and_a_singular_one_loses() {
+    // M x' = (1, 2, 3) with M = [[2, 1, 0], [1, p, 1], [0, 1, 4]]; for p = 3 the derivatives are (4, 1, 13)/18... solved here
+    // by Cramer's rule; for p = 0.75 the determinant 8 p - 6 is zero.
+    let text = "
+        states = { x = '1', y = '1', z = '1' }
+        parameters = { p = '1' }
+        der = { x = \"2*x' + y' = 1\", y = \"x' + p*y' + z' = 2\", z = \"y' + 4*z' = 3\" }
+        outputs = { rate = \"x' + y'\" }";
+    let model = model(text);
+    let response = respond(&model, &[], &[("p", 3.0)], 1.0);
+    let d = 18.0;
+    let y = (2.0 * (2.0 * 4.0 - 3.0) - 4.0) / d;
+    let (x, z) = ((1.0 - y) / 2.0, (3.0 - y) / 4.0);
+    for (signal, exact) in [("x", x), ("y", y), ("z", z), ("rate", x + y)] {
+        assert!((at(&response, signal, 1.0) - exact).abs() < 1e-12, "{signal}");
+    }
+    let failure = attempt(&model, &[], &[("p", 0.75)], 1.0).unwrap_err();
+    assert_eq!(failure, Failure::Undefined("the mass matrix is singular at the start".into()));
+}
+
+#[test]
+fn a_heat_rod_of_a_hundred_nodes_takes_few_lines() {
+    let text = "
+        states = { 'T[1..100]' = 'K' }
+        parameters = { k = '1/s' }
+        constants = { n = 100 }
+        let = { 'q[i=1..99]' = 'k*(T[i+1] - T[i])' }
+        start = { 'T[i]' = '20 K' }
+        [der]
+        'T[i]'   = 'q[i] - q[i-1]'
+        'T[1]'   = 'q[1]'
+        'T[100]' = '-q[n-1] + k*(50 - T[n])'";
+    let model = model(text);
+    assert_eq!(model.interface().states[99].start, "T0[100]");
+    let response = respond(&model, &[], &[("k", 10.0)], 2.0);
+    // The same by explicit Euler with tiny steps would be slow; in the middle nothing has happened yet, the end warms as
+    // a half-infinite rod does, and heat is only moved.
+    assert!((at(&response, "T[10]", 2.0) - 20.0).abs() < 1e-9);
+    let warm: Vec<f64> = (1..=100).map(|k| at(&response, &format!("T[{k}]"), 2.0)).collect();
+    assert!(warm.windows(2).all(|w| w[1] >= w[0] - 1e-9), "monotone");
+    // In units of the spacing: u(d) = 30 erfc(d / sqrt(4 k t)), with d from the wall at node 101.
+    let erfc_of_half = 0.479_500_122_2;
+    let d = 0.5 * (4.0_f64 * 10.0 * 2.0).sqrt();
+    let node = 101.0 - d;
+    let (low, part) = (node.floor(), node.fract());
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let index = low as usize - 1;
+    let here = warm[index] * (1.0 - part) + warm[index + 1] * part;
+    assert!((here - 20.0 - 30.0 * erfc_of_half).abs() < 0.15, "{here}");
+    let pattern = model.jacobian_pattern();
+    assert_eq!(pattern.len(), 3 * 100 - 2);
+    assert!(pattern.iter().all(|&(row, column)| row.abs_diff(column) <= 1));
+}
+
+#[test]
+fn places_of_effects_have_the_names_of_joints_states_inputs_and_signals() {
+    let places =
+        |text: &str| -> Vec<String> { model(text).interface().ports.iter().map(ToString::to_string).collect() };
+    assert_eq!(
+        places(text!("furuta-free")),
+        [
+            "joint:th",
+            "process:th",
+            "joint:ph",
+            "process:ph",
+            "actuator:u",
+            "sensor:th",
+            "sensor:thd",
+            "sensor:ph",
+            "sensor:phd"
+        ]
+    );
+    assert_eq!(places(text!("room")), ["process:T", "actuator:P", "actuator:To", "sensor:T"]);
+    let named = format!("{}\n[ports]\narm = {{ joint = 'ph' }}", text!("furuta-free"));
+    assert!(places(&named).contains(&"joint:arm".to_owned()));
+}
+
+#[test]
+fn a_term_at_a_port_acts_before_the_mass_matrix_at_the_input_and_at_the_output() {
+    let plain = text!("furuta-free");
+    let given = [("b", 0.0075), ("c", 0.0036), ("d", 0.21), ("bp", 2e-4), ("ba", 9e-4), ("th0", 2.0)];
+    let end = |model: &Equations| respond(model, &[("u", sine(0.05, 4.0, 0.0))], &given, 2.0);
+    let by_hand = |from: &str, to: &str| {
+        assert_eq!(plain.matches(from).count(), 1);
+        end(&model(&plain.replace(from, to)))
+    };
+    let with = |target: Target, value: &str| end(&model(plain).with_term(target, value).unwrap());
+    let friction = with(Target::Equation("phd".into()), "-0.002*ph");
+    let same = by_hand("= u - ba*phd", "= u - ba*phd - 0.002*ph");
+    let actuator = with(Target::Input("u".into()), "-0.1*u");
+    let weaker = by_hand("= u - ba*phd", "= 0.9*u - ba*phd");
+    for signal in ["th", "ph"] {
+        assert!((at(&friction, signal, 2.0) - at(&same, signal, 2.0)).abs() < 1e-9);
+        assert!((at(&actuator, signal, 2.0) - at(&weaker, signal, 2.0)).abs() < 1e-9);
+        assert!((at(&friction, signal, 2.0) - at(&actuator, signal, 2.0)).abs() > 1e-3);
+    }
+    let sensor = with(Target::Signal("th".into()), "0.01 + 0.1*ph");
+    assert!(
+        (at(&sensor, "th", 1.0) - (at(&sensor, "ph", 1.0) * 0.1 + 0.01) - at(&end(&model(plain)), "th", 1.0)).abs()
+            < 1e-12
+    );
+}
+
+#[test]
+fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
+    let text = "
+        states = { x = 'm', v = 'm/s' }
+        parameters = { w = 'rad/s', A = 'm', s = 'm' }
+        let = { a = '-k*x', k = 'w^2' }
+        start = { x = 's', v = '2*A*w' }
+        der = { x = 'v', v = 'a' }";
+    let model = model(text);
+    let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1)], 1.0);
+    assert!((at(&response, "x", 1.0) - (0.1 * 3f64.cos() + 3f64.sin())).abs() < 1e-9);
+    let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1), ("v0", 0.0)], 1.0);
+    assert!((at(&response, "x", 1.0) - 0.1 * 3f64.cos()).abs() < 1e-9, "a start value that is given goes over it");
+    assert_eq!(model.interface().states[0].start, "s");
+    assert_eq!(model.interface().states[1].rate_of.as_deref(), Some("x"));
+}
+
+#[test]
+fn every_mistake_names_its_place() {
+    let of = |text: &str| {
+        let mistake = read(text).err().unwrap_or_else(|| panic!("nothing wrong?\n{text}"));
+        (mistake.path.join("."), mistake.span.clone().map(|s| (s.start, s.end)), mistake.to_string())
+    };
+    let base = "states = { x = 'm', v = 'm/s' }\n";
+    let cases: [(&str, &str, Option<(usize, usize)>, &str); 14] = [
+        ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
+        ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
+        ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),
+        ("der = { x = 'v', v = '2*(x + 1' }", "der.v", Some((8, 8)), "`)`"),
+        ("der = { x = 'a', v = '0' }\nlet = { a = '2*b', b = 'a' }", "let.b", Some((0, 1)), "itself"),
+        ("parameters = { x = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x", None, "both a state and a parameter"),
+        ("parameters = { k = 'parsec' }\nder = { x = 'v', v = '0' }", "parameters.k", None, "not a known unit"),
+        ("der = { x = 'v', v = \"x'^2 = 1\" }", "der.v", Some((0, 2)), "derivative cannot stand"),
+        ("der = { x = \"v' = 1\", v = \"2*v' = x\" }", "der.x", None, "nothing determines the derivative of `x`"),
+        ("der = { x = 'v', v = 'v = 1' }", "der.v", None, "contains no derivative"),
+        ("der = { x = 'v', v = '0' }\nstart = { x = '2*v' }", "start.x", Some((2, 3)), "parameters and constants only"),
+        ("der = { x = 'v', v = '0' }\nfriction.v2 = { coulomb = 1 }", "friction.v2", None, "friction needs a joint"),
+        ("parameters = { x0 = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x0", None, "start value"),
+        ("der = { x = 'v', v = '0' }\nmass = { v = '1' }", "mass.v", None, "a row and a column"),
+    ];
+    for (text, path, span, words) in cases {
+        let (found, place, message) = of(&format!("{base}{text}"));
+        assert_eq!((found.as_str(), place), (path, span), "{message}\n{text}");
+        assert!(message.contains(words), "{message}\n{text}");
+    }
+    let rod = "states = { 'T[1..3]' = 'K' }\nder = { 'T[i]' = 'T[i-1] - T[i]' }";
+    assert!(of(rod).2.contains("there is no `T[0]` (where i is 1)"), "{}", of(rod).2);
+}

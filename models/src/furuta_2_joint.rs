@@ -1,0 +1,209 @@
+//! The Furuta pendulum as two rigid bodies and two bearings.
+
+use mops_core::{
+    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
+    WithTangents,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::kernel::drive::Drive;
+use crate::kernel::elements::BearingFriction;
+use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
+use crate::kernel::{self, Recording, Simulate, Tolerance, record, seconds, wanted};
+
+/// The Furuta pendulum as two rigid bodies: an arm that turns by `phi` about the vertical, a pendulum that turns by `theta`
+/// about the arm, 0 upright and pi hanging. With `K = J + m l^2`, `C = m r l`:
+///
+/// ```text
+/// (Ja + m r^2 + K sin^2 theta) phi'' + C cos theta theta'' + 2 K sin theta cos theta phi' theta' - C sin theta theta'^2 = u - t1
+/// C cos theta phi'' + K theta'' - K sin theta cos theta phi'^2 - m g l sin theta = -t2
+/// ```
+///
+/// The bearings have dry friction: arm `t1 = sign(phi') (tau11 + (tau12 - tau11) |phi'|)` while it turns, at rest whatever
+/// holds it up to `peak1 tau11`; the pendulum likewise with `tau21`, `tau22` (N m, at 0 and at 1 rad/s) and `peak2`. A
+/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so.
+///
+/// Parameters: `J` inertia of the pendulum about its centre of mass, `Ja` of the arm about its axis (kg m2), `m` mass of
+/// pendulum and weight (kg), `l` its centre of mass from the arm (m), `r` length of the arm (m, default 0.245), `g`
+/// gravity (m/s2, default 9.81), the friction (default none, peaks 1), and the start values `phi0`, `dphi0`, `theta0`
+/// (default pi), `dtheta0`.
+///
+/// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`, the torque on the arm, N m.
+///
+/// Source: M. Gafvert, Derivation of Furuta pendulum dynamics, report TFRT-7574, Lund (1998); friction as in the Modelica
+/// Standard Library 2.2, Mechanics.Rotational.BearingFriction.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Furuta2JointOptions {
+    /// End of the simulation where no experiment gives one.
+    horizon: Option<Quantity>,
+    /// Accuracy and limits of the simulation.
+    tolerance: Tolerance,
+}
+
+impl ModelOptions for Furuta2JointOptions {
+    const KIND: &'static str = "furuta-2-joint";
+
+    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+        self.tolerance.check()?;
+        let mut parameters = body_parameters();
+        parameters.extend([
+            torque("tau11", "friction of the arm at rest"),
+            torque("tau12", "friction of the arm at 1 rad/s"),
+            peak("peak1", "arm"),
+            torque("tau21", "friction of the pendulum at rest"),
+            torque("tau22", "friction of the pendulum at 1 rad/s"),
+            peak("peak2", "pendulum"),
+        ]);
+        let interface = mechanism::interface(&[ARM, PENDULUM], parameters, vec![arm_torque()]);
+        let horizon = seconds("horizon", self.horizon.as_ref())?;
+        Ok(Box::new(Furuta2Joint { interface: Interface { horizon, ..interface }, tolerance: self.tolerance }))
+    }
+}
+
+/// The model of the kind `furuta-2-joint`.
+struct Furuta2Joint {
+    interface: Interface,
+    tolerance: Tolerance,
+}
+
+impl Model for Furuta2Joint {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        kernel::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(kernel::tangents(self, job, seeds))
+    }
+}
+
+impl Simulate for Furuta2Joint {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let p: [S; 16] = parameters.try_into().expect("the study gives every parameter");
+        let [inertia, arm_inertia, m, l, r, g, tau11, tau12, peak1, tau21, tau22, peak2, start @ ..] = p;
+        let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
+        let friction = [
+            BearingFriction::new(&[[at_rest, tau11], [at_one, tau12]], peak1)?,
+            BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
+        ];
+        let lumped = Lumped::of(inertia, arm_inertia, m, l, r, g);
+        let bodies = TwoBodies { lumped, drive: Drive::new(job.case.input("u")) };
+        let mut dynamics = Mechanism::<S, _, 2, 4>::new(bodies, friction, &[ARM, PENDULUM]);
+        let output = |dynamics: &Mechanism<S, TwoBodies<'_, S>, 2, 4>, signal: usize, t: f64, x: &[S; 4]| {
+            if signal < 4 { x[signal] } else { S::from(dynamics.bodies.drive.at(t)) }
+        };
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+    }
+}
+
+/// The lumped parameters of arm and pendulum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lumped<S> {
+    /// Inertia of the pendulum about its joint, `J + m l^2`, kg m2.
+    pub a: S,
+    /// Inertia of the arm with the pendulum's mass at its end, `Ja + m r^2`, kg m2.
+    pub b: S,
+    /// Coupling, `m r l`, kg m2.
+    pub c: S,
+    /// Gravity torque, `m g l`, N m.
+    pub d: S,
+}
+
+impl<S: Scalar> Lumped<S> {
+    /// From the inertias of pendulum and arm, the pendulum's mass and centre of mass, the arm's length, and gravity.
+    pub fn of(inertia: S, arm_inertia: S, m: S, l: S, r: S, g: S) -> Self {
+        Self { a: inertia + m * l * l, b: arm_inertia + m * r * r, c: m * r * l, d: m * g * l }
+    }
+
+    /// Mass matrix, and the torques of gravity and of the rotating frame, in the order arm, pendulum.
+    #[inline]
+    pub fn mass_and_force(&self, theta: S, dphi: S, dtheta: S) -> ([[S; 2]; 2], [S; 2]) {
+        let Self { a, b, c, d } = *self;
+        let (sin, cos) = theta.sin_cos();
+        let coupling = c * cos;
+        let turning = a * sin * cos * dphi;
+        let arm_force = c * sin * dtheta * dtheta - turning * dtheta * 2.0;
+        ([[b + a * sin * sin, coupling], [coupling, a]], [arm_force, turning * dphi + d * sin])
+    }
+}
+
+/// Arm and pendulum, with the torque on the arm.
+pub(crate) struct TwoBodies<'a, S> {
+    pub lumped: Lumped<S>,
+    pub drive: Drive<'a>,
+}
+
+impl<S: Scalar> Bodies<S, 2> for TwoBodies<'_, S> {
+    #[inline]
+    fn mass_and_force(&self, t: f64, q: &[S; 2], w: &[S; 2]) -> ([[S; 2]; 2], [S; 2]) {
+        let (mass, [arm, pendulum]) = self.lumped.mass_and_force(q[1], w[0], w[1]);
+        (mass, [arm + self.drive.at(t), pendulum])
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        self.drive.next_break(t)
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.drive.longest_step()
+    }
+
+    fn pass_break(&mut self, t: f64) {
+        self.drive.pass_break(t);
+    }
+}
+
+/// The joint of the arm.
+pub(crate) const ARM: Joint = Joint {
+    angle: "phi",
+    about: "arm",
+    start: 0.0,
+    events: ["arm sticks", "arm slides", "arm driven by negative friction", "arm braked by its friction again"],
+};
+
+/// The joint of the pendulum.
+pub(crate) const PENDULUM: Joint = Joint {
+    angle: "theta",
+    about: "pendulum, 0 upright, pi hanging",
+    start: std::f64::consts::PI,
+    events: [
+        "pendulum sticks",
+        "pendulum slides",
+        "pendulum driven by negative friction",
+        "pendulum braked by its friction again",
+    ],
+};
+
+/// Inertias, mass, lengths and gravity.
+pub(crate) fn body_parameters() -> Vec<Parameter> {
+    let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
+    vec![
+        positive("J", "kg m2", "inertia of the pendulum about its centre of mass"),
+        positive("Ja", "kg m2", "inertia of the arm about its axis"),
+        positive("m", "kg", "mass of pendulum and weight"),
+        positive("l", "m", "distance of the pendulum's centre of mass from the arm"),
+        positive("r", "m", "length of the arm").with_default(0.245),
+        Parameter::new("g", "m/s2", "gravity").with_default(9.81),
+    ]
+}
+
+/// A friction torque at some speed.
+pub(crate) fn torque(name: &str, about: &str) -> Parameter {
+    Parameter::new(name, "N m", about).with_default(0.0)
+}
+
+/// Break-away torque over sliding torque at rest.
+pub(crate) fn peak(name: &str, joint: &str) -> Parameter {
+    let about = format!("torque that breaks the {joint} away over its friction at rest");
+    Parameter::new(name, "1", about).within(1.0, f64::INFINITY).with_default(1.0)
+}
+
+/// The input of all models of the pendulum.
+pub(crate) fn arm_torque() -> Variable {
+    Variable::new("u", "N m", "torque on the arm")
+}

@@ -1,0 +1,172 @@
+//! The Furuta pendulum held upright by state feedback, its arm led to an angle.
+
+use mops_core::{
+    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
+    WithTangents,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
+use crate::kernel::elements::{Lag, Saturation};
+use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, mechanism, record, seconds, wanted};
+
+/// The Furuta pendulum with a spring and a damper in each joint, upright, under state feedback with a filtered reference:
+///
+/// ```text
+/// ref = setpoint (1 - exp(-t/T))
+/// v = -(k1 (phi - ref) + k2 phi' + k3 theta + k4 theta'),   u = min(max(v, -limit), limit)
+/// ```
+///
+/// The arm is led from 0 to `setpoint` by a reference that a first-order filter keeps from jumping, so that the pendulum
+/// does not fall; `u` is the torque on the arm. The plant is that of `furuta-linear`, or with `plant = "nonlinear"` (the
+/// default) the equations it is the linearisation of.
+///
+/// Parameters: `k1` (N m/rad), `k2` (N m s/rad), `k3`, `k4` gains; `setpoint` (rad), `T` time constant of the filter (s, default
+/// 0.05), `limit` of the torque (N m, default 0.05); those of the plant (`a`, `b`, `c`, `d`, `c1`, `d1`, `c2`, `d2`) and the
+/// start values as in `furuta-linear`.
+///
+/// Signals: `phi`, `dphi`, `theta`, `dtheta`, `ref` (rad, rad/s), `u` (N m).
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 7.2 (state feedback).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FurutaStateFeedbackOptions {
+    /// End of the simulation.
+    horizon: Quantity,
+    /// The equations of the pendulum.
+    #[serde(default)]
+    plant: Plant,
+    /// Accuracy and limits of the simulation.
+    #[serde(default)]
+    tolerance: Tolerance,
+}
+
+/// Equations of the pendulum.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum Plant {
+    /// Those of two rigid bodies.
+    #[default]
+    Nonlinear,
+    /// Linearised about the upright position.
+    Linear,
+}
+
+impl ModelOptions for FurutaStateFeedbackOptions {
+    const KIND: &'static str = "furuta-state-feedback";
+
+    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+        self.tolerance.check()?;
+        let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
+        let mut parameters = vec![
+            Parameter::new("k1", "N m/rad", "gain of the arm's angle"),
+            Parameter::new("k2", "N m s/rad", "gain of the arm's speed"),
+            Parameter::new("k3", "N m/rad", "gain of the pendulum's angle"),
+            Parameter::new("k4", "N m s/rad", "gain of the pendulum's speed"),
+            Parameter::new("setpoint", "rad", "angle to which the arm is led"),
+            positive("T", "s", "time constant of the filter of the reference").with_default(0.05),
+            positive("limit", "N m", "largest torque").with_default(0.05),
+        ];
+        parameters.extend(lumped_parameters());
+        let mut interface = mechanism::interface(&upright_joints(), parameters, Vec::new());
+        interface.signals.push(Variable::new("ref", "rad", "reference of the arm's angle"));
+        interface.signals.push(Variable::new("u", "N m", "torque on the arm"));
+        interface.horizon = seconds("horizon", Some(&self.horizon))?;
+        Ok(Box::new(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance }))
+    }
+}
+
+/// The model of the kind `furuta-state-feedback`.
+struct FurutaStateFeedback {
+    interface: Interface,
+    plant: Plant,
+    tolerance: Tolerance,
+}
+
+impl Model for FurutaStateFeedback {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        kernel::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(kernel::tangents(self, job, seeds))
+    }
+}
+
+impl Simulate for FurutaStateFeedback {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let p: [S; 19] = parameters.try_into().expect("the study gives every parameter");
+        let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., phi, dphi, theta, dtheta] = p;
+        let mut dynamics = Loop {
+            gains: [k1, k2, k3, k4],
+            setpoint,
+            filter: Lag { time },
+            actuator: Saturation::new(-limit, limit),
+            equations: self.plant,
+            plant: Upright::of(plant)?,
+        };
+        let output = |dynamics: &Loop<S>, signal: usize, _: f64, x: &[S; 5]| {
+            if signal < 5 { x[signal] } else { dynamics.torque(x) }
+        };
+        let start = [phi, dphi, theta, dtheta, S::from(0.0)];
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+    }
+}
+
+/// The loop; state: the plant's, then the reference.
+struct Loop<S> {
+    gains: [S; 4],
+    setpoint: S,
+    filter: Lag<S>,
+    actuator: Saturation<S>,
+    equations: Plant,
+    plant: Upright<S>,
+}
+
+impl<S: Scalar> Loop<S> {
+    /// What the feedback asks for, N m.
+    fn demand(&self, x: &[S; 5]) -> S {
+        let [k1, k2, k3, k4] = self.gains;
+        -(k1 * (x[0] - x[4]) + k2 * x[1] + k3 * x[2] + k4 * x[3])
+    }
+
+    /// What the actuator gives, N m.
+    fn torque(&self, x: &[S; 5]) -> S {
+        self.actuator.output(self.demand(x))
+    }
+}
+
+impl<S: Scalar> Dynamics<S> for Loop<S> {
+    type State = [S; 5];
+
+    fn derivative(&self, _: f64, x: &[S; 5], dx: &mut [S; 5]) {
+        let plant = [x[0], x[1], x[2], x[3]];
+        let [arm, pendulum] = match self.equations {
+            Plant::Nonlinear => self.plant.nonlinear(&plant, self.torque(x)),
+            Plant::Linear => self.plant.linear(&plant, self.torque(x)),
+        };
+        *dx = [x[1], arm, x[3], pendulum, self.filter.derivative(self.setpoint, x[4])];
+    }
+
+    fn guards(&self) -> usize {
+        1
+    }
+
+    fn guard(&self, _: usize, _: f64, x: &[S; 5]) -> S {
+        self.actuator.guard(self.demand(x))
+    }
+
+    fn switch(&mut self, _: usize, _: f64, x: &mut [S; 5]) -> &'static str {
+        let limited = self.actuator.switch(self.demand(x));
+        if limited { "torque reaches its limit" } else { "torque leaves its limit" }
+    }
+
+    fn pass_break(&mut self, _: f64, x: &mut [S; 5]) {
+        self.actuator.settle(self.demand(x));
+    }
+}

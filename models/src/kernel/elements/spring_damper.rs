@@ -1,0 +1,35 @@
+//! A spring and a damper in parallel.
+
+use mops_core::Scalar;
+
+/// The torque `c (q - rest) + d q'` that a spring and a damper in parallel set against a joint.
+///
+/// Source: Modelica Standard Library 2.2, Mechanics.Rotational.SpringDamper.
+#[derive(Debug, Clone, Copy)]
+pub struct SpringDamper<S> {
+    /// Spring constant `c`, N m/rad.
+    pub spring: S,
+    /// Damping constant `d`, N m s/rad.
+    pub damper: S,
+    /// Angle at which the spring is unstretched, rad.
+    pub rest: S,
+}
+
+impl<S: Scalar> SpringDamper<S> {
+    /// One that is unstretched at 0.
+    pub fn new(spring: S, damper: S) -> Self {
+        Self { spring, damper, rest: S::from(0.0) }
+    }
+
+    /// The torque against the joint, N m.
+    #[inline]
+    pub fn torque(&self, angle: S, speed: S) -> S {
+        self.spring * (angle - self.rest) + self.damper * speed
+    }
+
+    /// The energy in the spring, J.
+    pub fn energy(&self, angle: S) -> S {
+        let stretch = angle - self.rest;
+        self.spring * stretch * stretch * 0.5
+    }
+}

@@ -1,0 +1,323 @@
+//! Elements in small systems, against closed forms.
+
+use mops_core::{Dual, Scalar, Trace};
+
+use super::*;
+use crate::kernel::{Dynamics, IntegrationMethod, Sink, Step, Tolerance, integrate};
+
+const TIGHT: Tolerance =
+    Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000, method: IntegrationMethod::Explicit };
+
+/// Keeps a signal and the times of the events.
+struct Record<F> {
+    signal: F,
+    trace: Trace,
+    events: Vec<f64>,
+}
+
+impl<D: Dynamics<f64>, F: Fn(&D, f64, &D::State) -> f64> Sink<f64, D> for Record<F>
+where
+    D::State: Default,
+{
+    fn step(&mut self, step: &Step<D::State>, dynamics: &D) {
+        let mut x = D::State::default();
+        let values = Trace::NODES.map(|s| {
+            step.state(s, &mut x);
+            (self.signal)(dynamics, step.start + s * step.taken, &x)
+        });
+        self.trace.push(step.start + step.taken, values);
+    }
+
+    fn event(&mut self, t: f64, _: &'static str) {
+        self.events.push(t);
+    }
+}
+
+fn simulate<D: Dynamics<f64>, F: Fn(&D, f64, &D::State) -> f64>(
+    mut dynamics: D,
+    start: D::State,
+    end: f64,
+    signal: F,
+) -> (Trace, Vec<f64>)
+where
+    D::State: Default,
+{
+    let mut record = Record { signal, trace: Trace::starting_at(0.0, 64), events: Vec::new() };
+    integrate(&mut dynamics, 0.0, end, start, &TIGHT, &mut record).expect("it simulates");
+    (record.trace, record.events)
+}
+
+fn near(value: f64, expected: f64, tolerance: f64) {
+    assert!((value - expected).abs() <= tolerance, "{value} is not {expected}");
+}
+
+#[test]
+fn a_table_is_straight_between_its_points_and_beyond_them() {
+    // The table of the Modelica documentation of BearingFriction.
+    let table = PiecewiseLinear::new(&[[0.0, 0.0], [1.0, 2.0], [2.0, 5.0], [3.0, 8.0]]).unwrap();
+    for (x, y) in [(0.5, 1.0), (1.0, 2.0), (1.5, 3.5), (3.0, 8.0), (5.0, 14.0), (-1.0, -2.0)] {
+        near(table.at(x), y, 1e-14);
+    }
+    assert_eq!(table.becomes_negative(0.0), None);
+    let falling = PiecewiseLinear::new(&[[0.0, 3.0], [1.0, 4.0], [2.0, 2.0]]).unwrap();
+    near(falling.becomes_negative(0.0).unwrap(), 3.0, 1e-14);
+    assert!(PiecewiseLinear::new(&[[1.0, 0.0], [1.0, 2.0]]).is_err());
+    assert!(PiecewiseLinear::<f64>::new(&[]).is_err());
+}
+
+#[test]
+fn tangents_of_a_table_are_those_of_its_lines() {
+    // y = y0 + (x - x0)(y1 - y0)/(x1 - x0) at x = 1.5 between (1, 2) and (2, 5), along y0, x1 and x.
+    let fixed = Dual::<3>::from;
+    let (y0, x1, x) = (Dual::variable(2.0, 0), Dual::variable(2.0, 1), Dual::variable(1.5, 2));
+    let table = PiecewiseLinear::new(&[[fixed(0.0), fixed(0.0)], [fixed(1.0), y0], [x1, fixed(5.0)]]).unwrap();
+    let y = table.at(x);
+    for (tangent, expected) in y.tangent.into_iter().zip([0.5, -1.5, 3.0]) {
+        near(tangent, expected, 1e-14);
+    }
+}
+
+#[test]
+fn bearing_friction_refuses_what_makes_no_sense() {
+    assert!(BearingFriction::new(&[[0.0, 1.0], [1.0, 2.0]], 0.9).is_err(), "break-away below sliding");
+    assert!(BearingFriction::new(&[[0.0, -1.0], [1.0, 2.0]], 1.0).is_err(), "driving at rest");
+    assert!(BearingFriction::new(&[[0.5, 1.0], [1.0, 2.0]], 1.0).is_err(), "no value at rest");
+    let falling = BearingFriction::new(&[[0.0, 0.001_67], [1.0, 0.001_443]], 1.228_72).unwrap();
+    near(falling.drives_from().unwrap(), 7.357, 5e-4);
+    near(falling.limit(), 1.228_72 * 0.001_67, 1e-15);
+}
+
+/// A mass on a spring and a damper.
+struct Sprung(SpringDamper<f64>);
+impl Dynamics<f64> for Sprung {
+    type State = [f64; 2];
+    fn derivative(&self, _: f64, x: &[f64; 2], dx: &mut [f64; 2]) {
+        *dx = [x[1], -self.0.torque(x[0], x[1])];
+    }
+}
+
+#[test]
+fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
+    // x'' + 2 D w x' + w^2 (x - 1) = 0 with w = 3, D = 0.2, from 2 at rest.
+    let (w, d): (f64, f64) = (3.0, 0.2);
+    let element = SpringDamper { spring: w * w, damper: 2.0 * d * w, rest: 1.0 };
+    let (x, _) = simulate(Sprung(element), [2.0, 0.0], 4.0, |_, _, x| x[0]);
+    let wd = w * (1.0 - d * d).sqrt();
+    for t in [0.3_f64, 1.0, 2.7, 4.0] {
+        let exact = 1.0 + (-d * w * t).exp() * ((wd * t).cos() + d * w / wd * (wd * t).sin());
+        near(x.at(t), exact, 1e-9);
+    }
+    near(element.energy(2.0), 4.5, 1e-15);
+}
+
+/// `x' = y`, where `y` follows `2 sin t` through an element with a mode.
+struct Through<E>(E);
+
+trait Element {
+    fn output(&self, u: f64) -> f64;
+    fn guard(&self, u: f64, rate: f64) -> f64;
+    fn switch(&mut self, u: f64);
+}
+
+impl Element for Saturation<f64> {
+    fn output(&self, u: f64) -> f64 {
+        Saturation::output(self, u)
+    }
+    fn guard(&self, u: f64, _: f64) -> f64 {
+        Saturation::guard(self, u)
+    }
+    fn switch(&mut self, u: f64) {
+        Saturation::switch(self, u);
+    }
+}
+
+impl Element for DeadZone<f64> {
+    fn output(&self, u: f64) -> f64 {
+        DeadZone::output(self, u)
+    }
+    fn guard(&self, u: f64, _: f64) -> f64 {
+        DeadZone::guard(self, u)
+    }
+    fn switch(&mut self, u: f64) {
+        DeadZone::switch(self, u);
+    }
+}
+
+impl Element for Backlash<f64> {
+    fn output(&self, u: f64) -> f64 {
+        Backlash::output(self, u)
+    }
+    fn guard(&self, u: f64, rate: f64) -> f64 {
+        Backlash::guard(self, u, rate)
+    }
+    fn switch(&mut self, u: f64) {
+        Backlash::switch(self, u);
+    }
+}
+
+impl<E: Element> Dynamics<f64> for Through<E> {
+    type State = [f64; 1];
+    fn derivative(&self, t: f64, _: &[f64; 1], dx: &mut [f64; 1]) {
+        dx[0] = self.0.output(2.0 * t.sin());
+    }
+    fn longest_step(&self) -> f64 {
+        0.4
+    }
+    fn guards(&self) -> usize {
+        1
+    }
+    fn guard(&self, _: usize, t: f64, _: &[f64; 1]) -> f64 {
+        self.0.guard(2.0 * t.sin(), 2.0 * t.cos())
+    }
+    fn switch(&mut self, _: usize, t: f64, _: &mut [f64; 1]) -> &'static str {
+        self.0.switch(2.0 * t.sin());
+        ""
+    }
+}
+
+use std::f64::consts::{FRAC_PI_6, PI, TAU};
+
+#[test]
+fn a_saturated_sine_is_cut_where_it_meets_the_limit() {
+    let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0)), [0.0], TAU, |_, _, x| x[0]);
+    for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
+        near(*event, exact, 1e-9);
+    }
+    assert_eq!(events.len(), 4);
+    // Half a period: twice 2 (1 - cos(pi/6)), and 1 for 2 pi/3.
+    near(integral.at(PI), 4.0 * (1.0 - FRAC_PI_6.cos()) + 2.0 * PI / 3.0, 1e-9);
+    near(integral.at(TAU), 0.0, 1e-9);
+}
+
+#[test]
+fn a_dead_zone_answers_only_beyond_its_edges() {
+    let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0)), [0.0], TAU, |_, _, x| x[0]);
+    for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
+        near(*event, exact, 1e-9);
+    }
+    // What a saturation leaves: 4 - its integral over half a period.
+    near(integral.at(PI), 4.0 - 4.0 * (1.0 - FRAC_PI_6.cos()) - 2.0 * PI / 3.0, 1e-9);
+}
+
+#[test]
+fn play_is_crossed_at_every_reversal() {
+    let (y, events) =
+        simulate(Through(Backlash::new(1.0, 0.0)), [0.0], TAU, |through, t, _| through.0.output(2.0 * t.sin()));
+    // Touches at sin = 1/4, reverses at pi/2, touches below where 2 sin t = 1.5 - 0.5, reverses at 3 pi/2, and above.
+    let exact = [0.25_f64.asin(), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
+    assert_eq!(events.len(), exact.len(), "{events:?}");
+    for (event, exact) in events.iter().zip(exact) {
+        near(*event, exact, 1e-7);
+    }
+    for (t, exact) in
+        [(0.1, 0.0), (1.0, 2.0 * 1.0_f64.sin() - 0.5), (2.0, 1.5), (4.0, 2.0 * 4.0_f64.sin() + 0.5), (5.5, -1.5)]
+    {
+        near(y.at(t), exact, 1e-6);
+    }
+}
+
+#[test]
+fn a_backlash_that_is_moved_by_a_jump_is_pushed_along() {
+    let mut play = Backlash::new(1.0, 0.0);
+    play.settle(0.0, 3.0, 0.0);
+    near(play.output(3.0), 2.5, 0.0);
+    play.settle(3.0, 2.4, -1.0);
+    near(play.output(2.4), 2.5, 0.0);
+}
+
+/// `T y' = 1 - y`.
+struct Lagging<S>(Lag<S>);
+impl<S: Scalar> Dynamics<S> for Lagging<S> {
+    type State = [S; 1];
+    fn derivative(&self, _: f64, x: &[S; 1], dx: &mut [S; 1]) {
+        dx[0] = self.0.derivative(S::from(1.0), x[0]);
+    }
+}
+
+#[test]
+fn a_lag_approaches_a_step_exponentially() {
+    let start = [Dual::<1>::from(0.0)];
+    let mut lag = Lagging(Lag { time: Dual::variable(0.5, 0) });
+    let (y, _) = integrate(&mut lag, 0.0, 2.0, start, &TIGHT, &mut ()).unwrap();
+    // y = 1 - exp(-t/T), dy/dT = -t/T^2 exp(-t/T).
+    near(y[0].value, 1.0 - (-4.0_f64).exp(), 1e-10);
+    near(y[0].tangent[0], -8.0 * (-4.0_f64).exp(), 1e-8);
+}
+
+/// `y' = -y(t - T)`, `y = 1` up to 0.
+struct Delayed<S>(Delay<S>);
+impl<S: Scalar> Dynamics<S> for Delayed<S> {
+    type State = [S; 1];
+    fn derivative(&self, t: f64, _: &[S; 1], dx: &mut [S; 1]) {
+        dx[0] = -self.0.at(t);
+    }
+    fn longest_step(&self) -> f64 {
+        self.0.longest_step()
+    }
+    fn next_break(&self, t: f64) -> f64 {
+        self.0.next_break(t)
+    }
+    fn pass_break(&mut self, t: f64, _: &mut [S; 1]) {
+        self.0.pass_break(t);
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    fn accepted(&mut self, step: &Step<[S; 1]>) {
+        let mut x = [S::from(0.0)];
+        let nodes = Delay::<S>::NODES.map(|s| {
+            step.state(s, &mut x);
+            x[0]
+        });
+        self.0.push(step.start, step.start + step.taken, nodes);
+    }
+}
+
+#[test]
+fn a_delayed_feedback_is_its_polynomials() {
+    // By the method of steps: sum over k of (-1)^k (t - (k - 1) T)^k / k!, as far as t > (k - 1) T; here T = 1.
+    let exact = |t: f64| {
+        1.0 - t + (t - 1.0).max(0.0).powi(2) / 2.0 - (t - 2.0).max(0.0).powi(3) / 6.0
+            + (t - 3.0).max(0.0).powi(4) / 24.0
+    };
+    let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), [1.0], 4.0, |_, _, x| x[0]);
+    for t in [0.5, 1.0, 1.3, 2.2, 3.0, 4.0] {
+        near(y.at(t), exact(t), 1e-9);
+    }
+    // dy/dT at t = 2.5: -(t - T) + (t - 2T)^2 at T = 1.
+    let mut dynamics = Delayed(Delay::new(Dual::<1>::variable(1.0, 0), Dual::from(1.0)));
+    let (y, _) = integrate(&mut dynamics, 0.0, 2.5, [Dual::from(1.0)], &TIGHT, &mut ()).unwrap();
+    near(y[0].tangent[0], -1.5 + 0.25, 1e-8);
+}
+
+/// A step from 0 to 1 at 0.3 s, delayed by half a second, integrated.
+struct DelayedStep(Delay<f64>, f64);
+impl Dynamics<f64> for DelayedStep {
+    type State = [f64; 1];
+    fn derivative(&self, t: f64, _: &[f64; 1], dx: &mut [f64; 1]) {
+        dx[0] = self.0.at(t);
+    }
+    fn longest_step(&self) -> f64 {
+        self.0.longest_step()
+    }
+    fn next_break(&self, t: f64) -> f64 {
+        self.0.next_break(t).min(if t < 0.3 { 0.3 } else { f64::INFINITY })
+    }
+    fn pass_break(&mut self, t: f64, _: &mut [f64; 1]) {
+        self.0.pass_break(t);
+        self.1 = f64::from(u8::from(t >= 0.3));
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    fn accepted(&mut self, step: &Step<[f64; 1]>) {
+        self.0.push(step.start, step.start + step.taken, [self.1; 5]);
+    }
+}
+
+#[test]
+fn a_jump_comes_out_of_a_delay_as_a_jump() {
+    let (y, _) = simulate(DelayedStep(Delay::new(0.5, 0.0), 0.0), [0.0], 2.0, |_, _, x| x[0]);
+    near(y.at(0.8), 0.0, 1e-14);
+    near(y.at(2.0), 1.2, 1e-12);
+}

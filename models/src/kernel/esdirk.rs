@@ -1,0 +1,443 @@
+//! The implicit Runge-Kutta method ARK4(3)6L\[2\]SA-ESDIRK: order 4(3), L-stable, stiffly accurate.
+//!
+//! The first stage is explicit and the last one is the new state, so that its derivative begins the next step. Each of
+//! the other five solves `z - h/4 f(z) = r` by Newton's method with one matrix `I - h/4 J` for all, which is kept as long
+//! as it serves. Dense output is the cubic Hermite polynomial of both ends.
+//!
+//! Tangents go through the same equations: once the value of a stage has converged it is frozen, and its tangents, which
+//! obey linear equations with the same matrix, are iterated to the end. So they change no value.
+//!
+//! Source: C. Kennedy, M. Carpenter, Applied Numerical Mathematics 44 (2003) 139-181, appendix C (coefficients); E. Hairer,
+//! G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996), section IV.8 (Newton's method, error).
+
+use mops_core::{Scalar, Work};
+
+use super::banded::Banded;
+use super::integrate::{Attempt, Method, scaled_norm};
+use super::{Dynamics, Tolerance};
+
+/// The diagonal of every implicit stage.
+const GAMMA: f64 = 0.25;
+
+/// Times of the stages.
+const C: [f64; 6] = [0.0, 1.0 / 2.0, 83.0 / 250.0, 31.0 / 50.0, 17.0 / 20.0, 1.0];
+
+/// What a stage takes of the ones before it.
+const A: [[f64; 5]; 6] = [
+    [0.0; 5],
+    [1.0 / 4.0, 0.0, 0.0, 0.0, 0.0],
+    [8611.0 / 62500.0, -1743.0 / 31250.0, 0.0, 0.0, 0.0],
+    [5_012_029.0 / 34_652_500.0, -654_441.0 / 2_922_500.0, 174_375.0 / 388_108.0, 0.0, 0.0],
+    [
+        15_267_082_809.0 / 155_376_265_600.0,
+        -71_443_401.0 / 120_774_400.0,
+        730_878_875.0 / 902_184_768.0,
+        2_285_395.0 / 8_070_912.0,
+        0.0,
+    ],
+    [82_889.0 / 524_892.0, 0.0, 15_625.0 / 83_664.0, 69_875.0 / 102_672.0, -2260.0 / 8211.0],
+];
+
+/// Weights of the method of order 3, for the error.
+const EMBEDDED: [f64; 6] = [
+    4_586_570_599.0 / 29_645_900_160.0,
+    0.0,
+    178_811_875.0 / 945_068_544.0,
+    814_220_225.0 / 1_159_782_912.0,
+    -3_700_637.0 / 11_593_932.0,
+    61_727.0 / 225_920.0,
+];
+
+/// Newton's method stops where the error left is this part of the tolerance.
+const NEWTON: f64 = 0.02;
+
+/// Iterations of Newton's method for a stage.
+const ITERATIONS: usize = 8;
+
+/// The stages of a step, and the matrix they are solved with.
+pub(super) struct Esdirk<X> {
+    k: [X; 6],
+    base: X,
+    update: X,
+    jacobian: Banded,
+    /// Columns that can be moved at once to take differences: no two of them meet in a row.
+    groups: Vec<Vec<usize>>,
+    /// The rows of every column.
+    rows: Vec<Vec<usize>>,
+    factors: Banded,
+    /// Step for which the factors are; 0 if there are none.
+    factors_for: f64,
+    /// Whether the Jacobian is that of the present start of the step.
+    fresh: bool,
+    /// How much of the error Newton's method leaves per iteration, as `rate / (1 - rate)`.
+    contraction: f64,
+    column: Vec<f64>,
+}
+
+impl<S: Scalar, D: Dynamics<S>> Method<S, D> for Esdirk<D::State> {
+    const ERROR_ORDER: f64 = 4.0;
+
+    fn new(f: &D, x: &D::State) -> Self {
+        let n = x.as_ref().len();
+        let rows = match f.jacobian_pattern() {
+            Some(pattern) => {
+                let mut rows = vec![Vec::new(); n];
+                pattern.into_iter().for_each(|(row, column)| rows[column].push(row));
+                rows
+            }
+            None => vec![(0..n).collect(); n],
+        };
+        let places = || rows.iter().enumerate().flat_map(|(column, rows)| rows.iter().map(move |&row| (row, column)));
+        let lower = places().map(|(row, column)| row.saturating_sub(column)).max().unwrap_or(0);
+        let upper = places().map(|(row, column)| column.saturating_sub(row)).max().unwrap_or(0);
+        let groups = groups(&rows);
+        Self {
+            k: std::array::from_fn(|_| x.clone()),
+            base: x.clone(),
+            update: x.clone(),
+            jacobian: Banded::zeros(n, lower, upper),
+            groups,
+            rows,
+            factors: Banded::zeros(n, lower, upper),
+            factors_for: 0.0,
+            fresh: false,
+            contraction: 1.0,
+            column: vec![0.0; n],
+        }
+    }
+
+    fn restart(&mut self, f: &D, t: f64, x: &D::State, work: &mut Work) {
+        f.derivative(t, x, &mut self.k[0]);
+        work.derivatives += 1;
+        self.factors_for = 0.0;
+        self.fresh = false;
+    }
+
+    fn slope(&self) -> &D::State {
+        &self.k[0]
+    }
+
+    fn attempt(&mut self, f: &D, at: Attempt<'_, D::State>, next: &mut D::State, work: &mut Work) -> f64 {
+        // Close to the step of the factors they still serve: Newton's method makes up for the difference.
+        if self.factors_for == 0.0 || !(0.8..=1.25).contains(&(at.h / self.factors_for)) {
+            self.factorise(f, &at, work);
+        }
+        loop {
+            if (1..6).all(|stage| self.stage(f, &at, stage, next, work)) {
+                return self.error(&at, next);
+            }
+            // Once more with a Jacobian of this place; a fresh one that does not serve asks for a smaller step.
+            if self.fresh && self.factors_for == at.h {
+                self.factors_for = 0.0;
+                return f64::NAN;
+            }
+            self.fresh = false;
+            self.factorise(f, &at, work);
+        }
+    }
+
+    fn advance(&mut self) {
+        self.k.swap(0, 5);
+        self.fresh = false;
+    }
+
+    fn dense(&self, h: f64, x: &D::State, next: &D::State, dense: &mut [D::State; 5]) {
+        for j in 0..x.as_ref().len() {
+            let (x0, x1) = (x.as_ref()[j], next.as_ref()[j]);
+            let (slope0, slope1) = (self.k[0].as_ref()[j] * h, self.k[5].as_ref()[j] * h);
+            let difference = x1 - x0;
+            let bend = slope0 - difference;
+            let coefficients = [x0, difference, bend, difference - slope1 - bend, S::from(0.0)];
+            for (dense, coefficient) in dense.iter_mut().zip(coefficients) {
+                dense.as_mut()[j] = coefficient;
+            }
+        }
+    }
+}
+
+impl<X: Clone> Esdirk<X> {
+    /// Makes the factors for a step, with a new Jacobian where the last one did not serve.
+    fn factorise<S: Scalar, D: Dynamics<S, State = X>>(&mut self, f: &D, at: &Attempt<'_, X>, work: &mut Work)
+    where
+        X: AsRef<[S]> + AsMut<[S]>,
+    {
+        if !self.fresh {
+            self.take_jacobian(f, at, work);
+            self.fresh = true;
+        }
+        self.factors.set_shifted(&self.jacobian, GAMMA * at.h);
+        // A singular matrix makes a solution that is not finite, and so a smaller step.
+        self.factors.factorise();
+        self.factors_for = at.h;
+        self.contraction = 1.0;
+    }
+
+    fn take_jacobian<S: Scalar, D: Dynamics<S, State = X>>(&mut self, f: &D, at: &Attempt<'_, X>, work: &mut Work)
+    where
+        X: AsRef<[S]> + AsMut<[S]>,
+    {
+        let Attempt { t, x, tolerance, .. } = *at;
+        self.jacobian.clear();
+        let jacobian = &mut self.jacobian;
+        if f.jacobian(t, x, &mut |row, column, value| jacobian.set(row, column, value)) {
+            work.derivatives += 1;
+            return;
+        }
+        let (moved, slopes) = (&mut self.base, &mut self.update);
+        // The derivative kept in `k` is right to the tolerance only, which differences would magnify.
+        f.derivative(t, x, slopes);
+        work.derivatives += 1;
+        self.column.iter_mut().zip(slopes.as_ref()).for_each(|(c, s)| *c = s.value());
+        for group in &self.groups {
+            moved.as_mut().copy_from_slice(x.as_ref());
+            // Steps of the square root of the rounding, relative to the state or to where it begins to count.
+            let step = |j: usize| {
+                let size = x.as_ref()[j].value().abs().max(tolerance.absolute / tolerance.relative);
+                f64::EPSILON.sqrt() * size
+            };
+            group.iter().for_each(|&j| moved.as_mut()[j] = x.as_ref()[j] + step(j));
+            f.derivative(t, moved, slopes);
+            work.derivatives += 1;
+            for &j in group {
+                for &i in &self.rows[j] {
+                    let slope = (slopes.as_ref()[i].value() - self.column[i]) / step(j);
+                    self.jacobian.set(i, j, slope);
+                }
+            }
+        }
+    }
+
+    /// Solves one stage, which becomes `z`; `false` where Newton's method does not converge.
+    fn stage<S: Scalar, D: Dynamics<S, State = X>>(
+        &mut self,
+        f: &D,
+        at: &Attempt<'_, X>,
+        stage: usize,
+        z: &mut X,
+        work: &mut Work,
+    ) -> bool
+    where
+        X: AsRef<[S]> + AsMut<[S]>,
+    {
+        let Attempt { t, h, x, tolerance } = *at;
+        let n = x.as_ref().len();
+        for j in 0..n {
+            let mut sum = x.as_ref()[j];
+            for (k, a) in self.k[..stage].iter().zip(A[stage]) {
+                sum += k.as_ref()[j] * (h * a);
+            }
+            self.base.as_mut()[j] = sum;
+            // The first guess: the derivative stays that of the stage before in time.
+            z.as_mut()[j] = sum + self.k[if stage == 2 { 0 } else { stage - 1 }].as_ref()[j] * (h * GAMMA);
+        }
+        let time = t + C[stage] * h;
+        let mut last = f64::NAN;
+        let mut converged = false;
+        // How much is left of the error when the iteration begins is known from the steps before.
+        self.contraction = self.contraction.max(1e-16).powf(0.8);
+        for iteration in 0..ITERATIONS {
+            self.newton_step(f, time, h, z, work);
+            let differences = self.update.as_ref().iter().zip(x.as_ref());
+            let size = scaled_norm(differences.map(|(d, x)| (d.value(), x.value().abs())), tolerance);
+            if !size.is_finite() {
+                return false;
+            }
+            if iteration > 0 {
+                let rate = size / last;
+                if rate >= 1.0 {
+                    return false;
+                }
+                self.contraction = rate / (1.0 - rate);
+                // Too slow to arrive in the iterations that are left.
+                #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+                let left = rate.powi((ITERATIONS - 1 - iteration) as i32);
+                if left * self.contraction * size > NEWTON {
+                    return false;
+                }
+            }
+            for (z, d) in z.as_mut().iter_mut().zip(self.update.as_ref()) {
+                *z += *d;
+            }
+            last = size;
+            if self.contraction * size <= NEWTON || size == 0.0 {
+                converged = true;
+                break;
+            }
+        }
+        if converged && S::DIRECTIONS > 0 {
+            self.finish_tangents(f, time, h, z, tolerance, work);
+        }
+        let k = &mut self.k[stage];
+        for j in 0..n {
+            k.as_mut()[j] = (z.as_ref()[j] - self.base.as_ref()[j]) / (h * GAMMA);
+        }
+        converged
+    }
+
+    /// The step of Newton's method from `z`, value and tangents, into `update`.
+    fn newton_step<S: Scalar, D: Dynamics<S, State = X>>(&mut self, f: &D, t: f64, h: f64, z: &X, work: &mut Work)
+    where
+        X: AsRef<[S]> + AsMut<[S]>,
+    {
+        f.derivative(t, z, &mut self.update);
+        work.derivatives += 1;
+        for (j, update) in self.update.as_mut().iter_mut().enumerate() {
+            *update = self.base.as_ref()[j] + *update * (h * GAMMA) - z.as_ref()[j];
+        }
+        solve(&self.factors, self.update.as_mut(), &mut self.column);
+    }
+
+    /// Iterates the tangents of a stage whose value stays.
+    fn finish_tangents<S: Scalar, D: Dynamics<S, State = X>>(
+        &mut self,
+        f: &D,
+        t: f64,
+        h: f64,
+        z: &mut X,
+        tolerance: &Tolerance,
+        work: &mut Work,
+    ) where
+        X: AsRef<[S]> + AsMut<[S]>,
+    {
+        for _ in 0..ITERATIONS {
+            self.newton_step(f, t, h, z, work);
+            let (mut moved, mut size) = (0.0_f64, 0.0_f64);
+            for (z, d) in z.as_mut().iter_mut().zip(self.update.as_ref()) {
+                *z += *d - d.value();
+                moved = d.tangents().iter().fold(moved, |m, t| m.max(t.abs()));
+                size = z.tangents().iter().fold(size, |m, t| m.max(t.abs()));
+            }
+            if moved <= NEWTON * tolerance.relative * size {
+                return;
+            }
+        }
+    }
+
+    /// The error over the tolerance, with what a stiff motion adds to it damped away by the matrix.
+    fn error<S: Scalar>(&mut self, at: &Attempt<'_, X>, next: &X) -> f64
+    where
+        X: AsRef<[S]>,
+    {
+        let Attempt { h, x, tolerance, .. } = *at;
+        for (j, error) in self.column.iter_mut().enumerate() {
+            let weight = |i: usize| if i < 5 { A[5][i] } else { GAMMA };
+            *error = h * (0..6).map(|i| (weight(i) - EMBEDDED[i]) * self.k[i].as_ref()[j].value()).sum::<f64>();
+        }
+        self.factors.solve(&mut self.column);
+        let sizes = x.as_ref().iter().zip(next.as_ref()).map(|(a, b)| a.value().abs().max(b.value().abs()));
+        scaled_norm(self.column.iter().copied().zip(sizes), tolerance)
+    }
+}
+
+/// Solves for every tangent and for the value.
+fn solve<S: Scalar>(factors: &Banded, b: &mut [S], column: &mut [f64]) {
+    for direction in 0..S::DIRECTIONS {
+        column.iter_mut().zip(b.iter()).for_each(|(c, b)| *c = b.tangents()[direction]);
+        factors.solve(column);
+        b.iter_mut().zip(column.iter()).for_each(|(b, &c)| b.set_tangent(direction, c));
+    }
+    column.iter_mut().zip(b.iter()).for_each(|(c, b)| *c = b.value());
+    factors.solve(column);
+    b.iter_mut().zip(column.iter()).for_each(|(b, &c)| *b = b.chain(c, 1.0));
+}
+
+/// Columns in groups of which no two meet in a row, the first that fits taken for each.
+///
+/// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974) 117-119.
+fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(Vec<usize>, Vec<bool>)> = Vec::new();
+    for (column, of_column) in rows.iter().enumerate() {
+        let fits = |(_, taken): &&mut (Vec<usize>, Vec<bool>)| of_column.iter().all(|&row| !taken[row]);
+        let group = match groups.iter_mut().find(fits) {
+            Some(group) => group,
+            None => {
+                groups.push((Vec::new(), vec![false; rows.len()]));
+                groups.last_mut().expect("one was pushed")
+            }
+        };
+        group.0.push(column);
+        of_column.iter().for_each(|&row| group.1[row] = true);
+    }
+    groups.into_iter().map(|(columns, _)| columns).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::{Dual, Failure};
+
+    use super::super::{IntegrationMethod, integrate};
+    use super::*;
+
+    fn stiff(relative: f64) -> Tolerance {
+        Tolerance { relative, absolute: relative * 1e-3, method: IntegrationMethod::Stiff, ..Tolerance::default() }
+    }
+
+    /// `x'' = mu (1 - x^2) x' - x`.
+    struct VanDerPol<S>(S);
+    impl<S: Scalar> Dynamics<S> for VanDerPol<S> {
+        type State = [S; 2];
+        fn derivative(&self, _: f64, x: &[S; 2], dx: &mut [S; 2]) {
+            *dx = [x[1], self.0 * (-x[0] * x[0] + 1.0) * x[1] - x[0]];
+        }
+    }
+
+    #[test]
+    fn van_der_pol_meets_its_published_value() {
+        // Reference at t = 2000 for mu = 1000 from (2, 0): 1.706167732170483 (test set for IVP solvers, Bari, vdpolm).
+        let (x, work) = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, [2.0, 0.0], &stiff(1e-8), &mut ()).unwrap();
+        assert!((x[0] - 1.706_167_732_170_483).abs() < 1e-6, "{x:?} {work:?}");
+        let explicit = Tolerance { method: IntegrationMethod::Explicit, ..stiff(1e-8) };
+        let failure = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, [2.0, 0.0], &explicit, &mut ());
+        assert!(matches!(failure, Err(Failure::StepLimit(_))));
+    }
+
+    #[test]
+    fn the_error_falls_with_the_fourth_power_of_the_step() {
+        // `x' = -cos(t) x^2`, `x(0) = 1`, has the solution `1/(1 + sin t)`.
+        struct Rational;
+        impl Dynamics<f64> for Rational {
+            type State = [f64; 1];
+            fn derivative(&self, t: f64, x: &[f64; 1], dx: &mut [f64; 1]) {
+                dx[0] = -t.cos() * x[0] * x[0];
+            }
+        }
+        let fixed = |steps: u32| {
+            let tolerance = Tolerance { relative: 1e-10, absolute: 1e-10, ..stiff(1e-10) };
+            let h = 2.0 / f64::from(steps);
+            let (mut x, mut next, mut work) = ([1.0], [0.0], Work::default());
+            let mut method = <Esdirk<[f64; 1]> as Method<f64, Rational>>::new(&Rational, &x);
+            for i in 0..steps {
+                let t = h * f64::from(i);
+                Method::<f64, Rational>::restart(&mut method, &Rational, t, &x, &mut work);
+                let attempt = Attempt { t, h, x: &x, tolerance: &tolerance };
+                assert!(method.attempt(&Rational, attempt, &mut next, &mut work).is_finite());
+                x = next;
+            }
+            (x[0] - 1.0 / (1.0 + 2f64.sin())).abs()
+        };
+        let order = (fixed(20) / fixed(40)).log2();
+        assert!((order - 4.0).abs() < 0.25, "{order}");
+    }
+
+    #[test]
+    fn tangents_are_exact_and_change_no_value() {
+        let tolerance = stiff(1e-9);
+        let run = |mu: f64| integrate(&mut VanDerPol(mu), 0.0, 5.0, [2.0, 0.0], &tolerance, &mut ()).unwrap().0;
+        let start = [Dual::from(2.0), Dual::from(0.0)];
+        let mut dual = VanDerPol(Dual::<1>::variable(10.0, 0));
+        let (x, _) = integrate(&mut dual, 0.0, 5.0, start, &tolerance, &mut ()).unwrap();
+        assert_eq!(x.map(|x| x.value), run(10.0));
+        let (high, low) = (run(10.0 + 1e-3), run(10.0 - 1e-3));
+        for i in 0..2 {
+            let slope = (high[i] - low[i]) / 2e-3;
+            assert!((x[i].tangent[0] - slope).abs() < 1e-5 * slope.abs().max(1e-2), "{:?} {slope}", x[i]);
+        }
+    }
+
+    #[test]
+    fn columns_that_meet_in_no_row_share_a_group() {
+        let tridiagonal: Vec<Vec<usize>> =
+            (0..9_usize).map(|j| (j.saturating_sub(1)..=(j + 1).min(8)).collect()).collect();
+        assert_eq!(groups(&tridiagonal).len(), 3);
+    }
+}

@@ -1,0 +1,219 @@
+//! Mechanisms: joints coupled by a mass matrix, with the friction of their bearings.
+
+use mops_core::{Interface, Parameter, Scalar, State, Variable};
+
+use super::Dynamics;
+use super::elements::BearingFriction;
+use super::friction::{Contact, Moment, balance};
+
+/// The rigid bodies of a mechanism with `N` joints: `M(q) q'' = f(t, q, q') - friction`.
+pub trait Bodies<S: Scalar, const N: usize> {
+    /// Mass matrix (kg m2) and torques without bearing friction (N m) at angles `q` (rad) and speeds `w` (rad/s).
+    fn mass_and_force(&self, t: f64, q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]);
+
+    /// As [`Dynamics::next_break`].
+    fn next_break(&self, _t: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    /// As [`Dynamics::longest_step`].
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// As [`Dynamics::pass_break`].
+    fn pass_break(&mut self, _t: f64) {}
+}
+
+/// A joint as the user meets it.
+#[derive(Debug)]
+pub struct Joint {
+    /// Name of its angle; `d` before it names the speed, `0` behind them the start values.
+    pub angle: &'static str,
+    /// What turns.
+    pub about: &'static str,
+    /// Start angle where the study gives none, rad.
+    pub start: f64,
+    /// What is said when it sticks, slides, and is driven and braked by a friction that changes its sign.
+    pub events: [&'static str; 4],
+}
+
+/// Signals of the joints (angle and speed of each in turn), start values behind `parameters`, states.
+pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<Variable>) -> Interface {
+    let mut interface = Interface::default();
+    for Joint { angle, about, start, .. } in joints {
+        let speed = format!("d{angle}");
+        let what = [format!("angle of the {about}"), format!("speed of the {about}")];
+        for ((name, unit, rate_of), (about, start)) in
+            [((*angle).to_owned(), "rad", None), (speed, "rad/s", Some((*angle).to_owned()))]
+                .into_iter()
+                .zip(what.into_iter().zip([*start, 0.0]))
+        {
+            let parameter = format!("{name}0");
+            parameters.push(Parameter::new(&parameter, unit, format!("{about} at the start")).with_default(start));
+            interface.signals.push(Variable::new(&name, unit, about));
+            interface.states.push(State { name: name.clone(), start: parameter, signal: Some(name), rate_of });
+        }
+    }
+    interface.signals.extend(inputs.iter().cloned());
+    Interface { parameters, inputs, ..interface }
+}
+
+/// A mechanism with its friction, and how its joints move; the state is angle and speed of each joint in turn, `M = 2 N`.
+pub struct Mechanism<S, B, const N: usize, const M: usize> {
+    /// The bodies.
+    pub bodies: B,
+    friction: [BearingFriction<S>; N],
+    contact: [Contact; N],
+    /// Lines of the friction tables over which the joints slide.
+    line: [usize; N],
+    /// Whether the friction of a joint drives it at present.
+    drives: [bool; N],
+    guards: Vec<Guard>,
+    events: [[&'static str; 4]; N],
+    started: bool,
+}
+
+/// What a joint is watched for.
+#[derive(Debug, Clone, Copy)]
+enum Guard {
+    /// Sliding: its speed in its direction. Stuck: what is left of the limit.
+    Contact(usize),
+    /// Sliding: the line of its friction table.
+    Line(usize),
+    /// The sign of its friction: a table that falls below zero makes no physical sense there, and says so.
+    Sign(usize),
+}
+
+impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B, N, M> {
+    /// A mechanism of bodies, the friction of its joints, and the joints.
+    pub fn new(bodies: B, friction: [BearingFriction<S>; N], joints: &[Joint; N]) -> Self {
+        const { assert!(M == 2 * N, "a state is angle and speed of each joint") };
+        let watched = |i: usize| {
+            let sign = friction[i].drives_from().map(|_| Guard::Sign(i));
+            let contact = (sign.is_some() || !friction[i].is_viscous()).then_some(Guard::Contact(i));
+            let line = (!friction[i].table().is_straight()).then_some(Guard::Line(i));
+            contact.into_iter().chain(line).chain(sign)
+        };
+        let guards = (0..N).flat_map(watched).collect();
+        let events = std::array::from_fn(|i| joints[i].events);
+        let contact = [Contact::Stuck; N];
+        Self { bodies, friction, contact, line: [0; N], drives: [false; N], guards, events, started: false }
+    }
+
+    /// How the joints move.
+    pub fn contact(&self) -> &[Contact; N] {
+        &self.contact
+    }
+
+    /// Angles and speeds.
+    fn split(x: &[S; M]) -> ([S; N], [S; N]) {
+        (std::array::from_fn(|i| x[2 * i]), std::array::from_fn(|i| x[2 * i + 1]))
+    }
+
+    /// Speed of a joint in the direction in which it slides, and its friction torque there.
+    fn sliding(&self, i: usize, speed: S) -> (S, S) {
+        let forward = match self.contact[i] {
+            Contact::Forward => speed,
+            Contact::Backward => -speed,
+            Contact::Stuck => S::from(0.0),
+        };
+        (forward, self.friction[i].table().on(self.line[i], forward))
+    }
+
+    /// Accelerations and friction torques.
+    fn balance(&self, t: f64, x: &[S; M]) -> ([S; N], [S; N]) {
+        let (q, w) = Self::split(x);
+        let (mass, force) = self.bodies.mass_and_force(t, &q, &w);
+        let sliding = std::array::from_fn(|i| self.sliding(i, w[i]).1);
+        balance(&mass, &force, &sliding, &self.contact)
+    }
+
+    fn settle(&mut self, t: f64, x: &[S; M], wish: &[Contact; N], released: Option<usize>) {
+        let (q, w) = Self::split(x);
+        let (mass, force) = self.bodies.mass_and_force(t, &q, &w);
+        let mass = mass.map(|row| row.map(Scalar::value));
+        let (force, speed) = (force.map(Scalar::value), w.map(Scalar::value));
+        let sliding = std::array::from_fn(|i| self.friction[i].sliding(w[i].abs()).value());
+        let limit = std::array::from_fn(|i| self.friction[i].limit().value());
+        let moment = Moment { mass: &mass, force: &force, sliding: &sliding, limit: &limit, speed: &speed };
+        self.contact = moment.contacts(wish, released);
+        self.line = std::array::from_fn(|i| self.friction[i].table().line_at(w[i].abs()));
+        self.drives = std::array::from_fn(|i| speed[i] != 0.0 && sliding[i] < 0.0);
+    }
+}
+
+impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for Mechanism<S, B, N, M> {
+    type State = [S; M];
+
+    fn derivative(&self, t: f64, x: &[S; M], dx: &mut [S; M]) {
+        let (acceleration, _) = self.balance(t, x);
+        for i in 0..N {
+            dx[2 * i] = x[2 * i + 1];
+            dx[2 * i + 1] = acceleration[i];
+        }
+    }
+
+    fn guards(&self) -> usize {
+        self.guards.len()
+    }
+
+    fn guard(&self, index: usize, t: f64, x: &[S; M]) -> S {
+        match self.guards[index] {
+            Guard::Contact(i) if self.contact[i] == Contact::Stuck => {
+                self.friction[i].limit() - self.balance(t, x).1[i].abs()
+            }
+            Guard::Contact(i) => x[2 * i + 1] * self.contact[i].sign(),
+            Guard::Line(i) | Guard::Sign(i) if self.contact[i] == Contact::Stuck => S::from(1.0),
+            Guard::Line(i) => self.friction[i].table().guard(self.line[i], self.sliding(i, x[2 * i + 1]).0),
+            Guard::Sign(i) => {
+                let torque = self.sliding(i, x[2 * i + 1]).1;
+                if self.drives[i] { -torque } else { torque }
+            }
+        }
+    }
+
+    fn switch(&mut self, index: usize, t: f64, x: &mut [S; M]) -> &'static str {
+        match self.guards[index] {
+            Guard::Line(i) => {
+                let (speed, _) = self.sliding(i, x[2 * i + 1]);
+                self.line[i] = self.friction[i].table().next(self.line[i], speed);
+                ""
+            }
+            Guard::Sign(i) => {
+                self.drives[i] = !self.drives[i];
+                self.events[i][if self.drives[i] { 2 } else { 3 }]
+            }
+            Guard::Contact(i) => {
+                let mut wish = self.contact;
+                let was_stuck = self.contact[i] == Contact::Stuck;
+                if was_stuck {
+                    wish[i] = Contact::of(self.balance(t, x).1[i].value());
+                } else {
+                    wish[i] = Contact::Stuck;
+                    x[2 * i + 1] = S::from(0.0);
+                }
+                self.settle(t, x, &wish, was_stuck.then_some(i));
+                self.events[i][usize::from(self.contact[i] != Contact::Stuck)]
+            }
+        }
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        self.bodies.next_break(t)
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.bodies.longest_step()
+    }
+
+    fn pass_break(&mut self, t: f64, x: &mut [S; M]) {
+        self.bodies.pass_break(t);
+        let wish = if self.started { self.contact } else { [Contact::Stuck; N] };
+        self.started = true;
+        self.settle(t, x, &wish, None);
+    }
+}
+
+#[cfg(test)]
+mod tests;

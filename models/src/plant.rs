@@ -1,0 +1,198 @@
+//! A plant given by its transfer function, whose coefficients may be parameters of the model.
+
+use mops_core::{Failure, Mistake, Scalar};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
+use serde::de::{self, Deserializer, Visitor};
+
+/// A transfer function, by poles and zeros or by coefficients.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub(crate) struct Plant {
+    /// Real poles, 1/s.
+    poles: Option<Vec<Coefficient>>,
+    /// Real zeros, 1/s.
+    zeros: Vec<Coefficient>,
+    /// `gain (s - z1)(s - z2)... / ((s - p1)(s - p2)...)`.
+    gain: Option<Coefficient>,
+    /// Coefficients of the numerator, falling powers of s.
+    numerator: Option<Vec<Coefficient>>,
+    /// Coefficients of the denominator, falling powers of s.
+    denominator: Option<Vec<Coefficient>>,
+}
+
+/// A number, or the name of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Coefficient {
+    Number(f64),
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for Coefficient {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberOrName;
+        impl Visitor<'_> for NumberOrName {
+            type Value = Coefficient;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number, or the name of a parameter")
+            }
+            fn visit_f64<E: de::Error>(self, number: f64) -> Result<Coefficient, E> {
+                if number.is_finite() {
+                    Ok(Coefficient::Number(number))
+                } else {
+                    Err(E::custom("a coefficient must be finite"))
+                }
+            }
+            #[allow(clippy::cast_precision_loss)]
+            fn visit_i64<E: de::Error>(self, number: i64) -> Result<Coefficient, E> {
+                Ok(Coefficient::Number(number as f64))
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<Coefficient, E> {
+                Ok(Coefficient::Name(name.to_owned()))
+            }
+        }
+        deserializer.deserialize_any(NumberOrName)
+    }
+}
+
+impl JsonSchema for Coefficient {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Coefficient".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": ["number", "string"], "description": "a number, or the name of a parameter" })
+    }
+}
+
+/// A strictly proper transfer function whose coefficients may be parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct TransferFunction {
+    form: Form,
+}
+
+#[derive(Debug, Clone)]
+enum Form {
+    Roots { poles: Vec<Slot>, zeros: Vec<Slot>, gain: Slot },
+    Coefficients { numerator: Vec<Slot>, denominator: Vec<Slot> },
+}
+
+/// A number, or an index into the parameters named in the plant.
+#[derive(Debug, Clone, Copy)]
+enum Slot {
+    Number(f64),
+    Named(usize),
+}
+
+impl Slot {
+    fn value<S: Scalar>(self, named: &[S]) -> S {
+        match self {
+            Self::Number(number) => S::from(number),
+            Self::Named(index) => named[index],
+        }
+    }
+}
+
+impl TransferFunction {
+    /// Checks the plant; `names` gets the parameters it names, which are none of the `taken` ones.
+    pub fn new(plant: &Plant, taken: &[&str], names: &mut Vec<String>) -> Result<Self, Mistake> {
+        let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, Mistake> {
+            list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
+        };
+        let form = match (&plant.poles, &plant.numerator, &plant.denominator) {
+            (Some(poles), None, None) => {
+                let gain = plant.gain.clone().unwrap_or(Coefficient::Number(1.0));
+                Form::Roots {
+                    poles: slots("poles", poles)?,
+                    zeros: slots("zeros", &plant.zeros)?,
+                    gain: slots("gain", &[gain])?[0],
+                }
+            }
+            (None, Some(numerator), Some(denominator)) => {
+                if plant.gain.is_some() || !plant.zeros.is_empty() {
+                    return Err(Mistake::here("`gain` and `zeros` go with `poles`, not with coefficients"));
+                }
+                Form::Coefficients {
+                    numerator: slots("numerator", numerator)?,
+                    denominator: slots("denominator", denominator)?,
+                }
+            }
+            _ => {
+                return Err(Mistake::here("the plant is given neither by its poles nor by numerator and denominator")
+                    .with_help("as in plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
+            }
+        };
+        let (above, below) = match &form {
+            Form::Roots { poles, zeros, .. } => (zeros.len(), poles.len()),
+            Form::Coefficients { numerator, denominator } => {
+                (numerator.len().saturating_sub(1), denominator.len().saturating_sub(1))
+            }
+        };
+        if above >= below {
+            return Err(Mistake::here(format!(
+                "the plant must be strictly proper, but has order {above} over order {below}"
+            ))
+            .with_help("add the pole of the actuator or the sensor"));
+        }
+        Ok(Self { form })
+    }
+
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        match &self.form {
+            Form::Roots { poles, .. } => poles.len(),
+            Form::Coefficients { denominator, .. } => denominator.len().saturating_sub(1),
+        }
+    }
+
+    /// Coefficients of rising powers, the denominator's leading one being 1 and left out.
+    pub fn polynomials<S: Scalar>(&self, named: &[S]) -> Result<(Vec<S>, Vec<S>), Failure> {
+        let values = |slots: &[Slot]| -> Vec<S> { slots.iter().map(|s| s.value(named)).collect() };
+        let (mut numerator, mut denominator) = match &self.form {
+            Form::Roots { poles, zeros, gain } => {
+                let gain = gain.value(named);
+                let numerator = from_roots(&values(zeros)).into_iter().map(|c| gain * c).collect();
+                (numerator, from_roots(&values(poles)))
+            }
+            Form::Coefficients { numerator, denominator } => {
+                let (mut above, mut below) = (values(numerator), values(denominator));
+                above.reverse();
+                below.reverse();
+                (above, below)
+            }
+        };
+        let leading = denominator.pop().unwrap_or(S::from(0.0));
+        if leading.value() == 0.0 {
+            return Err(Failure::Undefined("the leading coefficient of the plant's denominator is 0".into()));
+        }
+        numerator.iter_mut().chain(&mut denominator).for_each(|c| *c = *c / leading);
+        numerator.resize(denominator.len(), S::from(0.0));
+        Ok((numerator, denominator))
+    }
+}
+
+fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> Result<Slot, Mistake> {
+    match coefficient {
+        Coefficient::Number(number) => Ok(Slot::Number(*number)),
+        Coefficient::Name(name) if taken.contains(&name.as_str()) => {
+            Err(Mistake::here(format!("`{name}` is a parameter of the controller"))
+                .with_help("give the plant's parameter another name"))
+        }
+        Coefficient::Name(name) => Ok(Slot::Named(names.iter().position(|known| known == name).unwrap_or_else(|| {
+            names.push(name.clone());
+            names.len() - 1
+        }))),
+    }
+}
+
+/// Coefficients, rising powers, of `(s - r1)(s - r2)...`.
+fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
+    let mut polynomial = vec![S::from(1.0)];
+    for &root in roots {
+        polynomial.push(S::from(0.0));
+        for i in (0..polynomial.len()).rev() {
+            let lower = if i > 0 { polynomial[i - 1] } else { S::from(0.0) };
+            polynomial[i] = lower - root * polynomial[i];
+        }
+    }
+    polynomial
+}

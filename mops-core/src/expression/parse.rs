@@ -1,0 +1,332 @@
+//! From text to [`Node`]s.
+//!
+//! ```text
+//! equation    = expression ('=' expression)?
+//! expression  = conjunction ('or' conjunction)*          conditions bind less than numbers
+//! conjunction = negation ('and' negation)*
+//! negation    = 'not'? comparison
+//! comparison  = sum (('>=' | '<=' | '>' | '<') sum)?
+//! sum         = product (('+' | '-') product)*
+//! product     = signed (('*' | '/') signed)*
+//! signed      = ('-' | '+')? power
+//! power       = operand ('^' signed)?
+//! operand     = '(' expression ')' | number | name '(' expression (',' expression)* ')' | name ('[' sum ']')? "'"?
+//! ```
+
+use std::ops::Range;
+
+use winnow::ascii::{float, multispace0};
+use winnow::combinator::{alt, cut_err, delimited, opt, peek, preceded, repeat, separated};
+use winnow::error::{StrContext, StrContextValue};
+use winnow::prelude::*;
+use winnow::stream::LocatingSlice;
+use winnow::token::{one_of, take_while};
+
+use super::functions::{FUNCTIONS, Function};
+use super::tree::{Comparison, Form, Node, Operator};
+
+/// Where an expression is wrong, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SyntaxError {
+    /// Bytes of the text.
+    pub span: Range<usize>,
+    /// One sentence.
+    pub message: String,
+}
+
+/// An equation `left = right`, or an expression alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equation {
+    /// What stands before the `=`, if there is one.
+    pub left: Option<Node>,
+    /// The rest.
+    pub right: Node,
+}
+
+type Input<'t> = LocatingSlice<&'t str>;
+
+/// As read: functions by their names, conditions anywhere.
+enum Raw {
+    Number(f64),
+    Name(String),
+    Member(String, Box<Spanned>),
+    Rate(Box<Spanned>),
+    Negative(Box<Spanned>),
+    Binary(Operator, Box<Spanned>, Box<Spanned>),
+    Compare(Comparison, Box<Spanned>, Box<Spanned>),
+    And(Box<Spanned>, Box<Spanned>),
+    Or(Box<Spanned>, Box<Spanned>),
+    Not(Box<Spanned>),
+    Call(String, Range<usize>, Vec<Spanned>),
+}
+
+struct Spanned {
+    raw: Raw,
+    span: Range<usize>,
+}
+
+impl Spanned {
+    fn binary(a: Self, b: Self, make: impl FnOnce(Box<Self>, Box<Self>) -> Raw) -> Self {
+        let span = a.span.start..b.span.end;
+        Self { raw: make(Box::new(a), Box::new(b)), span }
+    }
+}
+
+/// Reads an expression that is a number.
+pub fn expression(text: &str) -> Result<Node, SyntaxError> {
+    let raw = run(text, delimited(multispace0, disjunction, multispace0))?;
+    number_of(raw)
+}
+
+/// Reads an equation, or an expression that is a number.
+///
+/// # Errors
+/// A text that is neither, with the place of the first mistake.
+pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
+    let right = opt(preceded('=', cut_err((multispace0, disjunction, multispace0))));
+    let (_, first, _, second) = run(text, (multispace0, disjunction, multispace0, right))?;
+    Ok(match second {
+        Some((_, right, _)) => Equation { left: Some(number_of(first)?), right: number_of(right)? },
+        None => Equation { left: None, right: number_of(first)? },
+    })
+}
+
+fn run<'t, T>(
+    text: &'t str,
+    mut parser: impl Parser<Input<'t>, T, winnow::error::ErrMode<winnow::error::ContextError>>,
+) -> Result<T, SyntaxError> {
+    parser.parse(LocatingSlice::new(text)).map_err(|error| {
+        let from = error.offset();
+        let to = (from + 1..=text.len()).find(|&end| text.is_char_boundary(end)).unwrap_or(from);
+        let rest: String = text[from..].chars().take(12).collect();
+        let wanted: Vec<String> = error
+            .inner()
+            .context()
+            .filter_map(|context| match context {
+                StrContext::Expected(what) => Some(what.to_string()),
+                _ => None,
+            })
+            .collect();
+        let found = if rest.is_empty() { "the expression ends".to_owned() } else { format!("`{rest}` stands") };
+        let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
+        SyntaxError { span: from..to, message: format!("{found} where {wanted} is expected") }
+    })
+}
+
+/// Checks that it is a number, and so are all parts that must be; finds the functions.
+fn number_of(raw: Spanned) -> Result<Node, SyntaxError> {
+    let node = checked(raw)?;
+    if node.is_condition() {
+        return Err(SyntaxError {
+            span: node.span,
+            message: "a condition stands where a number is expected".to_owned(),
+        });
+    }
+    Ok(node)
+}
+
+fn condition_of(raw: Spanned) -> Result<Node, SyntaxError> {
+    let node = checked(raw)?;
+    if !node.is_condition() {
+        let message = "a number stands where a condition such as `x > 0` is expected".to_owned();
+        return Err(SyntaxError { span: node.span, message });
+    }
+    Ok(node)
+}
+
+fn checked(Spanned { raw, span }: Spanned) -> Result<Node, SyntaxError> {
+    let number = |raw: Box<Spanned>| number_of(*raw).map(Box::new);
+    let condition = |raw: Box<Spanned>| condition_of(*raw).map(Box::new);
+    let form = match raw {
+        Raw::Number(value) => Form::Number(value),
+        Raw::Name(name) if name == "pi" => Form::Number(std::f64::consts::PI),
+        Raw::Name(name) => Form::Name(name),
+        Raw::Member(name, index) => Form::Member(name, number(index)?),
+        Raw::Rate(of) => Form::Rate(number(of)?),
+        Raw::Negative(a) => Form::Negative(number(a)?),
+        Raw::Binary(operator, a, b) => Form::Binary(operator, number(a)?, number(b)?),
+        Raw::Compare(comparison, a, b) => Form::Compare(comparison, number(a)?, number(b)?),
+        Raw::And(a, b) => Form::And(condition(a)?, condition(b)?),
+        Raw::Or(a, b) => Form::Or(condition(a)?, condition(b)?),
+        Raw::Not(a) => Form::Not(condition(a)?),
+        Raw::Call(name, place, arguments) => call(&name, place, &span, arguments)?,
+    };
+    Ok(Node { form, span })
+}
+
+fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spanned>) -> Result<Form, SyntaxError> {
+    let wrong = |span: Range<usize>, message: String| Err(SyntaxError { span, message });
+    if name == "der" {
+        let [of] = <[Spanned; 1]>::try_from(arguments)
+            .map_err(|_| SyntaxError { span: span.clone(), message: "`der` takes one quantity".to_owned() })?;
+        let of = number_of(of)?;
+        return match of.form {
+            Form::Name(_) | Form::Member(..) => Ok(Form::Rate(Box::new(of))),
+            _ => wrong(of.span, "`der` takes the name of a state".to_owned()),
+        };
+    }
+    let Some(&(_, function, least, most)) = FUNCTIONS.iter().find(|(known, ..)| *known == name) else {
+        let names: Vec<&str> = FUNCTIONS.iter().map(|(name, ..)| *name).collect();
+        return wrong(place, format!("there is no function `{name}`; known: {}", names.join(", ")));
+    };
+    let count = arguments.len();
+    let fits = match function {
+        Function::If | Function::Table => count % 2 == 1,
+        _ => true,
+    };
+    if count < least || count > most || !fits {
+        let wanted = match function {
+            Function::If => "a condition, a value and the value otherwise".to_owned(),
+            Function::Table => "x, then x and y of at least two points".to_owned(),
+            Function::Clip | Function::Deadzone => "x, the lower and the upper limit".to_owned(),
+            Function::Min | Function::Max => "two values or more".to_owned(),
+            _ => format!("{least} value{}", if least == 1 { "" } else { "s" }),
+        };
+        return wrong(span.clone(), format!("`{name}` takes {wanted}, not {count}"));
+    }
+    let checked = arguments.into_iter().enumerate().map(|(i, argument)| {
+        let is_condition = function == Function::If && i % 2 == 0 && i + 1 < count;
+        if is_condition { condition_of(argument) } else { number_of(argument) }
+    });
+    Ok(Form::Call(function, checked.collect::<Result<_, _>>()?))
+}
+
+fn expected(what: &'static str) -> StrContext {
+    StrContext::Expected(StrContextValue::Description(what))
+}
+
+fn word<'t>(word: &'static str) -> impl Parser<Input<'t>, (), winnow::error::ErrMode<winnow::error::ContextError>> {
+    move |input: &mut Input<'t>| {
+        (multispace0, word, peek(winnow::combinator::not(one_of(is_letter))), multispace0).void().parse_next(input)
+    }
+}
+
+fn is_letter(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+fn disjunction(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let first = conjunction(input)?;
+    let rest: Vec<Spanned> = repeat(0.., preceded(word("or"), cut_err(conjunction))).parse_next(input)?;
+    Ok(rest.into_iter().fold(first, |a, b| Spanned::binary(a, b, Raw::Or)))
+}
+
+fn conjunction(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let first = negation(input)?;
+    let rest: Vec<Spanned> = repeat(0.., preceded(word("and"), cut_err(negation))).parse_next(input)?;
+    Ok(rest.into_iter().fold(first, |a, b| Spanned::binary(a, b, Raw::And)))
+}
+
+fn negation(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let (not, span) = opt(word("not")).with_span().parse_next(input)?;
+    let inner = comparison(input)?;
+    Ok(match not {
+        Some(()) => Spanned { span: span.start..inner.span.end, raw: Raw::Not(Box::new(inner)) },
+        None => inner,
+    })
+}
+
+fn comparison(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let first = sum(input)?;
+    let symbol = alt((
+        ">=".value(Comparison::AtLeast),
+        "<=".value(Comparison::AtMost),
+        '>'.value(Comparison::Greater),
+        '<'.value(Comparison::Less),
+    ));
+    let second = opt((delimited(multispace0, symbol, multispace0), cut_err(sum))).parse_next(input)?;
+    Ok(match second {
+        Some((comparison, second)) => Spanned::binary(first, second, |a, b| Raw::Compare(comparison, a, b)),
+        None => first,
+    })
+}
+
+fn sum(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let first = product(input)?;
+    chain(input, first, ['+', '-'], product)
+}
+
+fn product(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let first = signed(input)?;
+    chain(input, first, ['*', '/'], signed)
+}
+
+fn chain(
+    input: &mut Input<'_>,
+    first: Spanned,
+    operators: [char; 2],
+    operand: fn(&mut Input<'_>) -> ModalResult<Spanned>,
+) -> ModalResult<Spanned> {
+    let rest: Vec<(char, Spanned)> =
+        repeat(0.., (delimited(multispace0, one_of(operators), multispace0), cut_err(operand))).parse_next(input)?;
+    Ok(rest.into_iter().fold(first, |a, (symbol, b)| {
+        let operator = match symbol {
+            '+' => Operator::Add,
+            '-' => Operator::Subtract,
+            '*' => Operator::Multiply,
+            _ => Operator::Divide,
+        };
+        Spanned::binary(a, b, |a, b| Raw::Binary(operator, a, b))
+    }))
+}
+
+/// `-x^2` is `-(x^2)`.
+fn signed(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let (sign, span) = opt((one_of(['-', '+']), multispace0)).with_span().parse_next(input)?;
+    let inner = power(input)?;
+    Ok(match sign {
+        Some(('-', _)) => Spanned { span: span.start..inner.span.end, raw: Raw::Negative(Box::new(inner)) },
+        _ => inner,
+    })
+}
+
+fn power(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let base = operand(input)?;
+    let exponent = opt(preceded((multispace0, '^', multispace0), cut_err(signed))).parse_next(input)?;
+    Ok(match exponent {
+        Some(exponent) => Spanned::binary(base, exponent, |a, b| Raw::Binary(Operator::Power, a, b)),
+        None => base,
+    })
+}
+
+fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let number = preceded(peek(one_of(('0'..='9', '.'))), float).with_span();
+    alt((bracketed, number.map(|(value, span)| Spanned { raw: Raw::Number(value), span }), name_or_call))
+        .context(expected("a number, a name or `(`"))
+        .parse_next(input)
+}
+
+fn bracketed(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    delimited(('(', multispace0), cut_err(disjunction), (multispace0, cut_err(')').context(expected("`)`"))))
+        .parse_next(input)
+}
+
+fn name_or_call(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let (name, span) = (one_of(|c: char| c.is_alphabetic() || c == '_'), take_while(0.., is_letter))
+        .take()
+        .with_span()
+        .parse_next(input)?;
+    let name: &str = name;
+    let arguments: Option<(Vec<Spanned>, Range<usize>)> = opt(delimited(
+        (multispace0, '(', multispace0),
+        separated(1.., cut_err(disjunction), (multispace0, ',', multispace0)),
+        (multispace0, cut_err(')').context(expected("`)`"))),
+    )
+    .with_span())
+    .parse_next(input)?;
+    if let Some((arguments, end)) = arguments {
+        return Ok(Spanned { span: span.start..end.end, raw: Raw::Call(name.to_owned(), span, arguments) });
+    }
+    let index = opt(delimited(('[', multispace0), cut_err(sum), (multispace0, cut_err(']').context(expected("`]`")))))
+        .with_span()
+        .parse_next(input)?;
+    let quantity = match index {
+        (Some(index), end) => Spanned { span: span.start..end.end, raw: Raw::Member(name.to_owned(), Box::new(index)) },
+        (None, _) => Spanned { span, raw: Raw::Name(name.to_owned()) },
+    };
+    let (prime, end) = opt('\'').with_span().parse_next(input)?;
+    Ok(match prime {
+        Some(_) => Spanned { span: quantity.span.start..end.end, raw: Raw::Rate(Box::new(quantity)) },
+        None => quantity,
+    })
+}

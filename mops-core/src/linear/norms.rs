@@ -1,0 +1,189 @@
+//! The largest gain of a linear system over all frequencies.
+
+use nalgebra::DMatrix;
+
+use super::{Complex, FrequencyResponse, StateSpace, eigenvalues};
+
+/// A largest gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// The largest singular value of the response.
+    pub gain: f64,
+    /// Where it is reached, rad/s; infinite where the gain is that of `D`.
+    pub frequency: f64,
+}
+
+/// The Hinf norm: [`peak_gain`] of a stable system.
+///
+/// # Errors
+/// A system that is not stable: the norm is infinite.
+pub fn hinf_norm(system: &StateSpace) -> Result<Peak, String> {
+    if !system.is_stable()? {
+        return Err("the system is not stable: its Hinf norm is infinite".to_owned());
+    }
+    peak_gain(system)
+}
+
+/// The largest singular value of the frequency response over all frequencies, and where it is. The delay does not matter.
+///
+/// The Hamiltonian matrix of a gain has eigenvalues on the imaginary axis exactly where the response passes that gain;
+/// between two of them the response is evaluated for the next, higher gain. Source: N. A. Bruinsma, M. Steinbuch, A fast
+/// algorithm to compute the Hinf norm of a transfer function matrix, Systems and Control Letters 14 (1990) 287-293.
+///
+/// # Errors
+/// A pole on the imaginary axis, where the gain is infinite; an entry that is not finite.
+pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
+    let poles = system.poles()?;
+    let size = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    if poles.iter().any(|p| p.re.abs() <= 1e-14 * size) {
+        return Err("a pole lies on the imaginary axis: the gain is infinite there".to_owned());
+    }
+    let response = StateSpace { delay: 0.0, ..system.clone() }.response()?;
+    let mut best =
+        Peak { gain: largest_singular_value(&system.d.map(|d| Complex::new(d, 0.0))), frequency: f64::INFINITY };
+    let resonances = poles.iter().flat_map(|p| [p.norm(), p.im.abs(), (p.im * p.im - p.re * p.re).max(0.0).sqrt()]);
+    for frequency in resonances.chain([0.0]) {
+        best = better(best, &response, frequency);
+    }
+    for _ in 0..40 {
+        let level = best.gain * (1.0 + 1e-10);
+        if level == 0.0 {
+            break;
+        }
+        let mut passed = level_frequencies(system, level)?;
+        passed.push(0.0);
+        passed.sort_by(f64::total_cmp);
+        let before = best;
+        for pair in passed.windows(2) {
+            best = better(best, &response, 0.5 * (pair[0] + pair[1]));
+        }
+        if best.gain <= level {
+            best = before;
+            break;
+        }
+    }
+    Ok(polished(best, &response))
+}
+
+fn better(best: Peak, response: &FrequencyResponse, frequency: f64) -> Peak {
+    let gain = largest_singular_value(&response.at_frequency(frequency));
+    if gain > best.gain { Peak { gain, frequency } } else { best }
+}
+
+/// Climbs from a point near the top to the top, by golden section in a range of one part in a thousand.
+fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
+    if !peak.frequency.is_finite() || peak.frequency == 0.0 {
+        return peak;
+    }
+    let gain = |frequency: f64| largest_singular_value(&response.at_frequency(frequency));
+    let frequency = maximise(gain, peak.frequency * (1.0 - 1e-3), peak.frequency * (1.0 + 1e-3));
+    better(peak, response, frequency)
+}
+
+/// The place of the maximum of a function with one maximum between `low` and `high`, by golden section.
+pub(super) fn maximise(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut fa, mut fb) = (f(a), f(b));
+    while high - low > 1e-9 * (low.abs() + high.abs()) {
+        if fa >= fb {
+            (high, b, fb) = (b, a, fa);
+            a = high - GOLDEN * (high - low);
+            fa = f(a);
+        } else {
+            (low, a, fa) = (a, b, fb);
+            b = low + GOLDEN * (high - low);
+            fb = f(b);
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// The largest singular value.
+pub(super) fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
+    if m.len() == 1 {
+        return m[(0, 0)].norm();
+    }
+    if m.iter().any(|z| !z.is_finite()) {
+        return f64::INFINITY;
+    }
+    m.clone().singular_values().iter().copied().fold(0.0, f64::max)
+}
+
+/// Frequencies at which a singular value of the response may be `level`: those of eigenvalues near the imaginary axis, not
+/// yet made exact. Rounding moves a double eigenvalue by the root of the machine precision, hence the wide strip.
+pub(super) fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
+    let StateSpace { a, b, c, d, .. } = system;
+    let (n, m) = (a.nrows(), b.ncols());
+    let Some(r) = (DMatrix::identity(m, m) * (level * level) - d.transpose() * d).try_inverse() else {
+        return Ok(Vec::new());
+    };
+    let closed = a + b * &r * d.transpose() * c;
+    let lower = c.transpose() * (DMatrix::identity(c.nrows(), c.nrows()) + d * &r * d.transpose()) * c;
+    let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
+    // The level is split between both off-diagonal blocks, so that they are of one size.
+    hamiltonian.view_mut((0, 0), (n, n)).copy_from(&closed);
+    hamiltonian.view_mut((0, n), (n, n)).copy_from(&(b * r * b.transpose() * level));
+    hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-lower / level));
+    hamiltonian.view_mut((n, n), (n, n)).copy_from(&-closed.transpose());
+    let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * z.norm();
+    Ok(eigenvalues(&hamiltonian)?.iter().filter(|z| near(z)).map(|z| z.im).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::TransferFunction;
+    use crate::linear::testing::{assert_near, random};
+
+    fn norm(numerator: &[f64], denominator: &[f64]) -> Result<Peak, String> {
+        hinf_norm(&TransferFunction::new(numerator.to_vec(), denominator.to_vec()).state_space().unwrap())
+    }
+
+    #[test]
+    fn the_peak_of_a_resonance_has_its_closed_form() {
+        // w^2/(s^2 + 2 z w s + w^2): 1/(2 z sqrt(1 - z^2)) at w sqrt(1 - 2 z^2).
+        for (z, w) in [(0.3f64, 2.0f64), (1e-3, 50.0), (1e-6, 1.0), (0.7, 1e3)] {
+            let peak = norm(&[w * w], &[1.0, 2.0 * z * w, w * w]).unwrap();
+            let exact = 1.0 / (2.0 * z * (1.0 - z * z).sqrt());
+            assert_near(peak.gain / exact, 1.0, 1e-9);
+            assert_near(peak.frequency, w * (1.0 - 2.0 * z * z).sqrt(), 1e-4 * w);
+        }
+    }
+
+    #[test]
+    fn a_gain_that_only_falls_or_only_rises_has_its_peak_at_an_end() {
+        assert_eq!(norm(&[3.0], &[1.0, 2.0]).unwrap(), Peak { gain: 1.5, frequency: 0.0 });
+        let lead = norm(&[2.0, 1.0], &[1.0, 1.0]).unwrap();
+        assert_near(lead.gain, 2.0, 1e-9);
+        assert!(lead.frequency > 1e3);
+    }
+
+    #[test]
+    fn of_two_resonances_the_narrow_higher_one_is_found() {
+        // 1/(s^2 + 0.2 s + 1) and a needle of gain 100 at 37 rad/s.
+        let broad = TransferFunction::new(vec![1.0], vec![1.0, 0.2, 1.0]).state_space().unwrap();
+        let needle = TransferFunction::new(vec![1e-3 * 37.0 * 37.0], vec![1.0, 2e-5 * 37.0 * 0.5, 37.0 * 37.0]);
+        let both = broad.parallel(&needle.state_space().unwrap()).unwrap();
+        let peak = hinf_norm(&both).unwrap();
+        assert_near(peak.frequency, 37.0, 1e-3);
+        assert_near(peak.gain, 100.0, 0.01);
+    }
+
+    #[test]
+    fn with_several_inputs_and_outputs_no_frequency_has_more() {
+        let a = random(6, 6, 1) - DMatrix::identity(6, 6) * 1.5;
+        let system = StateSpace::new(a, random(6, 2, 2), random(3, 6, 3), random(3, 2, 4) * 0.1);
+        let peak = hinf_norm(&system).unwrap();
+        let response = system.response().unwrap();
+        let on_grid = (0..4000).map(|i| largest_singular_value(&response.at_frequency(0.005 * f64::from(i))));
+        let largest = on_grid.fold(0.0, f64::max);
+        assert!(largest <= peak.gain * (1.0 + 1e-12) && largest > peak.gain * (1.0 - 1e-5), "{largest} {peak:?}");
+    }
+
+    #[test]
+    fn an_unstable_system_has_no_norm_and_an_undamped_one_no_peak() {
+        assert!(norm(&[1.0], &[1.0, -1.0]).unwrap_err().contains("not stable"));
+        assert!(norm(&[1.0], &[1.0, 0.0, 1.0]).is_err());
+    }
+}

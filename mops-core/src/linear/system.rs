@@ -1,0 +1,196 @@
+//! Linear systems put together: channels, series, parallel and feedback connection.
+
+use nalgebra::DMatrix;
+
+use super::{Complex, StateSpace, eigenvalues};
+
+impl StateSpace {
+    /// A system without delay whose states are called `x1`, `x2`, ..., its inputs `u1`, ..., its outputs `y1`, ....
+    ///
+    /// # Panics
+    /// If the sizes of the matrices do not fit.
+    pub fn new(a: DMatrix<f64>, b: DMatrix<f64>, c: DMatrix<f64>, d: DMatrix<f64>) -> Self {
+        assert!(a.is_square() && a.nrows() == b.nrows() && a.ncols() == c.ncols(), "states of A, B and C");
+        assert!(d.nrows() == c.nrows() && d.ncols() == b.ncols(), "inputs and outputs of B, C and D");
+        let names = |letter: char, count: usize| (1..=count).map(|i| format!("{letter}{i}")).collect();
+        let (states, inputs, outputs) = (names('x', a.nrows()), names('u', b.ncols()), names('y', c.nrows()));
+        Self { a, b, c, d, states, inputs, outputs, delay: 0.0 }
+    }
+
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        self.a.nrows()
+    }
+
+    /// The poles: eigenvalues of `A`, 1/s.
+    ///
+    /// # Errors
+    /// An entry that is not finite.
+    pub fn poles(&self) -> Result<Vec<Complex>, String> {
+        eigenvalues(&self.a)
+    }
+
+    /// Whether every pole lies in the open left half plane.
+    ///
+    /// # Errors
+    /// An entry that is not finite.
+    pub fn is_stable(&self) -> Result<bool, String> {
+        Ok(self.poles()?.iter().all(|pole| pole.re < 0.0))
+    }
+
+    /// The system from one input to one output, by their indices.
+    #[must_use]
+    pub fn channel(&self, input: usize, output: usize) -> Self {
+        Self {
+            b: self.b.columns(input, 1).into_owned(),
+            c: self.c.rows(output, 1).into_owned(),
+            d: self.d.view((output, input), (1, 1)).into_owned(),
+            inputs: vec![self.inputs[input].clone()],
+            outputs: vec![self.outputs[output].clone()],
+            ..self.clone()
+        }
+    }
+
+    /// `next` driven by the outputs of this system; the delays add up.
+    ///
+    /// # Panics
+    /// If `next` does not have one input per output of this system.
+    #[must_use]
+    pub fn series(&self, next: &Self) -> Self {
+        assert_eq!(self.outputs.len(), next.inputs.len(), "one input per output");
+        let (n, m) = (self.order(), next.order());
+        let mut a = DMatrix::zeros(n + m, n + m);
+        a.view_mut((0, 0), (n, n)).copy_from(&self.a);
+        a.view_mut((n, 0), (m, n)).copy_from(&(&next.b * &self.c));
+        a.view_mut((n, n), (m, m)).copy_from(&next.a);
+        Self {
+            a,
+            b: above(&self.b, &(&next.b * &self.d)),
+            c: beside(&(&next.d * &self.c), &next.c),
+            d: &next.d * &self.d,
+            states: self.states.iter().chain(&next.states).cloned().collect(),
+            inputs: self.inputs.clone(),
+            outputs: next.outputs.clone(),
+            delay: self.delay + next.delay,
+        }
+    }
+
+    /// The sum of this system and another with the same input.
+    ///
+    /// # Errors
+    /// Different delays.
+    ///
+    /// # Panics
+    /// If the numbers of inputs or outputs differ.
+    pub fn parallel(&self, other: &Self) -> Result<Self, String> {
+        if self.delay != other.delay {
+            return Err("systems with different delays have no sum without further states".to_owned());
+        }
+        let (n, m) = (self.order(), other.order());
+        let mut a = DMatrix::zeros(n + m, n + m);
+        a.view_mut((0, 0), (n, n)).copy_from(&self.a);
+        a.view_mut((n, n), (m, m)).copy_from(&other.a);
+        Ok(Self {
+            a,
+            b: above(&self.b, &other.b),
+            c: beside(&self.c, &other.c),
+            d: &self.d + &other.d,
+            states: self.states.iter().chain(&other.states).cloned().collect(),
+            ..self.clone()
+        })
+    }
+
+    /// The closed loop with unity negative feedback, `T = L/(1 + L)`: from the reference to the outputs.
+    ///
+    /// # Errors
+    /// A delay in the loop, which has no finite number of states; a loop through `D` alone that has no solution.
+    pub fn complementary_sensitivity(&self) -> Result<Self, String> {
+        let inverse = self.loop_inverse()?;
+        Ok(Self {
+            a: &self.a - &self.b * &inverse * &self.c,
+            b: &self.b * &inverse,
+            c: &inverse * &self.c,
+            d: &inverse * &self.d,
+            ..self.clone()
+        })
+    }
+
+    /// The sensitivity of the loop, `S = 1/(1 + L)`: from the reference to the control error.
+    ///
+    /// # Errors
+    /// As [`StateSpace::complementary_sensitivity`].
+    pub fn sensitivity(&self) -> Result<Self, String> {
+        let inverse = self.loop_inverse()?;
+        Ok(Self {
+            a: &self.a - &self.b * &inverse * &self.c,
+            b: &self.b * &inverse,
+            c: -(&inverse * &self.c),
+            d: inverse,
+            ..self.clone()
+        })
+    }
+
+    /// `(1 + D)^-1`.
+    fn loop_inverse(&self) -> Result<DMatrix<f64>, String> {
+        if self.delay != 0.0 {
+            return Err("a closed loop with a delay has no finite number of poles".to_owned());
+        }
+        if !self.d.is_square() {
+            return Err("unity feedback needs as many outputs as inputs".to_owned());
+        }
+        let inverse = (DMatrix::identity(self.d.nrows(), self.d.nrows()) + &self.d).try_inverse();
+        inverse.ok_or_else(|| "the loop has no solution: L is -1 at infinite frequency".to_owned())
+    }
+}
+
+/// A matrix above another.
+pub(super) fn above(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = DMatrix::zeros(top.nrows() + bottom.nrows(), top.ncols());
+    both.rows_mut(0, top.nrows()).copy_from(top);
+    both.rows_mut(top.nrows(), bottom.nrows()).copy_from(bottom);
+    both
+}
+
+/// A matrix to the left of another.
+pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = DMatrix::zeros(left.nrows(), left.ncols() + right.ncols());
+    both.columns_mut(0, left.ncols()).copy_from(left);
+    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
+    both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::TransferFunction;
+    use crate::linear::testing::{assert_same_set, c};
+
+    fn lag(gain: f64, pole: f64) -> StateSpace {
+        TransferFunction::new(vec![gain], vec![1.0, pole]).state_space().unwrap()
+    }
+
+    #[test]
+    fn connections_have_the_response_that_the_algebra_of_transfer_functions_says() {
+        let (f, g) = (lag(3.0, 1.0), lag(2.0, 5.0));
+        let s = c(0.3, 2.0);
+        let at = |system: &StateSpace| system.response().unwrap().at(s)[(0, 0)];
+        let (fs, gs) = (at(&f), at(&g));
+        assert!((at(&f.series(&g)) - fs * gs).norm() < 1e-14);
+        assert!((at(&f.parallel(&g).unwrap()) - (fs + gs)).norm() < 1e-14);
+        let l = f.series(&g);
+        assert!((at(&l.complementary_sensitivity().unwrap()) - fs * gs / (fs * gs + 1.0)).norm() < 1e-14);
+        assert!((at(&l.sensitivity().unwrap()) - (fs * gs + 1.0).inv()).norm() < 1e-14);
+    }
+
+    #[test]
+    fn feedback_moves_the_poles_and_refuses_a_delay() {
+        // 6/((s + 1)(s + 5)) in unity feedback: s^2 + 6 s + 11.
+        let l = lag(3.0, 1.0).series(&lag(2.0, 5.0));
+        let root = 2.0f64.sqrt();
+        let closed = l.complementary_sensitivity().unwrap();
+        assert_same_set(&closed.poles().unwrap(), &[c(-3.0, root), c(-3.0, -root)], 1e-13);
+        assert!(closed.is_stable().unwrap());
+        let late = StateSpace { delay: 0.1, ..l };
+        assert!(late.complementary_sensitivity().unwrap_err().contains("delay"));
+    }
+}

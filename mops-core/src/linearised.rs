@@ -1,0 +1,284 @@
+//! A model's linearisation as a model of its own: the same parameters, at an operating point, between chosen signals.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::case::Case;
+use crate::diagnostic::suggestion;
+use crate::linear::{Balance, StateSpace, equilibrium};
+use crate::model::{Analysis, AnalysisKind, Failure, Interface, Job, Local, Model, OperatingPoint, Variable};
+use crate::study::Mistake;
+use crate::unit::Quantity;
+
+/// What is linearised: where, and between which inputs and signals.
+#[derive(Debug, Clone, Default)]
+pub struct Linearise {
+    /// Inputs; all where absent.
+    pub inputs: Option<Vec<String>>,
+    /// Outputs, which are signals of the model; all where absent.
+    pub outputs: Option<Vec<String>>,
+    /// Values of states and inputs; a state that is not named has its start value, an input that of the case.
+    pub at: Vec<(String, Quantity)>,
+    /// Whether the operating point is moved to where the model rests; what `at` names is held, and so are inputs.
+    pub equilibrium: bool,
+    /// States and inputs that the search may move although they would be held.
+    pub free: Vec<String>,
+}
+
+/// The linearisation of a model: for every value of its parameters the system of its deviations from the operating point.
+pub struct Linearised {
+    model: Arc<dyn Model>,
+    interface: Interface,
+    states: Vec<Variable>,
+    /// Indices of the inputs and outputs, in the model.
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
+    /// Values of states, then inputs, where they are given.
+    given: Vec<Option<f64>>,
+    /// For each state the parameter that is its start value.
+    starts: Vec<Option<usize>>,
+    /// Which of states, then inputs, a search may move; `None` where there is no search.
+    free: Option<Vec<bool>>,
+}
+
+/// A linear system, and where it comes from.
+#[derive(Debug, Clone)]
+pub struct Resting {
+    /// The system of the deviations.
+    pub system: StateSpace,
+    /// Values of the states.
+    pub states: Vec<f64>,
+    /// Values of all inputs of the model.
+    pub inputs: Vec<f64>,
+    /// Rates of change of the states there; zero in an equilibrium.
+    pub rates: Vec<f64>,
+}
+
+impl Linearised {
+    /// The linearisation of a model.
+    ///
+    /// # Errors
+    /// A model without equations that can be linearised; names that it does not have; quantities in a wrong unit.
+    pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, Mistake> {
+        let states = model.equation_states();
+        let of = model.interface();
+        if states.is_empty() {
+            let fact = match of.analysis {
+                AnalysisKind::Time => "this model cannot be linearised: it does not give its equations",
+                AnalysisKind::Linear => "this model is linear already",
+            };
+            return Err(Mistake::here(fact).with_help("remove `linearise`"));
+        }
+        let inputs = chosen("inputs", options.inputs.as_deref(), &of.inputs, "input")?;
+        let outputs = chosen("outputs", options.outputs.as_deref(), &of.signals, "signal")?;
+        let places: Vec<&Variable> = states.iter().chain(&of.inputs).collect();
+        let place = |name: &str| {
+            places.iter().position(|v| v.name == name).ok_or_else(|| {
+                Mistake::new(name, format!("the model has no state or input `{name}`"))
+                    .with_help(suggestion(name, places.iter().map(|v| v.name.as_str())))
+            })
+        };
+        let mut given = vec![None; places.len()];
+        for (name, quantity) in &options.at {
+            let index = place(name).map_err(|m| m.within("at"))?;
+            let value = quantity.to(&places[index].unit).map_err(|why| Mistake::new(name, why).within("at"))?;
+            if !value.is_finite() {
+                return Err(Mistake::new(name, format!("`{name}` must be finite, not {value}")).within("at"));
+            }
+            given[index] = Some(value);
+        }
+        if !options.equilibrium && !options.free.is_empty() {
+            return Err(Mistake::new("free", "only the search for an equilibrium moves something")
+                .with_help("add equilibrium = true, or remove `free`"));
+        }
+        let mut free: Vec<bool> = (0..places.len()).map(|i| i < states.len() && given[i].is_none()).collect();
+        for name in &options.free {
+            free[place(name).map_err(|m| m.within("free"))?] = true;
+        }
+        let start_of = |state: &Variable| {
+            let start = &of.states.iter().find(|s| s.name == state.name)?.start;
+            of.parameters.iter().position(|p| p.variable.name == *start)
+        };
+        let starts = states.iter().map(start_of).collect();
+        let interface = Interface {
+            signals: outputs.iter().map(|&i| of.signals[i].clone()).collect(),
+            parameters: of.parameters.clone(),
+            inputs: inputs.iter().map(|&i| of.inputs[i].clone()).collect(),
+            analysis: AnalysisKind::Linear,
+            ..Interface::default()
+        };
+        let free = options.equilibrium.then_some(free);
+        Ok(Self { model, interface, states, inputs, outputs, given, starts, free })
+    }
+
+    /// The states of the model.
+    pub fn states(&self) -> &[Variable] {
+        &self.states
+    }
+
+    /// The system for given parameters, and the operating point it belongs to.
+    ///
+    /// # Errors
+    /// Parameters for which the model is not defined; no equilibrium.
+    pub fn at(&self, case: &Case, parameters: &[f64]) -> Result<Resting, Failure> {
+        let of = self.model.interface();
+        let n = self.states.len();
+        let start = |index: usize| match (index < n).then(|| self.starts[index]) {
+            Some(Some(parameter)) => parameters[parameter],
+            Some(None) => 0.0,
+            None => case.input(&of.inputs[index - n].name).map_or(0.0, |input| input.at(0.0)),
+        };
+        let mut point: Vec<f64> =
+            self.given.iter().enumerate().map(|(i, given)| given.unwrap_or_else(|| start(i))).collect();
+        let local = |point: &[f64]| {
+            let (states, inputs) = point.split_at(n);
+            let at = OperatingPoint { parameters, states, inputs };
+            self.model.local(&at).expect("a model with equations gives them")
+        };
+        if let Some(free) = &self.free {
+            let balance = |point: &[f64]| {
+                let Local { rates, slopes, .. } = local(point).map_err(|failure| failure.to_string())?;
+                Ok(Balance { rates, slopes: slopes.rows(0, n).into_owned() })
+            };
+            point = equilibrium(balance, &point, free).map_err(Failure::Undefined)?;
+        }
+        let Local { rates, slopes, .. } = local(&point)?;
+        let inputs = point.split_off(n);
+        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates })
+    }
+
+    fn system(&self, slopes: &DMatrix<f64>) -> StateSpace {
+        let n = self.states.len();
+        let names = |variables: &[Variable]| variables.iter().map(|v| v.name.clone()).collect();
+        let (of_outputs, of_inputs) = (|i: usize| n + self.outputs[i], |j: usize| n + self.inputs[j]);
+        let (inputs, outputs) = (self.inputs.len(), self.outputs.len());
+        StateSpace {
+            a: slopes.view((0, 0), (n, n)).into_owned(),
+            b: DMatrix::from_fn(n, inputs, |i, j| slopes[(i, of_inputs(j))]),
+            c: DMatrix::from_fn(outputs, n, |i, j| slopes[(of_outputs(i), j)]),
+            d: DMatrix::from_fn(outputs, inputs, |i, j| slopes[(of_outputs(i), of_inputs(j))]),
+            states: names(&self.states),
+            inputs: names(&self.interface.inputs),
+            outputs: names(&self.interface.signals),
+            delay: 0.0,
+        }
+    }
+}
+
+impl Model for Linearised {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        self.at(job.case, job.parameters).map(|resting| Analysis::Linear(resting.system))
+    }
+}
+
+/// Indices of the named variables; of all where none is named.
+fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -> Result<Vec<usize>, Mistake> {
+    let Some(names) = names else { return Ok((0..known.len()).collect()) };
+    let find = |name: &String| {
+        known.iter().position(|v| v.name == *name).ok_or_else(|| {
+            Mistake::new(name, format!("the model has no {what} `{name}`"))
+                .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
+                .within(key)
+        })
+    };
+    if names.is_empty() {
+        return Err(Mistake::new(key, format!("no {what} is named")).with_help(format!("leave `{key}` out for all")));
+    }
+    names.iter().map(find).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Parameter, State};
+
+    /// A pendulum with torque u: `angle'' = g sin(angle) - u`, angle 0 upright.
+    struct Pendulum(Interface);
+
+    impl Model for Pendulum {
+        fn interface(&self) -> &Interface {
+            &self.0
+        }
+        fn analyse(&self, _: &Job<'_>) -> Result<Analysis, Failure> {
+            unreachable!("it is only linearised")
+        }
+        fn equation_states(&self) -> Vec<Variable> {
+            vec![Variable::new("angle", "rad", ""), Variable::new("speed", "rad/s", "")]
+        }
+        fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+            let (g, [angle, speed], u) = (at.parameters[0], [at.states[0], at.states[1]], at.inputs[0]);
+            let slopes = [[0.0, 1.0, 0.0], [g * angle.cos(), 0.0, -1.0], [angle.cos(), 0.0, 0.0], [0.0, 1.0, 0.0]];
+            Some(Ok(Local {
+                rates: vec![speed, g * angle.sin() - u],
+                signals: vec![angle.sin(), speed],
+                slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
+            }))
+        }
+    }
+
+    fn pendulum() -> Arc<dyn Model> {
+        Arc::new(Pendulum(Interface {
+            signals: vec![Variable::new("side", "1", ""), Variable::new("speed", "rad/s", "")],
+            parameters: vec![Parameter::new("g", "1/s2", ""), Parameter::new("angle0", "rad", "")],
+            states: vec![State { name: "angle".into(), start: "angle0".into(), signal: None, rate_of: None }],
+            inputs: vec![Variable::new("u", "1/s2", "")],
+            ..Interface::default()
+        }))
+    }
+
+    fn quantity(text: &str) -> Quantity {
+        Quantity::parse(text).unwrap()
+    }
+
+    #[test]
+    fn the_operating_point_is_what_is_given_else_the_start_value() {
+        let by_start = Linearised::new(pendulum(), &Linearise::default()).unwrap();
+        let resting = by_start.at(&Case::default(), &[9.0, 0.5]).unwrap();
+        assert_eq!((resting.states[0], resting.system.a[(1, 0)]), (0.5, 9.0 * 0.5f64.cos()));
+        let at = vec![("angle".into(), quantity("180 deg"))];
+        let outputs = Some(vec!["side".into()]);
+        let hanging = Linearised::new(pendulum(), &Linearise { at, outputs, ..Linearise::default() }).unwrap();
+        let Analysis::Linear(system) = hanging
+            .analyse(&Job { case: &Case::default(), parameters: &[9.0, 0.5], signals: &[], horizon: 0.0 })
+            .unwrap()
+        else {
+            panic!("it is linear")
+        };
+        assert_eq!(
+            (system.a[(1, 0)], system.c[(0, 0)], system.outputs.as_slice()),
+            (-9.0, -1.0, &["side".to_owned()][..])
+        );
+        assert!(system.poles().unwrap().iter().all(|p| (p.norm() - 3.0).abs() < 1e-14 && p.re == 0.0));
+    }
+
+    #[test]
+    fn an_equilibrium_holds_what_is_given_and_moves_an_input_only_if_it_may() {
+        let at = vec![("angle".into(), quantity("0.4"))];
+        let trim = Linearise { at: at.clone(), equilibrium: true, free: vec!["u".into()], ..Linearise::default() };
+        let resting = Linearised::new(pendulum(), &trim).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap();
+        assert!((resting.inputs[0] - 9.0 * 0.4f64.sin()).abs() < 1e-12 && resting.states[0] == 0.4);
+        let held = Linearise { at, equilibrium: true, ..Linearise::default() };
+        let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
+        assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");
+    }
+
+    #[test]
+    fn names_and_units_that_do_not_fit_are_mistakes_at_their_keys() {
+        let wrong = |options: Linearise| Linearised::new(pendulum(), &options).err().unwrap().to_string();
+        let at = |name: &str, value: &str| vec![(name.to_owned(), quantity(value))];
+        assert_eq!(
+            wrong(Linearise { at: at("angel", "1"), ..Linearise::default() }),
+            "at.angel: the model has no state or input `angel`; did you mean `angle`?"
+        );
+        assert!(
+            wrong(Linearise { at: at("angle", "1 s"), ..Linearise::default() }).starts_with("at.angle: a quantity in")
+        );
+        assert!(wrong(Linearise { inputs: Some(vec!["v".into()]), ..Linearise::default() }).starts_with("inputs.v: "));
+        assert!(wrong(Linearise { free: vec!["u".into()], ..Linearise::default() }).starts_with("free: "));
+    }
+}
