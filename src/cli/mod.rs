@@ -3,6 +3,7 @@
 mod check;
 mod data;
 mod describe;
+mod findings;
 mod linear_plots;
 mod linearise;
 mod list;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use mops_core::{
     Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
-    CriterionSpec, Draft, Evaluation, Failure, Interface, Job, Measured, Mistake, Model, Outcome, Parameter, Pareto,
-    Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage, Value,
-    Variable,
+    CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model, Outcome, Parameter,
+    Pareto, Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage,
+    Value, Variable,
 };
 
 use super::plot::{Curve, CurveStyle, Plot};
@@ -121,7 +121,13 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
         criteria: criteria(&best),
         start: StartReport { feasible: true, worst_scaled: first.merit.objective, criteria: criteria(&first) },
         front: Vec::new(),
-        calibration: Some(CalibrationReport { parameters: Vec::new(), experiments: Vec::new() }),
+        calibration: Some(CalibrationReport {
+            parameters: Vec::new(),
+            experiments: Vec::new(),
+            sensitivity: None,
+            excitation: Vec::new(),
+        }),
+        found: Findings::default(),
         failures: Vec::new(),
         warnings: vec!["mind the `gap`".into()],
     };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, TunerDraft};
-use super::{JobPlan, Objective, ParameterSource, Row, Study, Task};
+use super::{JobPlan, Objective, ParameterSource, Row, Study, Task, Tasks, tasks};
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
 use crate::diagnostic::suggestion;
@@ -54,10 +54,15 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         }
     }
 
-    let objective = draft.objective.unwrap_or(match draft.task {
-        Task::Design => Objective::Max,
-        Task::Calibration => Objective::Sum,
-    });
+    let objective =
+        draft.objective.unwrap_or(match draft.task {
+            Task::Design => Objective::Max,
+            Task::Calibration => Objective::Sum,
+            // As the study of which they tell would be solved.
+            Task::Excitation | Task::Sensitivity | Task::Sweep => {
+                if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
+            }
+        });
     let mut study = Study {
         name: draft.name,
         task: draft.task,
@@ -68,9 +73,11 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         tuners,
         rows: Vec::new(),
         jobs: Vec::new(),
+        tasks: Tasks::default(),
         warnings,
     };
-    if draft.criteria.is_empty() {
+    // How rich an input is can be told without a criterion.
+    if draft.criteria.is_empty() && study.task != Task::Excitation {
         return Err(Mistake::new("criteria", "the study has no criterion").with_help(
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
         ));
@@ -84,6 +91,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
             .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
+    study.tasks = tasks::build(draft.tasks, &study)?;
     Ok(study)
 }
 

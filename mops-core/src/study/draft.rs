@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Objective, Study, Task};
+use super::{Objective, Study, Task, TasksDraft};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::experiment::{Input, ResponseData, Role};
 use crate::model::Model;
@@ -83,6 +83,8 @@ pub struct Draft {
     pub cases: Vec<CaseDraft>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionDraft)>,
+    /// What tasks other than design and calibration are asked.
+    pub tasks: TasksDraft,
 }
 
 impl Draft {
