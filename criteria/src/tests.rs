@@ -87,7 +87,7 @@ fn every_kind_is_read_from_a_study_file_and_has_a_value() {
         })
         .collect();
     let problem = Problem::new(read_study(&criteria).expect("it is a study").into());
-    let evaluation = problem.evaluate(&problem.start());
+    let evaluation = problem.evaluate_at(&problem.study().start());
     assert!(evaluation.failures.is_empty(), "{:?}", evaluation.failures);
     // In the case and in both experiments; over time not in the one over frequency; of measurements only where there is one.
     let measured = ["fit", "normalised-error", "rmse", "fit-percent", "frequency-fit"].len();
