@@ -9,7 +9,7 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use mops::{Budget, Oracle, Problem, Run, Shipped, file};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-const STUDIES: [&str; 3] = ["pid-design", "pid-design-multi-case", "furuta-calibration"];
+const STUDIES: [&str; 3] = ["pid-design", "pid-design-multi-case", "furuta-swing"];
 const POINTS: u32 = 200;
 
 fn main() {

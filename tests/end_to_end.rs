@@ -85,7 +85,7 @@ fn a_run_leaves_result_report_plots_and_evaluations() {
 
 #[test]
 fn thread_count_does_not_change_a_single_bit() {
-    for study in ["pid-design-multi-case", "furuta-calibration"] {
+    for study in ["pid-design-multi-case", "furuta-swing"] {
         let results: Vec<Value> = ["1", "2", "3"]
             .iter()
             .map(|jobs| {
@@ -102,8 +102,8 @@ fn thread_count_does_not_change_a_single_bit() {
 #[test]
 fn the_calibration_recovers_the_device_within_its_intervals() {
     let folder = tempfile::tempdir().unwrap();
-    let result = run("furuta-calibration", folder.path(), &[]);
-    // The values of the generator, studies/furuta-calibration/generate.rs.
+    let result = run("furuta-swing", folder.path(), &[]);
+    // The values of the generator, studies/furuta-swing/generate.rs.
     let truth = [
         ("b", 1.133e-3),
         ("c", 6.31e-4),
@@ -187,9 +187,9 @@ fn a_new_study_checks_and_runs() {
     let folder = tempfile::tempdir().unwrap();
     mops(&["new", "mine"]).current_dir(&folder).assert().code(0);
     mops(&["check", "mine/study.toml"]).current_dir(&folder).assert().code(0);
-    mops(&["new", "copy", "--from", "furuta-calibration"]).current_dir(&folder).assert().code(0);
+    mops(&["new", "copy", "--from", "furuta-swing"]).current_dir(&folder).assert().code(0);
     mops(&["run", "copy", "--quiet", "--max-evaluations", "40"]).current_dir(&folder).assert().code(0);
-    assert!(folder.path().join("results/furuta-calibration/report.html").exists());
+    assert!(folder.path().join("results/furuta-swing/report.html").exists());
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! The Furuta pendulum as two rigid bodies and two bearings.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
-    WithTangents,
+    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
+    Scalar, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::kernel::drive::Drive;
 use crate::kernel::elements::BearingFriction;
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{self, Recording, Simulate, Tolerance, record, seconds, wanted};
+use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted};
 
 /// The Furuta pendulum as two rigid bodies: an arm that turns by `phi` about the vertical, a pendulum that turns by `theta`
 /// about the arm, 0 upright and pi hanging. With `K = J + m l^2`, `C = m r l`:
@@ -22,7 +22,8 @@ use crate::kernel::{self, Recording, Simulate, Tolerance, record, seconds, wante
 ///
 /// The bearings have dry friction: arm `t1 = sign(phi') (tau11 + (tau12 - tau11) |phi'|)` while it turns, at rest whatever
 /// holds it up to `peak1 tau11`; the pendulum likewise with `tau21`, `tau22` (N m, at 0 and at 1 rad/s) and `peak2`. A
-/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so.
+/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so. Linearised, the
+/// friction is left out.
 ///
 /// Parameters: `J` inertia of the pendulum about its centre of mass, `Ja` of the arm about its axis (kg m2), `m` mass of
 /// pendulum and weight (kg), `l` its centre of mass from the arm (m), `r` length of the arm (m, default 0.245), `g`
@@ -80,24 +81,53 @@ impl Model for Furuta2Joint {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..4].to_vec()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
+}
+
+impl Equations for Furuta2Joint {
+    /// Without friction, which has no slope at rest.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let frictionless = std::array::from_fn(|_| BearingFriction::none());
+        let dynamics = Self::dynamics(parameters, Drive::held(u[0]), frictionless);
+        let x = x.try_into().expect("two joints have four states");
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
 }
 
 impl Simulate for Furuta2Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let p: [S; 16] = parameters.try_into().expect("the study gives every parameter");
-        let [inertia, arm_inertia, m, l, r, g, tau11, tau12, peak1, tau21, tau22, peak2, start @ ..] = p;
-        let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
-        let friction = [
-            BearingFriction::new(&[[at_rest, tau11], [at_one, tau12]], peak1)?,
-            BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
-        ];
-        let lumped = Lumped::of(inertia, arm_inertia, m, l, r, g);
-        let bodies = TwoBodies { lumped, drive: Drive::new(job.case.input("u")) };
-        let mut dynamics = Mechanism::<S, _, 2, 4>::new(bodies, friction, &[ARM, PENDULUM]);
-        let output = |dynamics: &Mechanism<S, TwoBodies<'_, S>, 2, 4>, signal: usize, t: f64, x: &[S; 4]| {
-            if signal < 4 { x[signal] } else { S::from(dynamics.bodies.drive.at(t)) }
+        let [_, _, _, _, _, _, tau11, tau12, peak1, tau21, tau22, peak2, start @ ..] = parameters else {
+            panic!("the study gives every parameter")
         };
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        let line = |at_rest: S, at_one: S| [[S::from(0.0), at_rest], [S::from(1.0), at_one]];
+        let friction = [
+            BearingFriction::new(&line(*tau11, *tau12), *peak1)?,
+            BearingFriction::new(&line(*tau21, *tau22), *peak2)?,
+        ];
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), friction);
+        let start = start.try_into().expect("four start values come last");
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
+    }
+}
+
+type TwoJoints<'a, S> = Mechanism<S, TwoBodies<'a, S>, 2, 4>;
+
+impl Furuta2Joint {
+    fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 2]) -> TwoJoints<'a, S> {
+        let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
+        Mechanism::new(TwoBodies { lumped, drive }, friction, &[ARM, PENDULUM])
+    }
+
+    /// The value of a signal: the states, then the torque.
+    fn signal<S: Scalar>(dynamics: &TwoJoints<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
+        if signal < 4 { x[signal] } else { dynamics.bodies.drive.at(t) }
     }
 }
 
@@ -115,8 +145,8 @@ pub(crate) struct Lumped<S> {
 }
 
 impl<S: Scalar> Lumped<S> {
-    /// From the inertias of pendulum and arm, the pendulum's mass and centre of mass, the arm's length, and gravity.
-    pub fn of(inertia: S, arm_inertia: S, m: S, l: S, r: S, g: S) -> Self {
+    /// From values of [`body_parameters`].
+    pub fn of(&[inertia, arm_inertia, m, l, r, g]: &[S; 6]) -> Self {
         Self { a: inertia + m * l * l, b: arm_inertia + m * r * r, c: m * r * l, d: m * g * l }
     }
 
@@ -135,7 +165,7 @@ impl<S: Scalar> Lumped<S> {
 /// Arm and pendulum, with the torque on the arm.
 pub(crate) struct TwoBodies<'a, S> {
     pub lumped: Lumped<S>,
-    pub drive: Drive<'a>,
+    pub drive: Drive<'a, S>,
 }
 
 impl<S: Scalar> Bodies<S, 2> for TwoBodies<'_, S> {

@@ -1,7 +1,8 @@
 //! The Furuta pendulum whose pendulum can also tilt sideways, against a spring.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, WithTangents,
+    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
+    Scalar, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +11,7 @@ use crate::furuta_2_joint::{ARM, Lumped, PENDULUM, arm_torque, body_parameters, 
 use crate::kernel::drive::Drive;
 use crate::kernel::elements::{BearingFriction, SpringDamper};
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{self, Recording, Simulate, Tolerance, record, seconds, wanted};
+use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted};
 
 /// The Furuta pendulum of `furuta-2-joint` with a third joint: at its top the pendulum tilts by `psi` in the plane through
 /// its swing axis, against a spring and a damper in parallel. The rod has no inertia about its own axis. With
@@ -27,6 +28,7 @@ use crate::kernel::{self, Recording, Simulate, Tolerance, record, seconds, wante
 /// The bearing of the arm has a table of friction torque over speed: `tau11` at rest, `tau01` at `point0`, `tau05` at
 /// `point1`, `tau12` at `point2`, straight between and beyond, break-away at `peak1 tau11`. The pendulum's has two entries
 /// as in `furuta-2-joint`. A friction that is negative at a speed drives the joint: an event says so.
+/// Linearised, the friction is left out.
 ///
 /// Parameters: those of `furuta-2-joint`; `tau01`, `tau05` (N m), `point0`, `point1`, `point2` (rad/s, increasing); `c`
 /// (N m/rad), `d` (N m s/rad); start values `psi0`, `dpsi0` besides the others (0).
@@ -97,27 +99,58 @@ impl Model for Furuta3Joint {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..6].to_vec()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
+}
+
+impl Equations for Furuta3Joint {
+    /// Without friction, which has no slope at rest.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let frictionless = std::array::from_fn(|_| BearingFriction::none());
+        let dynamics = Self::dynamics(parameters, Drive::held(u[0]), frictionless);
+        let x = x.try_into().expect("three joints have six states");
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
 }
 
 impl Simulate for Furuta3Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let p: [S; 25] = parameters.try_into().expect("the study gives every parameter");
-        let [inertia, arm_inertia, m, l, r, g, friction @ .., c, d, phi, dphi, theta, dtheta, psi, dpsi] = p;
-        let [tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2] = friction;
+        let [_, _, _, _, _, _, friction @ .., _, _, phi, dphi, theta, dtheta, psi, dpsi] = parameters else {
+            panic!("the study gives every parameter")
+        };
+        let [tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2] =
+            *friction.first_chunk().expect("the study gives every parameter");
         let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
         let friction = [
             BearingFriction::new(&[[at_rest, tau11], [point0, tau01], [point1, tau05], [point2, tau12]], peak1)?,
             BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
             BearingFriction::none(),
         ];
-        let lumped = Lumped::of(inertia, arm_inertia, m, l, r, g);
-        let bodies = ThreeBodies { lumped, tilt: SpringDamper::new(c, d), drive: Drive::new(job.case.input("u")) };
-        let mut dynamics = Mechanism::<S, _, 3, 6>::new(bodies, friction, &[ARM, PENDULUM, TILT]);
-        let output = |dynamics: &Mechanism<S, ThreeBodies<'_, S>, 3, 6>, signal: usize, t: f64, x: &[S; 6]| {
-            if signal < 6 { x[signal] } else { S::from(dynamics.bodies.drive.at(t)) }
-        };
-        let start = [phi, dphi, theta, dtheta, psi, dpsi];
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), friction);
+        let start = [*phi, *dphi, *theta, *dtheta, *psi, *dpsi];
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
+    }
+}
+
+type ThreeJoints<'a, S> = Mechanism<S, ThreeBodies<'a, S>, 3, 6>;
+
+impl Furuta3Joint {
+    fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 3]) -> ThreeJoints<'a, S> {
+        let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
+        // Spring and damper stand before the six start values.
+        let tilt = SpringDamper::new(p[p.len() - 8], p[p.len() - 7]);
+        Mechanism::new(ThreeBodies { lumped, tilt, drive }, friction, &[ARM, PENDULUM, TILT])
+    }
+
+    /// The value of a signal: the states, then the torque.
+    fn signal<S: Scalar>(dynamics: &ThreeJoints<'_, S>, signal: usize, t: f64, x: &[S; 6]) -> S {
+        if signal < 6 { x[signal] } else { dynamics.bodies.drive.at(t) }
     }
 }
 
@@ -125,7 +158,7 @@ impl Simulate for Furuta3Joint {
 pub(crate) struct ThreeBodies<'a, S> {
     pub lumped: Lumped<S>,
     pub tilt: SpringDamper<S>,
-    pub drive: Drive<'a>,
+    pub drive: Drive<'a, S>,
 }
 
 impl<S: Scalar> Bodies<S, 3> for ThreeBodies<'_, S> {

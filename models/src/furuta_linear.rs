@@ -1,7 +1,8 @@
 //! The Furuta pendulum near its upright position, linearised.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, WithTangents,
+    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
+    Scalar, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +11,9 @@ use crate::furuta_2_joint::{ARM, Lumped, PENDULUM, arm_torque};
 use crate::kernel::drive::Drive;
 use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::{self, Joint};
-use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, seconds, wanted};
+use crate::kernel::{
+    self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted,
+};
 
 /// The Furuta pendulum linearised about the upright position, with a spring and a damper in parallel in each joint:
 ///
@@ -64,18 +67,41 @@ impl Model for FurutaLinear {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..4].to_vec()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
+}
+
+impl Equations for FurutaLinear {
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(u[0]))?;
+        let x = x.try_into().expect("the pendulum has four states");
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
 }
 
 impl Simulate for FurutaLinear {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let p: [S; 12] = parameters.try_into().expect("the study gives every parameter");
-        let [plant @ .., phi, dphi, theta, dtheta] = p;
-        let mut dynamics = Driven { plant: Upright::of(plant)?, drive: Drive::new(job.case.input("u")) };
-        let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &[S; 4]| {
-            if signal < 4 { x[signal] } else { S::from(dynamics.drive.at(t)) }
-        };
-        let start = [phi, dphi, theta, dtheta];
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
+        let start = *parameters.last_chunk().expect("four start values come last");
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
+    }
+}
+
+impl FurutaLinear {
+    fn dynamics<'a, S: Scalar>(parameters: &[S], drive: Drive<'a, S>) -> Result<Driven<'a, S>, Failure> {
+        let plant = *parameters.first_chunk().expect("the plant comes first");
+        Ok(Driven { plant: Upright::of(plant)?, drive })
+    }
+
+    /// The value of a signal: the states, then the torque.
+    fn signal<S: Scalar>(dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
+        if signal < 4 { x[signal] } else { dynamics.drive.at(t) }
     }
 }
 
@@ -142,14 +168,14 @@ impl<S: Scalar> Upright<S> {
 /// The linearised pendulum with a torque from outside.
 struct Driven<'a, S> {
     plant: Upright<S>,
-    drive: Drive<'a>,
+    drive: Drive<'a, S>,
 }
 
 impl<S: Scalar> Dynamics<S> for Driven<'_, S> {
     type State = [S; 4];
 
     fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {
-        let [arm, pendulum] = self.plant.linear(x, S::from(self.drive.at(t)));
+        let [arm, pendulum] = self.plant.linear(x, self.drive.at(t));
         *dx = [x[1], arm, x[3], pendulum];
     }
 

@@ -1,15 +1,17 @@
 //! The Furuta pendulum held upright by state feedback, its arm led to an angle.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
-    WithTangents,
+    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
+    Scalar, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
 use crate::kernel::elements::{Lag, Saturation};
-use crate::kernel::{self, Dynamics, Recording, Simulate, Tolerance, mechanism, record, seconds, wanted};
+use crate::kernel::{
+    self, Dynamics, Equations, Recording, Simulate, Tolerance, mechanism, rates_and_signals, record, seconds, wanted,
+};
 
 /// The Furuta pendulum with a spring and a damper in each joint, upright, under state feedback with a filtered reference:
 ///
@@ -96,25 +98,51 @@ impl Model for FurutaStateFeedback {
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..5].to_vec()
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
+}
+
+impl Equations for FurutaStateFeedback {
+    /// Within the limit of the torque.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], _: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let dynamics = self.dynamics(parameters)?;
+        let x = x.try_into().expect("the loop has five states");
+        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
 }
 
 impl Simulate for FurutaStateFeedback {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let mut dynamics = self.dynamics(parameters)?;
+        let [phi, dphi, theta, dtheta] = *parameters.last_chunk().expect("four start values come last");
+        let start = [phi, dphi, theta, dtheta, S::from(0.0)];
+        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
+    }
+}
+
+impl FurutaStateFeedback {
+    fn dynamics<S: Scalar>(&self, parameters: &[S]) -> Result<Loop<S>, Failure> {
         let p: [S; 19] = parameters.try_into().expect("the study gives every parameter");
-        let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., phi, dphi, theta, dtheta] = p;
-        let mut dynamics = Loop {
+        let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., _, _, _, _] = p;
+        Ok(Loop {
             gains: [k1, k2, k3, k4],
             setpoint,
             filter: Lag { time },
             actuator: Saturation::new(-limit, limit),
             equations: self.plant,
             plant: Upright::of(plant)?,
-        };
-        let output = |dynamics: &Loop<S>, signal: usize, _: f64, x: &[S; 5]| {
-            if signal < 5 { x[signal] } else { dynamics.torque(x) }
-        };
-        let start = [phi, dphi, theta, dtheta, S::from(0.0)];
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &output)
+        })
+    }
+
+    /// The value of a signal: the states, the torque.
+    fn signal<S: Scalar>(dynamics: &Loop<S>, signal: usize, _: f64, x: &[S; 5]) -> S {
+        if signal < 5 { x[signal] } else { dynamics.torque(x) }
     }
 }
 

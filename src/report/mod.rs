@@ -1,6 +1,7 @@
 //! The report of a run: one HTML page, and its plots as SVG and PNG.
 
 mod axis;
+mod bode;
 mod calibration;
 mod clip;
 mod comparison;
@@ -32,6 +33,7 @@ use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 
+pub(crate) use bode::{Sweep, bode, frequencies};
 pub(crate) use numbers::{file_name, significant};
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;

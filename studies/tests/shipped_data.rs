@@ -1,14 +1,38 @@
-//! The shipped recordings are what their generator makes.
+//! The shipped recordings are what their generators make.
 
 #[path = "../furuta-calibration/generate.rs"]
 mod furuta_calibration;
+#[path = "../furuta-swing/generate.rs"]
+mod furuta_swing;
+#[path = "../step-identification/generate.rs"]
+mod step_identification;
+
+fn check(study: &str, file: &str, generated: &str) {
+    let studies = mops_studies::shipped();
+    let study = studies.iter().find(|s| s.name == study).expect("it is shipped");
+    let shipped = study.file(&format!("data/{file}")).expect("it is shipped");
+    assert!(shipped == generated.as_bytes(), "{file} of {} differs", study.name);
+}
 
 #[test]
-fn the_recordings_of_furuta_calibration_are_what_the_generator_makes() {
-    let studies = mops_studies::shipped();
-    let study = studies.iter().find(|s| s.name == "furuta-calibration").expect("it is shipped");
+fn the_recordings_of_the_calibrations_are_what_the_generator_makes() {
     for (name, seed, start) in furuta_calibration::RECORDINGS {
-        let shipped = study.file(&format!("data/{name}")).expect("it is shipped");
-        assert!(shipped == furuta_calibration::recording(seed, start).as_bytes(), "{name} differs");
+        let generated = furuta_calibration::recording(seed, start);
+        check("furuta-calibration", name, &generated);
+        check("furuta-calibration-2-joint", name, &generated);
+    }
+}
+
+#[test]
+fn the_recordings_of_furuta_swing_are_what_the_generator_makes() {
+    for (name, seed, start) in furuta_swing::RECORDINGS {
+        check("furuta-swing", name, &furuta_swing::recording(seed, start));
+    }
+}
+
+#[test]
+fn the_recordings_of_step_identification_are_what_the_generator_makes() {
+    for (name, seed, torque) in step_identification::RECORDINGS {
+        check("step-identification", name, &step_identification::recording(seed, torque));
     }
 }

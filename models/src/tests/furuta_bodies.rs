@@ -64,16 +64,12 @@ fn start([phi, dphi, theta, dtheta]: [f64; 4]) -> [(&'static str, f64); 4] {
     [("phi0", phi), ("dphi0", dphi), ("theta0", theta), ("dtheta0", dtheta)]
 }
 
-fn lumped([inertia, arm, m, l, r, g]: Rods) -> Lumped<f64> {
-    Lumped::of(inertia, arm, m, l, r, g)
-}
-
 fn two_bodies(rods: Rods) -> TwoBodies<'static, f64> {
-    TwoBodies { lumped: lumped(rods), drive: Drive::new(None) }
+    TwoBodies { lumped: Lumped::of(&rods), drive: Drive::new(None) }
 }
 
 fn three_bodies(rods: Rods, spring: f64, damper: f64) -> ThreeBodies<'static, f64> {
-    ThreeBodies { lumped: lumped(rods), tilt: SpringDamper::new(spring, damper), drive: Drive::new(None) }
+    ThreeBodies { lumped: Lumped::of(&rods), tilt: SpringDamper::new(spring, damper), drive: Drive::new(None) }
 }
 
 fn near(value: f64, expected: f64, tolerance: f64) {

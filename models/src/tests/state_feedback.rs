@@ -1,8 +1,9 @@
 //! The upright pendulum under state feedback against published figures.
 
-use mops_core::{Case, ModelOptions, Response};
+use mops_core::{Case, Model, ModelOptions, OperatingPoint, Response};
 
-use super::{check_tangents_by, respond};
+use super::{check_tangents_by, respond, values as values_of};
+use crate::furuta_2_joint::Furuta2JointOptions;
 use crate::furuta_linear::FurutaLinearOptions;
 use crate::furuta_state_feedback::FurutaStateFeedbackOptions;
 
@@ -94,4 +95,41 @@ fn the_linear_pendulum_falls_as_its_unstable_pole_says() {
     let theta = response.trace("theta").unwrap();
     let pole = (theta.at(1.9) / theta.at(1.8)).ln() / 0.1;
     assert!((pole - 6.739).abs() < 1e-3, "{pole}");
+}
+
+/// `A` (rows of the rates) and `B` of a model upright at rest.
+fn linearised(model: &dyn Model, given: &[(&str, f64)]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let parameters = values_of(model, given);
+    let states = vec![0.0; model.equation_states().len()];
+    let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0] };
+    let local = model.local(&at).expect("it can be linearised").expect("it is defined");
+    let n = states.len();
+    (
+        (0..n).map(|i| (0..n).map(|j| local.slopes[(i, j)]).collect()).collect(),
+        local.slopes.column(n).as_slice()[..n].to_vec(),
+    )
+}
+
+#[test]
+fn the_linearised_pendula_have_the_matrices_of_the_thesis() {
+    let linear = toml::from_str::<FurutaLinearOptions>("").unwrap().build().unwrap();
+    let plant: Vec<_> = PLANT.into_iter().filter(|(name, _)| *name != "setpoint").collect();
+    let (a, b) = linearised(linear.as_ref(), &plant);
+    // Section 5.2; linearised by differences, it is right to 2e-4.
+    let printed = [[-0.1082, 0.0, -25.4814, 0.0255], [0.0756, 0.0, 45.7597, -0.0458]];
+    for (row, printed) in [&a[1], &a[3]].into_iter().zip(printed) {
+        for (value, printed) in row.iter().zip(printed) {
+            assert!((value - printed).abs() < 2e-4, "{value} is not {printed}");
+        }
+    }
+    assert!((b[1] - 1444.1).abs() < 0.06 && (b[3] + 1008.5).abs() < 0.06, "{b:?}");
+    // The rigid bodies with the rounded values of table 4.5.
+    let rods = [("J", 0.000464), ("Ja", 0.000227), ("m", 0.015102), ("l", 0.170544)];
+    let bodies = toml::from_str::<Furuta2JointOptions>("").unwrap().build().unwrap();
+    let (a, b) = linearised(bodies.as_ref(), &rods);
+    for (value, printed, digit) in
+        [(a[1][2], -25.4826, 6e-5), (a[3][2], 45.7750, 6e-5), (b[1], 1443.7, 0.06), (b[3], -1008.6, 0.06)]
+    {
+        assert!((value - printed).abs() < digit, "{value} is not {printed}");
+    }
 }
