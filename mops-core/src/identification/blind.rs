@@ -94,10 +94,10 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
             let (ratio, near) = (y / x, |wanted: f64| (y / x - wanted).abs() < EQUAL * wanted.abs());
             let [a_name, b_name] = [name(*a), name(*b)];
             // Along the direction ln a moves by x and ln b by y: a power of a times one of b stays.
-            let power = [2u8, 3].into_iter().find_map(|p| {
+            let power = [2u8, 3].into_iter().find(|&p| {
                 let times = f64::from(p);
                 let more = if ratio.abs() > 1.0 { times } else { 1.0 / times };
-                (near(more) || near(-more)).then_some(p)
+                near(more) || near(-more)
             });
             match power {
                 _ if relative && near(1.0) => {

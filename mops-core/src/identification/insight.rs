@@ -46,7 +46,7 @@ pub fn local(problem: &Problem, tuners: &[f64], zero: Option<f64>) -> Option<Loc
     let residuals = !found.at.residuals.is_empty();
     let counting = counting(problem);
     let rows = if residuals { found.at.residuals.len() } else { counting.len() };
-    if n == 0 || rows == 0 {
+    if n == 0 || rows == 0 || (residuals && found.residuals.iter().any(|column| column.len() != rows)) {
         return None;
     }
     let active: Vec<&Tuner> = problem.active().iter().map(|&i| &study.tuners[i]).collect();

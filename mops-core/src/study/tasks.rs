@@ -240,11 +240,20 @@ fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<Reg
     let RegressionDraft { experiment, input, output, a, b, delay, forgetting } = draft;
     let measures = |i: &usize| study.cases[*i].experiment.as_ref().is_some_and(|e| e.channel(&output).is_some());
     let case = match &experiment {
-        Some(wanted) => study.cases.iter().position(|c| c.name == *wanted).filter(measures).ok_or_else(|| {
-            let known = study.cases.iter().filter(|c| c.experiment.is_some()).map(|c| c.name.as_str());
-            Mistake::new("experiment", format!("no experiment `{wanted}` measures `{output}`"))
-                .with_help(suggestion(wanted, known))
-        })?,
+        Some(wanted) => {
+            let measured = || study.cases.iter().filter(|c| c.experiment.is_some()).map(|c| c.name.as_str());
+            let found =
+                study.cases.iter().position(|c| c.name == *wanted && c.experiment.is_some()).ok_or_else(|| {
+                    Mistake::new("experiment", format!("the study has no experiment `{wanted}`"))
+                        .with_help(suggestion(wanted, measured().collect::<Vec<_>>()))
+                })?;
+            let channels = study.cases[found].experiment.iter().flat_map(|e| &e.channels).map(|c| c.signal.as_str());
+            if !measures(&found) {
+                return Err(Mistake::new("output", format!("the experiment `{wanted}` does not measure `{output}`"))
+                    .with_help(suggestion(&output, channels.collect::<Vec<_>>())));
+            }
+            found
+        }
         None => (0..study.cases.len()).find(measures).ok_or_else(|| {
             Mistake::new("output", format!("no experiment measures `{output}`"))
                 .with_help("add it to the `channels` of an experiment")
