@@ -475,7 +475,8 @@ fn every_mistake_names_its_place() {
         (mistake.path.join("."), mistake.span.clone().map(|s| (s.start, s.end)), mistake.to_string())
     };
     let base = "states = { x = 'm', v = 'm/s' }\n";
-    let cases: [(&str, &str, Option<(usize, usize)>, &str); 14] = [
+    type Wrong = (&'static str, &'static str, Option<(usize, usize)>, &'static str);
+    let cases: [Wrong; 14] = [
         ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
         ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
         ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),
