@@ -449,7 +449,7 @@ fn models_from_text_that_are_wrong() {
             equations("a start value that changes", "20 K", "2*th"),
             equations("friction of something else", "friction.w", "friction.T"),
             equations("an event that resets no state", "w = \"-w\"", "v = \"-w\""),
-            equations("a mass matrix with one name", "start ", "mass = { w = 1 }\nstart "),
+            equations("a mass matrix with one name", "start      =", "mass = { w = 1 }\nstart      ="),
             equations("a family without ends", "T = \"K\"", "\"T[1..3]\" = \"K\""),
             equations("a bracket in a key", "T = \"K\"", "\"T[1..\" = \"K\""),
             equations("a number that is no expression", "2*sin(th)", "2 sin(th)"),

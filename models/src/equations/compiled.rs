@@ -84,18 +84,21 @@ pub struct Compiled {
     /// Which state a derivative depends on: derivative, state.
     pub pattern: Vec<(usize, usize)>,
     /// Columns of the Jacobian in groups that share no row: column, its rows.
-    pub columns: Vec<Vec<(usize, Vec<usize>)>>,
+    pub columns: Vec<Vec<Column>>,
 }
+
+/// A column of the Jacobian, and its rows.
+pub type Column = (usize, Vec<usize>);
 
 /// Groups of columns of which no two meet in a row, taken greedily.
 ///
 /// Source: A. Curtis, M. Powell, J. Reid, On the estimation of sparse Jacobian matrices, IMA J. Appl. Math. 13 (1974) 117.
-fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<(usize, Vec<usize>)>> {
+fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
     let mut rows = vec![Vec::new(); states];
     for &(row, column) in pattern {
         rows[column].push(row);
     }
-    let mut groups: Vec<(Vec<bool>, Vec<(usize, Vec<usize>)>)> = Vec::new();
+    let mut groups: Vec<(Vec<bool>, Vec<Column>)> = Vec::new();
     for (column, rows) in rows.into_iter().enumerate() {
         let free = groups.iter().position(|(taken, _)| rows.iter().all(|&row| !taken[row]));
         let group = free.unwrap_or(groups.len());

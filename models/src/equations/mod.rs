@@ -119,6 +119,21 @@ impl Equations {
         self.compiled.derivative.len()
     }
 
+    /// Values of the states at the start: of parameters, or of expressions where the parameter is no number, as nobody
+    /// gives it.
+    fn start<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
+        &self,
+        dynamics: &Running<'_, S, X, B>,
+        parameters: &[S],
+    ) -> Vec<S> {
+        let expressions: HashMap<usize, S> = dynamics.starts().into_iter().collect();
+        let start = |(s, start): (usize, &Start)| match *start {
+            Start::Expression(parameter) if parameters[parameter].value().is_nan() => expressions[&s],
+            Start::Parameter(parameter) | Start::Expression(parameter) => parameters[parameter],
+        };
+        self.starts.iter().enumerate().map(start).collect()
+    }
+
     fn run<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
         &self,
         job: &Job<'_>,
@@ -127,15 +142,7 @@ impl Equations {
     ) -> Result<Recording, Failure> {
         let drives = self.interface.inputs.iter().map(|input| Drive::new(job.case.input(&input.name))).collect();
         let mut dynamics: Running<'_, S, X, B> = Running::new(&self.compiled, drives, parameters, self.tolerance);
-        let expressions: HashMap<usize, S> = dynamics.starts().into_iter().collect();
-        let start = |(s, start): (usize, &Start)| match *start {
-            Start::Parameter(parameter) => parameters[parameter],
-            // A parameter that nobody gives is no number.
-            Start::Expression(parameter) if parameters[parameter].value().is_nan() => expressions[&s],
-            Start::Expression(parameter) => parameters[parameter],
-        };
-        let start: Vec<S> = self.starts.iter().enumerate().map(start).collect();
-        let start = state(&start);
+        let start = state(&self.start(&dynamics, parameters));
         dynamics.check_start(&start)?;
         let output =
             |dynamics: &Running<'_, S, X, B>, signal: usize, t: f64, x: &X| dynamics.signal(signal, t, x.as_ref());
@@ -159,6 +166,13 @@ impl Model for Equations {
 
     fn equation_states(&self) -> Vec<Variable> {
         self.interface.signals[..self.compiled.states].to_vec()
+    }
+
+    fn start_values(&self, parameters: &[f64]) -> Option<Vec<f64>> {
+        let drives = self.interface.inputs.iter().map(|_| Drive::held(0.0)).collect();
+        let dynamics: Running<'_, f64, Vec<f64>, Many<f64>> =
+            Running::new(&self.compiled, drives, parameters, self.tolerance);
+        Some(self.start(&dynamics, parameters))
     }
 
     fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {

@@ -463,6 +463,7 @@ fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
     assert!((at(&response, "x", 1.0) - (0.1 * 3f64.cos() + 3f64.sin())).abs() < 1e-9);
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1), ("v0", 0.0)], 1.0);
     assert!((at(&response, "x", 1.0) - 0.1 * 3f64.cos()).abs() < 1e-9, "a start value that is given goes over it");
+    assert_eq!(model.start_values(&[3.0, 0.5, 0.1, f64::NAN]), Some(vec![0.1, 3.0]));
     assert_eq!(model.interface().states[0].start, "s");
     assert_eq!(model.interface().states[1].rate_of.as_deref(), Some("x"));
 }
@@ -474,7 +475,8 @@ fn every_mistake_names_its_place() {
         (mistake.path.join("."), mistake.span.clone().map(|s| (s.start, s.end)), mistake.to_string())
     };
     let base = "states = { x = 'm', v = 'm/s' }\n";
-    let cases: [(&str, &str, Option<(usize, usize)>, &str); 14] = [
+    type Wrong = (&'static str, &'static str, Option<(usize, usize)>, &'static str);
+    let cases: [Wrong; 14] = [
         ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
         ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
         ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),
