@@ -40,6 +40,7 @@
 mod cli;
 mod report;
 mod solve;
+mod tasks;
 
 use std::process::ExitCode;
 
@@ -47,7 +48,7 @@ pub use mops_core::*;
 pub use mops_criteria as criteria;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
-pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report};
+pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface};
 pub use solve::{Options, Solved, Unsuitable, solve};
 
 /// Everything that comes with mops: models, criteria, solvers and studies.

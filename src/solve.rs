@@ -1,4 +1,4 @@
-//! Solves a study: problem, run, solver, conclusion.
+//! Does what a study is for: problem, run, solver, conclusion.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -7,6 +7,8 @@ use mops_core::{
     Budget, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Problem, Record, Run, SolverChoice, Stop, Study,
     Watch, conclude,
 };
+
+use crate::tasks;
 
 /// How a study is solved.
 #[derive(Clone)]
@@ -53,7 +55,7 @@ impl std::fmt::Display for Unsuitable {
 
 impl std::error::Error for Unsuitable {}
 
-/// Solves a study; `watch` looks on and may end the run.
+/// Does the task of a study; `watch` looks on and may end the run.
 ///
 /// # Errors
 /// The solver cannot treat the problem.
@@ -62,10 +64,14 @@ impl std::error::Error for Unsuitable {}
 /// If the threads cannot be started.
 pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs.unwrap_or(0)).build();
-    threads.expect("threads can be started").install(|| solve_here(study, options, watch))
+    threads.expect("threads can be started").install(|| tasks::perform(study, options, watch))
 }
 
-fn solve_here(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+/// Searches for the best point, and concludes.
+///
+/// # Errors
+/// The solver cannot treat the problem.
+pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();
@@ -79,6 +85,27 @@ fn solve_here(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solv
     let archive = run.archive().to_vec();
     drop(run);
     Ok(Solved { outcome, problem, best, archive })
+}
+
+/// Looks at the start values alone, and concludes.
+pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let begun = Instant::now();
+    let problem = Problem::new(Arc::new(study));
+    let mut run = Run::new(&problem, Budget { evaluations: 1 }, watch);
+    let halted = run.evaluate(&[problem.start()]).is_err() && run.best().is_none();
+    if halted {
+        // Nobody waits for this single point: it is needed to conclude.
+        run = Run::new(&problem, Budget { evaluations: 1 }, &());
+        run.evaluate(&[problem.start()]).expect("a budget of one point suffices for one");
+    }
+    // N.B.: as if it were interrupted, so that no start value is estimated either.
+    let ending = Ending { stop: Stop::Interrupted, pareto: Pareto::NotShown, seconds: 0.0 };
+    let (mut outcome, best) = conclude(&run, &options.solver, ending);
+    (outcome.solver, outcome.stop) = ("none".to_owned(), Stop::Converged);
+    outcome.seconds = begun.elapsed().as_secs_f64();
+    let archive = run.archive().to_vec();
+    drop(run);
+    Solved { outcome, problem, best, archive }
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.

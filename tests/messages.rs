@@ -392,6 +392,71 @@ fn demands_that_cannot_be_met_or_missed() {
     );
 }
 
+/// A model from text that is right.
+const EQUATIONS: &str = r#"[study]
+name = "rig"
+
+[models.rig.equations]
+states     = { th = "rad", w = "rad/s", T = "K" }
+inputs     = { u = "N m" }
+parameters = { J = "kg m2", b = "N m s/rad" }
+constants  = { g = "9.81 m/s2" }
+let        = { load = "2*sin(th)", heat = "b*w^2" }
+der        = { th = "w", w = "J*w' = u - load - b*w", T = "heat - T" }
+start      = { T = "20 K" }
+friction.w = { coulomb = 0.1 }
+when.hit   = { guard = "1 - th", reset = { w = "-w" } }
+horizon    = "3 s"
+
+[tuners]
+J = { start = 1.0, min = 0.1, max = 5.0 }
+b = { start = 0.1, min = 0.0, max = 1.0 }
+
+[criteria]
+highest = { peak = { signal = "th" }, demand = 1.0 }
+"#;
+
+/// The model from text with a mistake.
+fn equations(what: &'static str, right: &str, instead: &str) -> Case {
+    Case::new(what, &broken(EQUATIONS, right, instead))
+}
+
+#[test]
+fn models_from_text_that_are_wrong() {
+    check(
+        "equations",
+        &[
+            equations("a name that is not there", "u - load", "u - laod"),
+            equations("a bracket that does not close", "2*sin(th)", "2*sin(th"),
+            equations("a bracket of the wrong kind", "2*sin(th)", "2*sin(th]"),
+            equations("a function that is not there", "2*sin(th)", "2*sinus(th)"),
+            equations("a function with too few values", "2*sin(th)", "clip(th, 1)"),
+            equations("a condition as a number", "2*sin(th)", "2*(th > 1)"),
+            equations("a number as a condition", "2*sin(th)", "if(th, 1, 2)"),
+            equations("an unknown unit", "kg m2", "kg mm2x"),
+            equations("a start value in another unit", "20 K", "20 V"),
+            equations("definitions in a circle", "2*sin(th)", "heat + load"),
+            equations("a state without derivative", ", T = \"heat - T\"", ""),
+            equations("a derivative of something else", "T = \"heat - T\"", "T = \"heat - T\", u = \"1\""),
+            equations("the derivative of a parameter", "J*w' =", "b*J' ="),
+            equations("an equation that is not linear in the derivatives", "J*w' =", "w'^2 ="),
+            equations("an equation without a derivative", "J*w' =", "J ="),
+            equations("equations that leave a derivative open", "T = \"heat - T\"", "T = \"w' = T\""),
+            equations("an equation where none belongs", "2*sin(th)", "x = 2*sin(th)"),
+            equations("a name given twice", "b = \"N m s/rad\"", "b = \"N m s/rad\", u = \"1\""),
+            equations("a name with a meaning of its own", "b = \"N m s/rad\"", "b = \"N m s/rad\", time = \"s\""),
+            equations("a name that is no name", "g = \"9.81", "g-n = \"9.81"),
+            equations("a start value that changes", "20 K", "2*th"),
+            equations("friction of something else", "friction.w", "friction.T"),
+            equations("an event that resets no state", "w = \"-w\"", "v = \"-w\""),
+            equations("a mass matrix with one name", "start      =", "mass = { w = 1 }\nstart      ="),
+            equations("a family without ends", "T = \"K\"", "\"T[1..3]\" = \"K\""),
+            equations("a bracket in a key", "T = \"K\"", "\"T[1..\" = \"K\""),
+            equations("a number that is no expression", "2*sin(th)", "2 sin(th)"),
+        ],
+    );
+}
+
 #[test]
 fn models_that_cannot_be_simulated() {
     check(

@@ -10,23 +10,35 @@
 //! let criterion = CriterionDraft::minimise(overshoot, 0.1);
 //! ```
 
+pub mod bandwidth;
 pub mod control_effort;
+pub mod crossover_frequency;
+pub mod damping_ratio;
+pub mod delay_margin;
 pub mod delay_time;
 pub mod final_value;
 pub mod fit;
 pub mod fit_percent;
+pub mod frequency_fit;
+pub mod gain_margin;
+pub mod h2_norm;
+pub mod hinf_norm;
 pub mod iae;
 pub mod ise;
 pub mod itae;
 pub mod itse;
+pub mod maximum_complementary_sensitivity;
 pub mod maximum_rate;
+pub mod maximum_sensitivity;
 pub mod model_tracking;
 pub mod normalised_error;
 pub mod overshoot;
 pub mod peak;
+pub mod phase_margin;
 pub mod rise_time;
 pub mod rmse;
 pub mod settling_time;
+pub mod slowest_pole;
 pub mod steady_state_error;
 pub mod step_envelope;
 pub mod undershoot;
@@ -60,5 +72,17 @@ pub fn kinds() -> Vec<CriterionKind> {
         CriterionKind::of::<normalised_error::NormalisedError>(),
         CriterionKind::of::<rmse::Rmse>(),
         CriterionKind::of::<fit_percent::FitPercent>(),
+        CriterionKind::of::<gain_margin::GainMargin>(),
+        CriterionKind::of::<phase_margin::PhaseMargin>(),
+        CriterionKind::of::<delay_margin::DelayMargin>(),
+        CriterionKind::of::<maximum_sensitivity::MaximumSensitivity>(),
+        CriterionKind::of::<maximum_complementary_sensitivity::MaximumComplementarySensitivity>(),
+        CriterionKind::of::<bandwidth::Bandwidth>(),
+        CriterionKind::of::<crossover_frequency::CrossoverFrequency>(),
+        CriterionKind::of::<damping_ratio::DampingRatio>(),
+        CriterionKind::of::<slowest_pole::SlowestPole>(),
+        CriterionKind::of::<h2_norm::H2Norm>(),
+        CriterionKind::of::<hinf_norm::HinfNorm>(),
+        CriterionKind::of::<frequency_fit::FrequencyFit>(),
     ]
 }

@@ -5,8 +5,8 @@ use std::io;
 
 use mops_core::file::{Files, describe, read};
 use mops_core::{
-    Analysis, Catalogue, Failure, Interface, Job, Mistake, Model, ModelKind, ModelOptions, Problem, Response, Solver,
-    SolverKind, SolverOptions, Trace, Variable,
+    Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Mistake, Model, ModelKind, ModelOptions, Problem,
+    Response, Solver, SolverKind, SolverOptions, Trace, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -14,7 +14,7 @@ use serde::Deserialize;
 use crate::kinds;
 
 /// Every kind, with options as they stand in a study file.
-const EXAMPLES: [(&str, &str); 20] = [
+const EXAMPLES: [(&str, &str); 32] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
     ("peak", "{ signal = 'y', of = 'absolute' }"),
@@ -35,7 +35,27 @@ const EXAMPLES: [(&str, &str); 20] = [
     ("normalised-error", "{ signal = 'y', noise = '1 mm' }"),
     ("rmse", "{ signal = 'y' }"),
     ("fit-percent", "{ signal = 'y' }"),
+    ("gain-margin", "{ input = 'u', output = 'y', either-way = true }"),
+    ("phase-margin", "{}"),
+    ("delay-margin", "{}"),
+    ("maximum-sensitivity", "{}"),
+    ("maximum-complementary-sensitivity", "{}"),
+    ("bandwidth", "{ of = 'closed-loop' }"),
+    ("crossover-frequency", "{}"),
+    ("damping-ratio", "{ of = 'closed-loop' }"),
+    ("slowest-pole", "{ of = 'system' }"),
+    ("h2-norm", "{}"),
+    ("hinf-norm", "{}"),
+    ("frequency-fit", "{ signal = 'y', input = 'u', absolute = false }"),
 ];
+
+/// Kinds from this one on read linear systems.
+const FIRST_LINEAR: &str = "gain-margin";
+
+fn is_linear(kind: &str) -> bool {
+    let place = |kind| EXAMPLES.iter().position(|(name, _)| *name == kind);
+    place(kind) >= place(FIRST_LINEAR)
+}
 
 #[test]
 fn every_kind_has_one_name_and_the_examples_cover_them_all() {
@@ -61,30 +81,52 @@ fn every_page_of_the_manual_opens_with_a_formula_and_names_its_source() {
 fn every_kind_is_read_from_a_study_file_and_has_a_value() {
     let criteria: String = EXAMPLES
         .iter()
-        .map(|(name, options)| format!("{name} = {{ {name} = {options}, usage = 'monitor' }}\n"))
+        .map(|(name, options)| {
+            let model = if is_linear(name) { "linear" } else { "lag" };
+            format!("{name} = {{ {name} = {options}, model = '{model}', usage = 'monitor' }}\n")
+        })
         .collect();
     let problem = Problem::new(read_study(&criteria).expect("it is a study").into());
-    let evaluation = problem.evaluate(&problem.start());
+    let evaluation = problem.evaluate_at(&problem.study().start());
     assert!(evaluation.failures.is_empty(), "{:?}", evaluation.failures);
-    let measured = ["fit", "normalised-error", "rmse", "fit-percent"].len();
-    assert_eq!(evaluation.readings.iter().flatten().count(), 2 * (EXAMPLES.len() - measured) + measured);
+    // In the case and in both experiments; over time not in the one over frequency; of measurements only where there is one.
+    let measured = ["fit", "normalised-error", "rmse", "fit-percent", "frequency-fit"].len();
+    let linear = EXAMPLES.iter().filter(|(name, _)| is_linear(name)).count() - 1;
+    let simulated = EXAMPLES.len() - linear - measured;
+    assert_eq!(evaluation.readings.iter().flatten().count(), 2 * simulated + 3 * linear + measured);
+}
+
+#[test]
+fn a_criterion_refuses_a_model_of_the_other_sort_and_names_one_that_fits() {
+    let wrong =
+        read_study("margin = { gain-margin = {}, model = 'lag', usage = 'monitor' }").err().expect("a simulation");
+    assert!(wrong.to_string().contains("reads a linear system, but `lag` is simulated"), "{wrong}");
+    assert!(wrong.help.unwrap().contains("model = \"linear\""));
+    let wrong =
+        read_study("top = { peak = { signal = 'y' }, model = 'linear', usage = 'monitor' }").err().expect("linear");
+    assert!(wrong.to_string().contains("`linear` is a linear system"), "{wrong}");
+    let wrong = read_study("margin = { gain-margin = { input = 'v' }, model = 'linear', usage = 'monitor' }").err();
+    let wrong = wrong.expect("no such input");
+    assert!(wrong.to_string().contains(":14:36: the model has no input `v`"), "{wrong}");
 }
 
 #[test]
 fn a_mistake_in_an_option_is_led_back_to_its_place() {
-    let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, demand = 1 }")
+    let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, model = 'lag', demand = 1 }")
         .err()
         .expect("the unit is wrong");
-    assert!(wrong.to_string().contains(":12:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
+    assert!(wrong.to_string().contains(":14:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
 }
 
 fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {
     let catalogue = Catalogue { criteria: kinds(), ..Catalogue::default() }
         .with_model(ModelKind::of::<Lag>())
+        .with_model(ModelKind::of::<LinearLag>())
         .with_solver(SolverKind::of::<NoSolver>());
     let text = format!(
-        "[study]\nname = 'test'\n[models]\nlag = {{ lag = {{}} }}\n[tuners]\nT = {{ start = 1, min = 0.5, max = 2 }}\n\
+        "[study]\nname = 'test'\n[models]\nlag = {{ lag = {{}} }}\nlinear = {{ linear-lag = {{}} }}\n[tuners]\nT = {{ start = 1, min = 0.5, max = 2 }}\n\
          [cases]\nstep = {{ horizon = 6 }}\n[experiments]\nlog = {{ file = 'log.csv', channels = {{ y = 'y' }} }}\n\
+         sweep = {{ file = 'sweep.csv', frequency = 'f', responses = {{ y = {{ real = 're', imaginary = 'im' }} }} }}\n\
          [criteria]\n{criteria}"
     );
     read(&catalogue, "study.toml", &text, &[], &Data).map(|file| file.study)
@@ -94,7 +136,10 @@ fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic>
 struct Data;
 
 impl Files for Data {
-    fn read(&self, _: &str) -> io::Result<Vec<u8>> {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        if path == "sweep.csv" {
+            return Ok(b"f [Hz],re,im\n0.1,2,-1\n0.2,1,-1\n".to_vec());
+        }
         Ok(b"time [s],y [m]\n0,0\n2,0.8\n4,1.0\n".to_vec())
     }
 
@@ -127,6 +172,37 @@ impl Model for LagModel {
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         let trace: Trace = crate::common::testing::sampled(job.horizon, 500, |t| 1.0 - (-t / job.parameters[0]).exp());
         Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
+    }
+}
+
+/// `3/((T s + 1)(s + 1))`.
+#[derive(Deserialize, JsonSchema)]
+struct LinearLag {}
+
+struct LinearLagModel(Interface);
+
+impl ModelOptions for LinearLag {
+    const KIND: &'static str = "linear-lag";
+
+    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+        Ok(Box::new(LinearLagModel(Interface {
+            signals: vec![Variable::new("y", "m", "output")],
+            inputs: vec![Variable::new("u", "m", "input")],
+            parameters: vec![mops_core::Parameter::new("T", "s", "time constant")],
+            analysis: AnalysisKind::Linear,
+            ..Interface::default()
+        })))
+    }
+}
+
+impl Model for LinearLagModel {
+    fn interface(&self) -> &Interface {
+        &self.0
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        let t = job.parameters[0];
+        Ok(crate::common::testing::linear(&[3.0], &[t, 1.0 + t, 1.0]))
     }
 }
 

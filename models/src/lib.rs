@@ -7,8 +7,12 @@ pub mod furuta_3_joint;
 pub mod furuta_linear;
 pub mod furuta_state_feedback;
 pub mod kernel;
+mod linear_system;
 pub mod pid_loop;
+pub mod pid_open_loop;
 mod plant;
+pub mod state_space;
+pub mod transfer_function;
 
 use mops_core::ModelKind;
 
@@ -17,6 +21,9 @@ pub fn kinds() -> Vec<ModelKind> {
     vec![
         ModelKind::of::<pid_loop::PidLoopOptions>(),
         ModelKind::of::<furuta::FurutaOptions>(),
+        ModelKind::of::<pid_open_loop::PidOpenLoopOptions>(),
+        ModelKind::of::<transfer_function::TransferFunctionOptions>(),
+        ModelKind::of::<state_space::StateSpaceOptions>(),
         ModelKind::of::<furuta_2_joint::Furuta2JointOptions>(),
         ModelKind::of::<furuta_3_joint::Furuta3JointOptions>(),
         ModelKind::of::<furuta_linear::FurutaLinearOptions>(),
@@ -25,5 +32,7 @@ pub fn kinds() -> Vec<ModelKind> {
     ]
 }
 
+#[cfg(test)]
+mod linear_tests;
 #[cfg(test)]
 mod tests;

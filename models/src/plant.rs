@@ -185,7 +185,7 @@ fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> R
 }
 
 /// Coefficients, rising powers, of `(s - r1)(s - r2)...`.
-fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
+pub(crate) fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
     let mut polynomial = vec![S::from(1.0)];
     for &root in roots {
         polynomial.push(S::from(0.0));

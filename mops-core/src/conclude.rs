@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
-
 use crate::catalogue::SolverChoice;
 use crate::experiment::{Channel, Role};
+use crate::identification::{self, Local};
 use crate::model::Analysis;
 use crate::outcome::{
-    self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Outcome, ParameterReport, Pareto,
-    StartReport,
+    self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Findings, Outcome, ParameterReport,
+    Pareto, StartReport,
 };
 use crate::problem::{Evaluation, Problem};
 use crate::run::{Budget, Run};
@@ -45,7 +44,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
             continue;
         }
         let part = Problem::of_case(Arc::clone(&study), case, &best.tuners);
-        if part.active().is_empty() {
+        if part.active().is_empty() || part.simulations() == 0 {
             continue;
         }
         let mut run = Run::new(&part, Budget { evaluations: 2000 }, &());
@@ -60,7 +59,13 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
 
     let calibration =
         (study.task == Task::Calibration || study.cases.iter().any(|c| c.experiment.is_some())).then(|| {
-            CalibrationReport { parameters: standard_errors(problem, &best), experiments: experiments(problem, &best) }
+            let local = identification::local(problem, &best.tuners, study.tasks.sensitivity.zero);
+            CalibrationReport {
+                parameters: standard_errors(problem, &best, local.as_ref()),
+                experiments: experiments(problem, &best),
+                sensitivity: local.map(|local| identification::report_of(problem, &best.tuners, &local)),
+                excitation: identification::excitations(&study, &study.tasks.excitation.question),
+            }
         });
     let failures = run
         .failures()
@@ -98,6 +103,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         },
         front: vec![outcome::front_point(&study, &best)],
         calibration,
+        found: Findings::default(),
         failures,
         warnings,
     };
@@ -119,53 +125,12 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
 /// Standard errors of the active tuners: the roots of the diagonal of `s^2 (J' J)^-1`, with `s^2` the mean square of the
 /// residuals per degree of freedom. To first order, and for white residuals. Source: L. Ljung, System Identification,
 /// 2nd edition (1999), section 9.4. NaN along directions that the data do not determine.
-fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport> {
-    let study = Arc::clone(problem.study());
-    let active = problem.active().to_vec();
-    // A run of its own: the errors are computed even when the budget is spent.
-    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
-    let slopes = probe.linearise(&problem.point_of(&best.tuners), 1.0).ok().flatten();
-    let n = active.len();
-    // As many parameters as samples leave nothing to judge the noise by.
-    let errors = slopes.filter(|l| n > 0 && l.at.residuals.len() > n).map(|l| {
-        let m = l.at.residuals.len();
-        let columns: Vec<DVector<f64>> = l.residuals.into_iter().map(DVector::from_vec).collect();
-        let j = DMatrix::from_columns(&columns);
-        #[allow(clippy::cast_precision_loss)]
-        let variance = l.at.merit.objective / (m - n) as f64;
-        // Scaled to unit columns first, so that rank is judged free of units.
-        let norms: Vec<f64> = j.column_iter().map(|c| c.norm()).collect();
-        let scaled = DMatrix::from_fn(m, n, |i, k| if norms[k] > 0.0 { j[(i, k)] / norms[k] } else { 0.0 });
-        let svd = scaled.svd(false, true);
-        let v = svd.v_t.expect("asked for").transpose();
-        let largest = svd.singular_values.max();
-        (0..n)
-            .map(|k| {
-                let sum: f64 = (0..n)
-                    .map(|i| {
-                        let s = svd.singular_values[i];
-                        // A direction without effect makes every tuner that takes part in it undetermined.
-                        if s > 1e-9 * largest {
-                            (v[(k, i)] / s).powi(2)
-                        } else if v[(k, i)].abs() > 1e-6 {
-                            f64::NAN
-                        } else {
-                            0.0
-                        }
-                    })
-                    .sum();
-                (variance * sum).sqrt() / norms[k]
-            })
-            .collect::<Vec<f64>>()
-    });
+fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) -> Vec<ParameterReport> {
+    let study = problem.study();
     let report = |(k, &i): (usize, &usize)| {
         let tuner = &study.tuners[i];
         let value = best.tuners[i];
-        // The slope of the tuner along its coordinate of the unit box turns the error into the tuner's unit.
-        let u = tuner.position_of(value);
-        let (a, b) = ((u - 1e-4).max(0.0), (u + 1e-4).min(1.0));
-        let slope = (tuner.value_at(b) - tuner.value_at(a)) / (b - a);
-        let error = errors.as_ref().map_or(f64::NAN, |e| e[k] * slope);
+        let error = local.map_or(f64::NAN, |local| local.deviation * local.sensitivity.together[k]);
         let half = 1.96 * error;
         ParameterReport {
             name: tuner.name.clone(),
@@ -176,7 +141,7 @@ fn standard_errors(problem: &Problem, best: &Evaluation) -> Vec<ParameterReport>
             unit: tuner.unit.to_string(),
         }
     };
-    active.iter().enumerate().map(report).collect()
+    problem.active().iter().enumerate().map(report).collect()
 }
 
 fn experiments(problem: &Problem, best: &Evaluation) -> Vec<ExperimentReport> {

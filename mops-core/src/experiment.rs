@@ -123,11 +123,24 @@ pub struct Channel {
     pub noise: Option<f64>,
 }
 
+/// A measured frequency response.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ResponseData {
+    /// The output, a signal of a linear model.
+    pub signal: String,
+    /// Angular frequencies, rad/s.
+    pub frequencies: Vec<f64>,
+    /// Real and imaginary part at each, in the unit of the output over that of the input; gaps are left out.
+    pub values: Vec<[f64; 2]>,
+}
+
 /// A measurement: what was recorded, what it is used for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Experiment {
     /// The measured signals.
     pub channels: Vec<Channel>,
+    /// The measured frequency responses.
+    pub responses: Vec<ResponseData>,
     /// What it is used for.
     pub role: Role,
 }
@@ -136,6 +149,11 @@ impl Experiment {
     /// The channel that measures `signal`.
     pub fn channel(&self, signal: &str) -> Option<&Channel> {
         self.channels.iter().find(|channel| channel.signal == signal)
+    }
+
+    /// The frequency response of which `signal` is the output.
+    pub fn response(&self, signal: &str) -> Option<&ResponseData> {
+        self.responses.iter().find(|response| response.signal == signal)
     }
 
     /// Time of the last sample of all channels, s.

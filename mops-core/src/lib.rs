@@ -12,6 +12,7 @@ mod differences;
 mod experiment;
 pub mod expression;
 pub mod file;
+pub mod identification;
 pub mod linear;
 mod linearised;
 mod model;
@@ -35,7 +36,7 @@ pub use catalogue::{
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
-pub use experiment::{Channel, Experiment, Hold, Input, Role};
+pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting};
@@ -44,8 +45,8 @@ pub use model::{
     Variable, WithTangents, Work,
 };
 pub use outcome::{
-    CalibrationReport, ChannelReport, CriterionReport, ExperimentReport, FailureReport, Outcome, ParameterReport,
-    Pareto, StartReport, TunerReport, criterion_reports,
+    CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
+    Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
 pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
@@ -54,8 +55,9 @@ pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
-    CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, JobPlan, Measured, Mistake, ModelDraft, Objective,
-    ParameterSource, Row, Study, Task, TunerDraft,
+    Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, Draft, ExcitationDraft, ExcitationTask, Free, JobPlan,
+    Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask, Row,
+    SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
 };
 pub use trace::{Piece, Trace};
 pub use tuner::{Grid, Scale, Tuner};

@@ -124,7 +124,9 @@ impl Linearised {
     pub fn at(&self, case: &Case, parameters: &[f64]) -> Result<Resting, Failure> {
         let of = self.model.interface();
         let n = self.states.len();
+        let computed = self.model.start_values(parameters);
         let start = |index: usize| match (index < n).then(|| self.starts[index]) {
+            Some(_) if computed.is_some() => computed.as_ref().map_or(0.0, |values| values[index]),
             Some(Some(parameter)) => parameters[parameter],
             Some(None) => 0.0,
             None => case.input(&of.inputs[index - n].name).map_or(0.0, |input| input.at(0.0)),

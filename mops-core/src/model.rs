@@ -145,6 +145,11 @@ pub trait Model: Send + Sync {
         Vec::new()
     }
 
+    /// Values of [`Model::equation_states`] at the start, where they are not just those of parameters.
+    fn start_values(&self, _parameters: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// The equations at an operating point, to linearise the model there. `None`: it has none that can be linearised.
     fn local(&self, _at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         None

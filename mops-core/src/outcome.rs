@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::criterion::{Demand, Usage};
 use crate::experiment::Role;
+use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport};
 use crate::problem::{Evaluation, FEASIBLE};
 use crate::solver::Stop;
 use crate::study::{Study, Task};
@@ -65,10 +66,69 @@ pub struct Outcome {
     /// Of a calibration: estimates and errors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
+    /// What tasks other than design and calibration found: a block for each.
+    #[serde(flatten)]
+    pub found: Findings,
     /// What failed on the way.
     pub failures: Vec<FailureReport>,
     /// What a reader should know.
     pub warnings: Vec<String>,
+}
+
+/// What tasks other than design and calibration found.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Findings {
+    /// How rich the inputs are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excitation: Option<ExcitationFindings>,
+    /// What the data or the criteria tell of the tuners.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<SensitivityReport>,
+    /// The objective over one tuner or two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<SweepReport>,
+}
+
+/// How rich inputs are, and what regressions make of them.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExcitationFindings {
+    /// Every input of every case.
+    pub inputs: Vec<ExcitationReport>,
+    /// FIR and ARX models.
+    pub regressions: Vec<RegressionReport>,
+}
+
+/// The objective over one tuner or two.
+#[derive(Debug, Clone, Serialize)]
+pub struct SweepReport {
+    /// The findings in sentences; names stand between backticks.
+    pub words: Vec<String>,
+    /// The tuner along x.
+    pub x: SweepAxis,
+    /// The tuner along y, if there is one.
+    pub y: Option<SweepAxis>,
+    /// The objective: one row per value of y (a single one without y), with one number per value of x; null where a
+    /// simulation failed.
+    pub objective: Vec<Vec<f64>>,
+    /// The largest violation of a constraint, in scaled values, likewise.
+    pub violation: Vec<Vec<f64>>,
+    /// Value of x, of y (null without y), and objective at the best point of the sweep.
+    pub best: [f64; 3],
+    /// The same at the point around which it was made.
+    pub centre: [f64; 3],
+}
+
+/// A swept tuner.
+#[derive(Debug, Clone, Serialize)]
+pub struct SweepAxis {
+    /// Name.
+    pub tuner: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Whether the values are spread evenly in the logarithm.
+    pub log: bool,
+    /// The values.
+    pub values: Vec<f64>,
 }
 
 /// A tuner of a result.
@@ -140,6 +200,11 @@ pub struct CalibrationReport {
     pub parameters: Vec<ParameterReport>,
     /// How well each experiment is met.
     pub experiments: Vec<ExperimentReport>,
+    /// Which tuners, or which combinations of them, the data determine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<SensitivityReport>,
+    /// How rich the inputs of the experiments are; empty where nothing is driven.
+    pub excitation: Vec<ExcitationReport>,
 }
 
 /// An estimated parameter.

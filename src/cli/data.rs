@@ -4,21 +4,30 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use mops_core::Diagnostic;
 use mops_core::data::DataFile;
+use mops_core::identification::{excitation_report, spacing};
 
 use super::tables::{number, table};
-use super::{Trouble, print};
+use super::{Trouble, findings, print};
 
 /// What is shown.
 #[derive(Args)]
 pub(super) struct Arguments {
     /// A CSV file, or a MATLAB file of level 4 or 5.
     file: PathBuf,
+    /// Tell how rich this column is as an input: its order of persistent excitation.
+    #[arg(long, value_name = "COLUMN")]
+    excitation: Option<String>,
 }
 
 pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let file = DataFile::read(&arguments.file)?;
     let names = file.column_names();
+    if let Some(column) = &arguments.excitation {
+        print(&excitation(&file, column, &arguments.file.display().to_string())?);
+        return Ok(ExitCode::SUCCESS);
+    }
     let mut rows = Vec::new();
     let mut sampling = String::new();
     for name in &names {
@@ -52,6 +61,26 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
     }
     print(&text);
     Ok(ExitCode::SUCCESS)
+}
+
+/// How rich a column is, counted in samples.
+fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagnostic> {
+    let column = file.column(name)?;
+    if let Some(gap) = column.values.iter().position(|v| !v.is_finite()) {
+        return Err(Diagnostic::new(format!("`{name}` has a gap at row {}", gap + 1))
+            .with_help("an input must be known throughout: fill the gap, or cut the file"));
+    }
+    let time = file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
+    let step = match time {
+        Some(time) => spacing(file.column(&time)?.values).ok_or_else(|| {
+            Diagnostic::new(format!("the samples are not equally spaced in `{time}`"))
+                .with_help("a study resamples them: task = \"excitation\" with `sample-time` in [excitation]")
+        })?,
+        None => f64::NAN,
+    };
+    let unit = column.unit.unwrap_or("");
+    let report = excitation_report(column.values, None, [shown, name, unit], step, None);
+    Ok(findings::excitation(&[report]))
 }
 
 fn sample_time(name: &str, times: &[f64]) -> String {

@@ -3,6 +3,9 @@
 mod check;
 mod data;
 mod describe;
+mod findings;
+mod linear_plots;
+mod linearise;
 mod list;
 mod new;
 mod progress;
@@ -56,6 +59,8 @@ enum Command {
     New(new::Arguments),
     /// Simulate a study once at given values: table of criteria, CSV and plots.
     Simulate(simulate::Arguments),
+    /// Linearise a model of a study: A, B, C, D, poles, zeros, transfer functions, plots, state feedback.
+    Linearise(linearise::Arguments),
     /// Show what is in a data file: columns, units, ranges, gaps, sample time, noise.
     Data(data::Arguments),
     /// Print the JSON schema of study files, for completion in an editor.
@@ -100,6 +105,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Command::Describe(arguments) => describe::describe(catalogue, &arguments),
         Command::New(arguments) => new::new(catalogue, &arguments),
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),
+        Command::Linearise(arguments) => linearise::linearise(catalogue, &arguments),
         Command::Data(arguments) => data::data(&arguments),
         Command::Schema => schema::schema(catalogue),
         Command::Completions { shell } => {

@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Study, suggestion};
+use mops_core::{Catalogue, Diagnostic, Study, Task, suggestion};
 
 use super::progress::Progress;
 use super::study::{StudyArguments, open};
-use super::{Trouble, cannot_write, print, tables};
+use super::{Trouble, cannot_write, findings, print, tables};
 use crate::report::Report;
 use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solve};
 
@@ -82,7 +82,11 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     if arguments.json {
         print(&json);
     } else if talks {
-        print(&tables::outcome(&solved.outcome));
+        // Of inputs alone there are no criteria to show.
+        if solved.outcome.task != Task::Excitation {
+            print(&tables::outcome(&solved.outcome));
+        }
+        print(&findings::text(&solved.outcome));
         print(&format!("\nresult, report and plots are in {}\n", folder.display()));
     }
     if solved.best.scaled.is_none() {

@@ -55,6 +55,9 @@ fn round_step(step: f64) -> f64 {
 fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
     let every = ((high - low) / 7.0).ceil().max(1.0) as i32;
     let steps: &[f64] = if high - low <= 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    if high - low < 0.7 {
+        return close(low, high);
+    }
     let mut ticks = Vec::new();
     for power in low.floor() as i32..=high.ceil() as i32 {
         if power.rem_euclid(every) != 0 {
@@ -73,6 +76,17 @@ fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
         }
     }
     ticks
+}
+
+/// Ticks where no power of ten may lie in the range: round values.
+fn close(low: f64, high: f64) -> Vec<(f64, String)> {
+    let [from, to] = [low, high].map(|end| 10f64.powf(end));
+    let step = round_step((to - from) / 5.0);
+    (0..=12)
+        .map(|i| ((from / step - 1e-9).ceil() + f64::from(i)) * step)
+        .filter(|&value| value <= to * (1.0 + 1e-9))
+        .map(|value| ((value.log10() - low) / (high - low), super::numbers::significant(value, 4)))
+        .collect()
 }
 
 fn superscript(number: i32) -> String {

@@ -1,8 +1,9 @@
 //! The pictures of a run: every job's signals at the start and at the reported point, and measurements beside them.
 
-use mops_core::{Role, Row, Variable};
+use mops_core::{AnalysisKind, Role, Row, Variable};
 
 use super::Report;
+use super::bode;
 use super::comparison::Both;
 use super::numbers::{counted, with_unit};
 use super::plot::Plot;
@@ -100,6 +101,12 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     }
     let measured = |signal: &Variable| case.experiment.as_ref().is_some_and(|e| e.channel(&signal.name).is_some());
     for signal in plan.signals.iter().map(|&i| &signals[i]).filter(|s| !measured(s)) {
+        if model.interface().analysis == AnalysisKind::Linear {
+            let of_inputs = bode::compared(&both.start, (&both.best, both.best_name), &signal.name, &case.name);
+            let plots = of_inputs.into_iter().map(|(name, plot)| (format!("{place}-{name}"), plot)).collect();
+            group.figures.push(Figure { plots, caption: captions(&signal.name) });
+            continue;
+        }
         let rows: Vec<&Row> = study.rows.iter().filter(|row| row.job == job).collect();
         let plot = both.response(signal, &case.name, &rows);
         let plots = vec![(format!("response-{place}-{}", signal.name), plot)];

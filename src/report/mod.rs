@@ -1,11 +1,14 @@
 //! The report of a run: one HTML page, and its plots as SVG and PNG.
 
 mod axis;
+mod bode;
 mod calibration;
 mod clip;
 mod comparison;
+mod contour;
 mod convergence;
 mod criteria;
+mod excitation;
 mod figures;
 mod legend;
 mod numbers;
@@ -15,7 +18,10 @@ mod png;
 mod range;
 mod sampling;
 mod scene;
+mod sensitivity;
+mod surface;
 mod svg;
+mod sweep;
 #[cfg(test)]
 mod tests;
 mod tuners;
@@ -25,11 +31,13 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use mops_core::{Evaluation, Outcome, Problem, Record, Stop};
+use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 
+pub(crate) use bode::{Sweep, bode, frequencies};
 pub(crate) use numbers::{file_name, significant};
-pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
+pub(crate) use sensitivity::combination;
 
 /// Everything a report shows.
 pub struct Report<'a> {
@@ -54,9 +62,16 @@ impl Report<'_> {
         let plots = folder.join("plots");
         fs::create_dir_all(&plots)?;
         let (responses, left_out) = figures::responses(self);
-        let convergence = convergence::group(self.problem.study(), self.archive);
-        let pictures = page::Pictures { responses, left_out, convergence };
-        let groups = pictures.responses.iter().chain([&pictures.convergence]);
+        let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
+        let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
+        let inputs = match &self.outcome.found.excitation {
+            Some(found) => Some(&found.inputs),
+            None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
+        };
+        let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
+        let pictures = page::Pictures { responses, left_out, convergence, sweep, excitation };
+        let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation];
+        let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
         let mut names = numbers::FileNames::default();
         for (name, plot) in groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots) {
             let name = names.unique(name);
@@ -66,8 +81,23 @@ impl Report<'_> {
         fs::write(folder.join("report.html"), page::page(self, &pictures).into_string())
     }
 
+    /// Whether a search stands behind the result, and nothing but it.
+    fn searched(&self) -> bool {
+        match self.outcome.task {
+            Task::Design | Task::Calibration => true,
+            Task::Sensitivity => self.archive.len() > 1,
+            Task::Excitation | Task::Sweep => false,
+        }
+    }
+
     /// What the reported point is called: an optimum only if the solver showed one.
     fn best_name(&self) -> &'static str {
-        if self.outcome.stop == Stop::Converged && self.outcome.feasible { "optimum" } else { "best point" }
+        if self.outcome.solver == "none" {
+            "start"
+        } else if self.outcome.stop == Stop::Converged && self.outcome.feasible {
+            "optimum"
+        } else {
+            "best point"
+        }
     }
 }

@@ -1,20 +1,22 @@
 //! The page: one HTML file that needs no network and no script.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use mops_core::Task;
+use mops_core::{CalibrationReport, Task};
 
 use super::Report;
 use super::figures::{Figure, Group};
 use super::numbers::significant;
 use super::verdict::{self, Tone};
-use super::{calibration, criteria, tuners};
+use super::{calibration, criteria, excitation, sensitivity, tuners};
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {
     pub(super) responses: Vec<Group>,
     /// A sentence where responses are left out.
     pub(super) left_out: Option<String>,
-    pub(super) convergence: Group,
+    pub(super) convergence: Option<Group>,
+    pub(super) sweep: Option<Group>,
+    pub(super) excitation: Option<Group>,
 }
 
 /// The whole page.
@@ -38,14 +40,31 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     @if !warnings.is_empty() {
                         (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
                     }
-                    (section("Criteria", criteria::table(report)))
-                    (section("Tuners", tuners::table(report)))
-                    (section("Responses", html! {
-                        @if let Some(text) = &pictures.left_out { p { (text) } }
-                        @for group in &pictures.responses { (figures(group)) }
-                    }))
-                    (section("Convergence", figures(&pictures.convergence)))
-                    @if let Some(results) = &outcome.calibration { (section("Calibration", calibration::section(results))) }
+                    @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
+                    @if let Some(found) = &outcome.found.sensitivity {
+                        (section(sensitivity::title(found), sensitivity::section(found)))
+                    }
+                    @if let Some(found) = &outcome.found.excitation {
+                        (section("Excitation", html! {
+                            (excitation::section(found))
+                            @if let Some(group) = &pictures.excitation { (figures(group)) }
+                        }))
+                    }
+                    @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
+                    @if !outcome.tuners.is_empty() { (section("Tuners", tuners::table(report))) }
+                    @if !pictures.responses.is_empty() {
+                        (section("Responses", html! {
+                            @if let Some(text) = &pictures.left_out { p { (text) } }
+                            @for group in &pictures.responses { (figures(group)) }
+                        }))
+                    }
+                    @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
+                    @if let Some(results) = &outcome.calibration {
+                        (section("Calibration", calibration::section(results)))
+                        @if results.sensitivity.is_some() || !results.excitation.is_empty() {
+                            (section("What the data can tell", told(results, pictures)))
+                        }
+                    }
                     @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
                     (section("Study", html! {
                         details {
@@ -60,13 +79,27 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
     }
 }
 
+/// What the data of a calibration tell of its tuners, and how rich its inputs are.
+fn told(results: &CalibrationReport, pictures: &Pictures) -> Markup {
+    html! {
+        @if let Some(found) = &results.sensitivity { (sensitivity::section(found)) }
+        h3 { "Inputs" }
+        @if results.excitation.is_empty() {
+            p { "No experiment is driven by an input: what there is to learn comes from the start values." }
+        } @else {
+            (excitation::inputs(&results.excitation))
+            @if let Some(group) = &pictures.excitation { (figures(group)) }
+        }
+    }
+}
+
 /// A table that can be scrolled sideways where the screen is narrow.
 pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
     html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
 }
 
 fn section(title: &str, content: Markup) -> Markup {
-    let id = title.to_lowercase();
+    let id = title.to_lowercase().replace(' ', "-");
     html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (content) } }
 }
 
@@ -106,6 +139,9 @@ fn task(task: Task) -> &'static str {
     match task {
         Task::Design => "Design",
         Task::Calibration => "Calibration",
+        Task::Excitation => "Excitation",
+        Task::Sensitivity => "Sensitivity",
+        Task::Sweep => "Sweep",
     }
 }
 
@@ -129,7 +165,7 @@ fn figure(figure: &Figure) -> Markup {
 }
 
 /// A text in which names stand between backticks.
-fn rich(text: &str) -> Markup {
+pub(super) fn rich(text: &str) -> Markup {
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {
         return html! { (text) };

@@ -76,6 +76,22 @@ pub struct Band {
     pub range: [f64; 2],
 }
 
+/// Heights over a grid, drawn as colours behind the curves.
+#[derive(Debug, Clone, Default)]
+pub struct Surface {
+    /// Name of the height, with its unit.
+    pub label: String,
+    /// Places along x, increasing; at least two.
+    pub x: Vec<f64>,
+    /// Places along y, increasing; at least two.
+    pub y: Vec<f64>,
+    /// Heights: a row for every place along y, with a number for every place along x. Those that are not finite are left
+    /// blank.
+    pub values: Vec<Vec<f64>>,
+    /// Whether heights are told apart by their logarithms; those that are not positive are then left blank.
+    pub log: bool,
+}
+
 /// A plot. Curves are drawn in their order, the last on top.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
@@ -93,8 +109,12 @@ pub struct Plot {
     pub bands: Vec<Band>,
     /// Shown range of x; that of the curves where absent.
     pub x_range: Option<[f64; 2]>,
+    /// Whether x is logarithmic; values that are not positive are then left out.
+    pub log_x: bool,
     /// Whether y is logarithmic; values that are not positive are then left out.
     pub log_y: bool,
+    /// A surface behind the curves; its grid is then what is shown of x and y.
+    pub surface: Option<Surface>,
 }
 
 impl Plot {

@@ -55,6 +55,10 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
             paper.draw_rect(pixel(frame.from), pixel(frame.to), &colour(*ink), true).map_err(failed)
         }
+        Mark::Cell { frame, rgb: [r, g, b] } => {
+            let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
+            paper.draw_rect(pixel(frame.from), pixel(frame.to), &RGBColor(*r, *g, *b), true).map_err(failed)
+        }
         Mark::Text { text, at, anchor, size, ink, upwards } => {
             let h_pos = match anchor {
                 Anchor::Start => HPos::Left,

@@ -2,8 +2,9 @@
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
-use super::plot::{CurveStyle, Ink, Plot};
+use super::plot::{CurveStyle, Ink, Plot, Surface};
 use super::range::{drawable, range_of, y_range};
+use super::surface::SCALE_WIDTH;
 
 /// Size of every plot; one unit is a pixel of a page at its natural size.
 pub(super) const SIZE: Point = [560.0, 300.0];
@@ -28,6 +29,11 @@ pub(super) enum Mark {
     Box {
         frame: Frame,
         ink: Ink,
+    },
+    /// A box of a colour of its own, the same on every page.
+    Cell {
+        frame: Frame,
+        rgb: [u8; 3],
     },
     /// `at` is the middle of the height, and the left end, the middle or the right end by `anchor`.
     Text {
@@ -58,10 +64,16 @@ impl Scene {
     /// Lays out a plot.
     pub(super) fn of(plot: &Plot) -> Self {
         let mut scene = Self::default();
-        let xs = plot.curves.iter().flat_map(|c| &c.points).filter_map(|p| drawable(p.0, false));
-        let x_range = range_of(xs.chain(plot.x_range.into_iter().flatten()));
-        let x = time_axis(x_range.unwrap_or([0.0, 1.0]));
-        let y_range = y_range(plot);
+        let xs = plot.curves.iter().flat_map(|c| &c.points).map(|p| p.0).chain(plot.x_range.into_iter().flatten());
+        let x_range = match &plot.surface {
+            Some(surface) => Surface::range(&surface.x, plot.log_x),
+            None => range_of(xs.filter_map(|x| drawable(x, plot.log_x))),
+        };
+        let x = x_axis(x_range.unwrap_or([0.0, 1.0]), plot.log_x);
+        let y_range = match &plot.surface {
+            Some(surface) => Surface::range(&surface.y, plot.log_y),
+            None => y_range(plot),
+        };
         let y = Axis::new(y_range.unwrap_or([0.0, 1.0]), plot.log_y, 7.0);
         let levels: Vec<(f64, &str)> = plot
             .levels
@@ -73,7 +85,8 @@ impl Scene {
         scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Ink::Text);
         let top = scene.legend(plot, 38.0) + 12.0;
         let left = 38.0 + ADVANCE * longest(y.ticks.iter().map(|(_, label)| label.as_str()));
-        let right = SIZE[0] - 16.0 - ADVANCE * longest(levels.iter().map(|(_, name)| *name));
+        let beside = if plot.surface.is_some() { SCALE_WIDTH } else { 0.0 };
+        let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(levels.iter().map(|(_, name)| *name));
         let frame = Frame { from: [left, top], to: [right.max(left + 100.0), SIZE[1] - 46.0] };
         let place = |p: &(f64, f64)| {
             let (px, py) = (x.position(p.0)?, y.position(p.1)?);
@@ -88,6 +101,9 @@ impl Scene {
             }
         }
         scene.axes(plot, &x, &y, frame);
+        if let Some(surface) = &plot.surface {
+            scene.surface(surface, &x, &y, frame);
+        }
         for curve in &plot.curves {
             let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
             if curve.style == CurveStyle::Dots {
@@ -154,12 +170,12 @@ impl Scene {
 }
 
 /// The axis along x: fewer ticks where their labels would touch.
-fn time_axis(range: [f64; 2]) -> Axis {
+fn x_axis(range: [f64; 2], log: bool) -> Axis {
     let labels = |axis: &Axis| {
         ADVANCE * (longest(axis.ticks.iter().map(|(_, label)| label.as_str())) + 1.5) * axis.ticks.len() as f64
     };
-    let axis = Axis::new(range, false, 8.0);
-    if labels(&axis) > 0.75 * SIZE[0] { Axis::new(range, false, 4.0) } else { axis }
+    let axis = Axis::new(range, log, 8.0);
+    if labels(&axis) > 0.75 * SIZE[0] { Axis::new(range, log, 4.0) } else { axis }
 }
 
 fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {

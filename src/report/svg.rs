@@ -38,6 +38,11 @@ fn element(mark: &Mark) -> Markup {
             rect class=(class(*ink)) x=(short(frame.from[0])) y=(short(frame.from[1]))
                 width=(short(frame.to[0] - frame.from[0])) height=(short(frame.to[1] - frame.from[1])) fill=(colour(*ink)) {}
         },
+        Mark::Cell { frame, rgb: [r, g, b] } => html! {
+            rect x=(short(frame.from[0])) y=(short(frame.from[1])) width=(short(frame.to[0] - frame.from[0]))
+                height=(short(frame.to[1] - frame.from[1])) fill=(format!("#{r:02x}{g:02x}{b:02x}"))
+                shape-rendering="crispEdges" {}
+        },
         Mark::Text { text, at: [x, y], anchor, size, ink, upwards } => {
             // The middle of the letters lies about a third of their size above the line they stand on.
             let place = if *upwards {

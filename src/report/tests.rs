@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use mops_core::{
     Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
-    CriterionSpec, Draft, Evaluation, Failure, Interface, Job, Measured, Mistake, Model, Outcome, Parameter, Pareto,
-    Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage, Value,
-    Variable,
+    CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model, Outcome, Parameter,
+    Pareto, Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage,
+    Value, Variable,
 };
 
 use super::plot::{Curve, CurveStyle, Plot};
@@ -75,7 +75,7 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     let values = times.iter().map(|t| 1.0 - (-t / 1.3f64).exp() + 0.01 * (40.0 * t).sin()).collect();
     let channel =
         ChannelDraft { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelDraft::default() };
-    let measured = Measured { channels: vec![channel], role: Role::Calibration, free: Vec::new() };
+    let measured = Measured { channels: vec![channel], role: Role::Calibration, ..Measured::default() };
     let draft = Draft {
         name: name.into(),
         models: vec![("lag".into(), Lag::new().into())],
@@ -121,7 +121,13 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
         criteria: criteria(&best),
         start: StartReport { feasible: true, worst_scaled: first.merit.objective, criteria: criteria(&first) },
         front: Vec::new(),
-        calibration: Some(CalibrationReport { parameters: Vec::new(), experiments: Vec::new() }),
+        calibration: Some(CalibrationReport {
+            parameters: Vec::new(),
+            experiments: Vec::new(),
+            sensitivity: None,
+            excitation: Vec::new(),
+        }),
+        found: Findings::default(),
         failures: Vec::new(),
         warnings: vec!["mind the `gap`".into()],
     };

@@ -16,6 +16,9 @@ pub(super) enum Tone {
 /// The verdict, and how good it is.
 pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     let outcome = report.outcome;
+    if outcome.task == Task::Excitation {
+        return excitation(outcome);
+    }
     if !outcome.objective.is_finite() {
         let why = "No point could be evaluated: at each of them a simulation or a criterion failed.";
         return (Tone::Bad, format!("Failed. {why}"));
@@ -37,7 +40,33 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     match outcome.task {
         Task::Design => design(report),
         Task::Calibration => calibration(outcome, report.archive),
+        Task::Excitation => excitation(outcome),
+        Task::Sensitivity => sensitivity(outcome),
+        Task::Sweep => match outcome.found.sweep.iter().flat_map(|sweep| &sweep.words).next() {
+            Some(words) => (Tone::Good, words.clone()),
+            None => (Tone::Bad, "Nothing was swept.".to_owned()),
+        },
     }
+}
+
+fn excitation(outcome: &Outcome) -> (Tone, String) {
+    let inputs = outcome.found.excitation.iter().flat_map(|found| &found.inputs);
+    let poor: Vec<_> = inputs.clone().filter(|input| !input.suffices).collect();
+    match (inputs.clone().next(), poor.first()) {
+        (None, _) => (Tone::Mixed, "There is no input to look at.".to_owned()),
+        (Some(first), None) if inputs.count() == 1 => (Tone::Good, first.words.clone()),
+        (_, None) => (Tone::Good, "Every input is rich enough for the tuners that act in its case.".to_owned()),
+        (_, Some(worst)) => (Tone::Mixed, worst.words.clone()),
+    }
+}
+
+fn sensitivity(outcome: &Outcome) -> (Tone, String) {
+    let Some(found) = &outcome.found.sensitivity else {
+        return (Tone::Bad, "The sensitivities could not be computed.".to_owned());
+    };
+    let sound = found.rank == found.tuners.len() && found.tuners.iter().all(|t| t.trust == "determined");
+    let blind = found.tuners.len() - found.rank;
+    (if sound { Tone::Good } else { Tone::Mixed }, found.words[..(1 + blind).min(found.words.len())].join(" "))
 }
 
 /// The criteria that the problem uses so; those of data that only report are used for nothing.

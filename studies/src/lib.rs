@@ -22,6 +22,8 @@ pub fn shipped() -> Vec<Shipped> {
         study!("pid-design"),
         study!("pid-design-constrained"),
         study!("pid-design-multi-case"),
+        study!("tank-level"),
+        study!("multi-model"),
         study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),
         study!("furuta-calibration-2-joint", "data/horizontal.csv", "data/upright.csv"),
         study!("furuta-swing", "data/horizontal.csv", "data/upright.csv"),

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod error_integral;
+mod linear;
 mod part;
 mod step;
 #[cfg(test)]
@@ -11,6 +12,7 @@ use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable, suggestion};
 
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
+pub use linear::{Channel, LinearCriterion, Of, capped, feedback, poles};
 pub use part::part;
 pub use step::{Step, StepOptions};
 

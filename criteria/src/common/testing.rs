@@ -1,8 +1,9 @@
 //! Closed forms as simulations, for the tests of all criteria.
 
+use mops_core::linear::TransferFunction;
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionSpec, Experiment, Interface, Quantity, Response, Role, Trace, Value,
-    Variable,
+    Analysis, AnalysisKind, Case, Channel, Criterion, CriterionSpec, Experiment, Interface, Quantity, Response, Role,
+    Trace, Value, Variable,
 };
 
 /// Signals of the model of all tests.
@@ -10,9 +11,28 @@ pub fn signals() -> Vec<Variable> {
     [("y", "m"), ("u", "V"), ("phi", "rad")].map(|(name, unit)| Variable::new(name, unit, "")).to_vec()
 }
 
-/// The model of all tests.
-fn model() -> Interface {
-    Interface { signals: signals(), ..Interface::default() }
+/// The model of all tests of a criterion: signals over time, or a system from `u` in V to `y` in m.
+fn model(reads: AnalysisKind) -> Interface {
+    match reads {
+        AnalysisKind::Time => Interface { signals: signals(), ..Interface::default() },
+        AnalysisKind::Linear => Interface {
+            signals: vec![Variable::new("y", "m", "")],
+            inputs: vec![Variable::new("u", "V", "")],
+            analysis: AnalysisKind::Linear,
+            ..Interface::default()
+        },
+    }
+}
+
+/// A linear system by its transfer function, coefficients of falling powers.
+pub fn linear(numerator: &[f64], denominator: &[f64]) -> Analysis {
+    linear_delayed(numerator, denominator, 0.0)
+}
+
+/// The same with a delay.
+pub fn linear_delayed(numerator: &[f64], denominator: &[f64], delay: f64) -> Analysis {
+    let function = TransferFunction { numerator: numerator.to_vec(), denominator: denominator.to_vec(), delay };
+    Analysis::Linear(function.state_space().expect("it is a system"))
 }
 
 /// A function over [0, `end`] as a trace of `segments` equal segments.
@@ -50,7 +70,10 @@ pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
 /// A case in which `y` was measured.
 pub fn measured(times: &[f64], values: &[f64], noise: Option<f64>) -> Case {
     let channel = Channel { signal: "y".into(), times: times.to_vec(), values: values.to_vec(), noise };
-    Case { experiment: Some(Experiment { channels: vec![channel], role: Role::Calibration }), ..Case::default() }
+    Case {
+        experiment: Some(Experiment { channels: vec![channel], role: Role::Calibration, ..Experiment::default() }),
+        ..Case::default()
+    }
 }
 
 /// A quantity as a user writes it.
@@ -60,7 +83,7 @@ pub fn quantity(text: &str) -> Quantity {
 
 /// The criterion, bound to the model of all tests.
 pub fn bound(spec: &dyn CriterionSpec) -> Box<dyn Criterion> {
-    spec.bind(&model()).expect("the options are right")
+    spec.bind(&model(spec.reads())).expect("the options are right")
 }
 
 /// The value of a criterion.
@@ -85,7 +108,7 @@ pub fn undefined_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) 
 
 /// The mistake in the options of a criterion.
 pub fn mistake(spec: &dyn CriterionSpec) -> String {
-    spec.bind(&model()).err().expect("the options are wrong").to_string()
+    spec.bind(&model(spec.reads())).err().expect("the options are wrong").to_string()
 }
 
 /// Two numbers agree within `tolerance`.

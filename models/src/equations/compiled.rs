@@ -3,8 +3,10 @@
 use mops_core::Mistake;
 
 use super::graph::{Id, Op};
-use super::program::{Layout, Program, compile};
+use super::layout::Layout;
+use super::program::Program;
 use super::system::{Contact, System};
+use super::tape::compile;
 
 /// Where a signal comes from.
 #[derive(Debug)]
@@ -81,6 +83,32 @@ pub struct Compiled {
     pub matrices: Vec<Program>,
     /// Which state a derivative depends on: derivative, state.
     pub pattern: Vec<(usize, usize)>,
+    /// Columns of the Jacobian in groups that share no row: column, its rows.
+    pub columns: Vec<Vec<Column>>,
+}
+
+/// A column of the Jacobian, and its rows.
+pub type Column = (usize, Vec<usize>);
+
+/// Groups of columns of which no two meet in a row, taken greedily.
+///
+/// Source: A. Curtis, M. Powell, J. Reid, On the estimation of sparse Jacobian matrices, IMA J. Appl. Math. 13 (1974) 117.
+fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
+    let mut rows = vec![Vec::new(); states];
+    for &(row, column) in pattern {
+        rows[column].push(row);
+    }
+    let mut groups: Vec<(Vec<bool>, Vec<Column>)> = Vec::new();
+    for (column, rows) in rows.into_iter().enumerate() {
+        let free = groups.iter().position(|(taken, _)| rows.iter().all(|&row| !taken[row]));
+        let group = free.unwrap_or(groups.len());
+        if free.is_none() {
+            groups.push((vec![false; states], Vec::new()));
+        }
+        rows.iter().for_each(|&row| groups[group].0[row] = true);
+        groups[group].1.push((column, rows));
+    }
+    groups.into_iter().map(|(_, columns)| columns).collect()
 }
 
 /// A text that lives as long as the program: events are named by it, and a study is built once.
@@ -160,7 +188,9 @@ impl Compiled {
             })
             .collect();
         let rows = system.derivatives.iter().enumerate();
-        let pattern = rows.flat_map(|(row, &id)| graph.states_of(id).into_iter().map(move |s| (row, s))).collect();
+        let pattern: Vec<(usize, usize)> =
+            rows.flat_map(|(row, &id)| graph.states_of(id).into_iter().map(move |s| (row, s))).collect();
+        let columns = grouped(&pattern, names.len());
         Ok(Self {
             states: names.len(),
             parameters,
@@ -174,6 +204,7 @@ impl Compiled {
             starts,
             matrices,
             pattern,
+            columns,
         })
     }
 }

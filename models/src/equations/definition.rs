@@ -177,7 +177,12 @@ impl Definition {
             for quantity in declared("parameters", key, &parameter.unit, parameter.about.as_deref())? {
                 let value = |name: &str, given: &Option<Quantity>| {
                     let value = given.as_ref().map(|q| q.to(&quantity.unit)).transpose();
-                    value.map_err(|why| under(&path(&["parameters", key, name]), Mistake::here(why)))
+                    value.map_err(|why| {
+                        under(
+                            &path(&["parameters", key, name]),
+                            Mistake::here(why).with_help(counts_in(&quantity.unit)),
+                        )
+                    })
                 };
                 let default = value("default", &parameter.default)?;
                 let min = value("min", &parameter.min)?.unwrap_or(f64::NEG_INFINITY);
@@ -234,7 +239,9 @@ impl Definition {
             let plain = state.and_then(|s| Quantity::parse(&formula.0).ok().map(|q| (s, q)));
             match plain.filter(|_| has_unit(&formula.0)) {
                 Some((state, quantity)) => {
-                    let value = quantity.to(&state.unit).map_err(|why| under(&path, Mistake::here(why)))?;
+                    let value = quantity
+                        .to(&state.unit)
+                        .map_err(|why| under(&path, Mistake::here(why).with_help(counts_in(&state.unit))))?;
                     Text::expression(path, &Formula(format!("{value:?}")), index)
                 }
                 None => Text::expression(path, formula, index),
@@ -304,6 +311,10 @@ impl Definition {
         }
         Ok(())
     }
+}
+
+fn counts_in(unit: &Unit) -> String {
+    format!("a number without a unit counts in `{unit}`")
 }
 
 /// `3 rad` and `20 degC`, not `2*m`.

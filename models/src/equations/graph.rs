@@ -181,6 +181,9 @@ impl Graph {
 
     /// `-a`.
     pub fn negative(&mut self, a: Id) -> Id {
+        if let Op::Sub(x, y) = self.op(a) {
+            return self.sub(y, x);
+        }
         let minus = self.number(-1.0);
         self.mul(minus, a)
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use mops_core::expression::{Comparison, Form, Function, Node, Operator};
+use mops_core::expression::{Form, Node, Operator};
 use mops_core::{Mistake, suggestion};
 
 use super::definition::{Definition, Text, under};
@@ -51,7 +51,7 @@ enum Meaning {
 /// How kinks are evaluated: by their mode, so that a step sees one smooth branch, or as they stand. The latter holds
 /// inside roots, logarithms, powers and divisors, whose branches do not go on beyond the kink: `sqrt(max(h, 0))`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Kinks {
+pub(super) enum Kinks {
     ByMode,
     AsTheyStand,
 }
@@ -175,7 +175,7 @@ impl<'d> Lowering<'d> {
         ))
     }
 
-    fn without_rates(&self, text: &Text, node: &Node, affine: Affine, place: &str) -> Result<Id, Mistake> {
+    pub(super) fn without_rates(&self, text: &Text, node: &Node, affine: Affine, place: &str) -> Result<Id, Mistake> {
         if affine.rates.is_empty() {
             return Ok(affine.rest);
         }
@@ -203,7 +203,7 @@ impl<'d> Lowering<'d> {
         Affine { rest, rates: a.rates.into_iter().map(|(state, rate)| (state, f(&mut self.graph, rate))).collect() }
     }
 
-    fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
+    pub(super) fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
         let wrong = |fact: String, help: String| {
             Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
         };
@@ -364,162 +364,5 @@ impl<'d> Lowering<'d> {
                 }
             },
         })
-    }
-
-    fn call(&mut self, text: &Text, function: Function, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
-        let inner = match function {
-            Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => Kinks::AsTheyStand,
-            _ => kinks,
-        };
-        if function == Function::If {
-            return self.pieces(text, arguments, kinks);
-        }
-        let mut values = Vec::with_capacity(arguments.len());
-        for argument in arguments {
-            let affine = self.node(text, argument, inner)?;
-            let place = format!("in `{}`", function.name());
-            values.push(self.without_rates(text, argument, affine, &place)?);
-        }
-        let x = values[0];
-        let one = self.graph.number(1.0);
-        let zero = self.graph.number(0.0);
-        Ok(match function {
-            Function::Atan2 => self.graph.atan2(x, values[1]),
-            Function::Abs => {
-                let positive = self.at_least(x, zero, kinks);
-                let minus = self.graph.negative(x);
-                self.graph.choose(positive, x, minus)
-            }
-            Function::Sign if self.graph.level(x) < Level::Variable => {
-                let minus = self.graph.number(-1.0);
-                let (up, down) =
-                    (self.graph.holds(Comparison::Greater, x, zero), self.graph.holds(Comparison::Less, x, zero));
-                let below = self.graph.choose(down, minus, zero);
-                self.graph.choose(up, one, below)
-            }
-            Function::Sign => {
-                let minus = self.graph.number(-1.0);
-                let positive = self.condition(Comparison::AtLeast, x, zero, true, Kinks::ByMode);
-                self.graph.choose(positive, one, minus)
-            }
-            Function::Min | Function::Max => {
-                let mut best = x;
-                for &other in &values[1..] {
-                    let (a, b) = if function == Function::Max { (best, other) } else { (other, best) };
-                    let first = self.at_least(a, b, kinks);
-                    best = self.graph.choose(first, best, other);
-                }
-                best
-            }
-            Function::Clip | Function::Deadzone => {
-                let (low, high) = (values[1], values[2]);
-                let (above, below) = (self.at_least(x, low, kinks), self.at_least(high, x, kinks));
-                let (inside, over, under) = if function == Function::Clip {
-                    (x, high, low)
-                } else {
-                    (zero, self.graph.sub(x, high), self.graph.sub(x, low))
-                };
-                let upper = self.graph.choose(below, inside, over);
-                self.graph.choose(above, upper, under)
-            }
-            Function::Table => self.table(x, &values[1..], kinks),
-            smooth => self.graph.function(smooth, x),
-        })
-    }
-
-    /// `table(x, x1, y1, ..)`: the line that holds is found from the left.
-    fn table(&mut self, x: Id, points: &[Id], kinks: Kinks) -> Id {
-        let lines = points.len() / 2 - 1;
-        let mut value = None;
-        for k in (0..lines).rev() {
-            let [x1, y1, x2, y2] = [points[2 * k], points[2 * k + 1], points[2 * k + 2], points[2 * k + 3]];
-            let (rise, run) = (self.graph.sub(y2, y1), self.graph.sub(x2, x1));
-            let slope = self.graph.div(rise, run);
-            let (step, offset) = (self.graph.mul(slope, x), self.graph.mul(slope, x1));
-            let level = self.graph.sub(y1, offset);
-            let line = self.graph.add(step, level);
-            value = Some(match value {
-                None => line,
-                Some(further) => {
-                    let here = self.at_least(x2, x, kinks);
-                    self.graph.choose(here, line, further)
-                }
-            });
-        }
-        value.expect("the reader asks for two points")
-    }
-
-    /// `if(condition, a, .., otherwise)`.
-    fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
-        let branch = |lowering: &mut Self, node: &Node| {
-            let affine = lowering.node(text, node, kinks)?;
-            lowering.without_rates(text, node, affine, "in `if`")
-        };
-        let (otherwise, pairs) = arguments.split_last().expect("the reader asks for three arguments");
-        let mut value = branch(self, otherwise)?;
-        for pair in pairs.chunks_exact(2).rev() {
-            let here = branch(self, &pair[1])?;
-            value = self.decide(text, &pair[0], here, value)?;
-        }
-        Ok(value)
-    }
-
-    /// `a` where the condition holds, else `b`.
-    fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, Mistake> {
-        match &condition.form {
-            Form::Compare(comparison, left, right) => {
-                let mut side = |node: &Node| {
-                    let affine = self.node(text, node, Kinks::ByMode)?;
-                    self.without_rates(text, node, affine, "in a condition")
-                };
-                let (left, right) = (side(left)?, side(right)?);
-                let condition = self.condition(*comparison, left, right, true, Kinks::ByMode);
-                Ok(self.graph.choose(condition, a, b))
-            }
-            Form::And(first, second) => {
-                let inner = self.decide(text, second, a, b)?;
-                self.decide(text, first, inner, b)
-            }
-            Form::Or(first, second) => {
-                let inner = self.decide(text, second, a, b)?;
-                self.decide(text, first, a, inner)
-            }
-            Form::Not(inner) => self.decide(text, inner, b, a),
-            _ => unreachable!("the reader asks for a condition"),
-        }
-    }
-
-    /// The kink where `a` and `b` meet: positive where `a >= b`.
-    fn at_least(&mut self, a: Id, b: Id, kinks: Kinks) -> Id {
-        self.condition(Comparison::AtLeast, a, b, false, kinks)
-    }
-
-    /// A node that is positive where the condition holds; a switch, unless only parameters decide.
-    fn condition(&mut self, comparison: Comparison, a: Id, b: Id, jumps: bool, kinks: Kinks) -> Id {
-        if self.graph.level(a).max(self.graph.level(b)) < Level::Variable {
-            return self.graph.holds(comparison, a, b);
-        }
-        let (left, right, strict) = match comparison {
-            Comparison::Greater => (a, b, true),
-            Comparison::AtLeast => (a, b, false),
-            Comparison::Less => (b, a, true),
-            Comparison::AtMost => (b, a, false),
-        };
-        let same = |s: &&mut Switch| s.left == left && s.right == right && (s.strict == strict || !jumps);
-        let mode = match self.switches.iter_mut().find(same) {
-            Some(switch) => {
-                switch.jumps |= jumps;
-                switch.mode
-            }
-            None => {
-                let (mode, _) = self.mode();
-                self.switches.push(Switch { mode, left, right, strict, jumps });
-                mode
-            }
-        };
-        match kinks {
-            Kinks::ByMode => self.graph.add_op(Op::Mode(mode)),
-            Kinks::AsTheyStand => self.graph.holds(comparison, a, b),
-        }
     }
 }

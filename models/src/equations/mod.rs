@@ -1,30 +1,37 @@
 //! Models written in the study file: their equations are read and compiled once, and run on a tape of their own.
 
+mod bank;
+mod branches;
 mod compiled;
 mod definition;
 mod graph;
+mod interface;
 mod key;
+mod layout;
 mod lower;
+mod modes;
 mod options;
 mod program;
 mod running;
 mod system;
+mod tape;
 
 use std::collections::HashMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Port, Scalar, State,
-    Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Scalar,
+    State, Unit, Variable, WithTangents,
 };
 
-use crate::kernel::{self, Recording, Simulate, Tolerance, record, wanted};
+use crate::kernel::drive::Drive;
+use crate::kernel::{self, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
+use bank::{Bank, Large as Many, Small};
 use compiled::Compiled;
-use definition::{Definition, under};
+use definition::Definition;
 pub use definition::{Target, Text};
-use graph::Op;
+use interface::{Start, parameters, ports};
 pub use options::EquationsOptions;
-use program::Bank;
-use running::{Few, Many, Running};
+use running::Running;
 use system::System;
 
 impl ModelOptions for EquationsOptions {
@@ -35,14 +42,8 @@ impl ModelOptions for EquationsOptions {
     }
 }
 
-/// Where a state starts.
-#[derive(Debug, Clone, Copy)]
-enum Start {
-    /// At a parameter.
-    Parameter(usize),
-    /// At an expression, unless this parameter is given.
-    Expression(usize),
-}
+/// Registers of a model that fits into few, without tangents.
+type Few = Small<f64>;
 
 /// The model of the kind `equations`.
 pub struct Equations {
@@ -118,24 +119,30 @@ impl Equations {
         self.compiled.derivative.len()
     }
 
+    /// Values of the states at the start: of parameters, or of expressions where the parameter is no number, as nobody
+    /// gives it.
+    fn start<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
+        &self,
+        dynamics: &Running<'_, S, X, B>,
+        parameters: &[S],
+    ) -> Vec<S> {
+        let expressions: HashMap<usize, S> = dynamics.starts().into_iter().collect();
+        let start = |(s, start): (usize, &Start)| match *start {
+            Start::Expression(parameter) if parameters[parameter].value().is_nan() => expressions[&s],
+            Start::Parameter(parameter) | Start::Expression(parameter) => parameters[parameter],
+        };
+        self.starts.iter().enumerate().map(start).collect()
+    }
+
     fn run<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
         &self,
         job: &Job<'_>,
         parameters: &[S],
         state: impl FnOnce(&[S]) -> X,
     ) -> Result<Recording, Failure> {
-        let inputs: Vec<&str> = self.interface.inputs.iter().map(|input| input.name.as_str()).collect();
-        let mut dynamics: Running<'_, S, X, B> =
-            Running::new(&self.compiled, &inputs, job.case, parameters, self.tolerance);
-        let expressions: HashMap<usize, S> = dynamics.starts().into_iter().collect();
-        let start = |(s, start): (usize, &Start)| match *start {
-            Start::Parameter(parameter) => parameters[parameter],
-            // A parameter that nobody gives is no number.
-            Start::Expression(parameter) if parameters[parameter].value().is_nan() => expressions[&s],
-            Start::Expression(parameter) => parameters[parameter],
-        };
-        let start: Vec<S> = self.starts.iter().enumerate().map(start).collect();
-        let start = state(&start);
+        let drives = self.interface.inputs.iter().map(|input| Drive::new(job.case.input(&input.name))).collect();
+        let mut dynamics: Running<'_, S, X, B> = Running::new(&self.compiled, drives, parameters, self.tolerance);
+        let start = state(&self.start(&dynamics, parameters));
         dynamics.check_start(&start)?;
         let output =
             |dynamics: &Running<'_, S, X, B>, signal: usize, t: f64, x: &X| dynamics.signal(signal, t, x.as_ref());
@@ -150,104 +157,66 @@ impl Model for Equations {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
+        self.values(job).map(|recording| Analysis::Time(recording.response))
     }
 
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         Some(kernel::tangents(self, job, seeds))
     }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.interface.signals[..self.compiled.states].to_vec()
+    }
+
+    fn start_values(&self, parameters: &[f64]) -> Option<Vec<f64>> {
+        let drives = self.interface.inputs.iter().map(|_| Drive::held(0.0)).collect();
+        let dynamics: Running<'_, f64, Vec<f64>, Many<f64>> =
+            Running::new(&self.compiled, drives, parameters, self.tolerance);
+        Some(self.start(&dynamics, parameters))
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(kernel::local(self, at))
+    }
+}
+
+impl kernel::Equations for Equations {
+    /// At time 0; joints at rest without dry friction.
+    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
+        let drives = u.iter().map(|&u| Drive::held(u)).collect();
+        let mut dynamics: Running<'_, S, Vec<S>, Many<S>> =
+            Running::new(&self.compiled, drives, parameters, self.tolerance);
+        dynamics.look(x);
+        let output = |dynamics: &Running<'_, S, Vec<S>, Many<S>>, signal: usize, t: f64, x: &Vec<S>| {
+            dynamics.signal(signal, t, x)
+        };
+        Ok(rates_and_signals(&dynamics, &x.to_vec(), self.interface.signals.len(), &output))
+    }
 }
 
 impl Simulate for Equations {
-    /// Small models run on arrays of known size and registers whose indices need no check: on vectors a simulation takes
-    /// half as long again.
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, p: &[S]) -> Result<Recording, Failure> {
-        fn array<S: Scalar, const N: usize>(x: &[S]) -> [S; N] {
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        self.run::<S, Vec<S>, Many<S>>(job, parameters, <[S]>::to_vec)
+    }
+}
+
+impl Equations {
+    /// Without tangents small models run on arrays of known size, and on registers whose indices need no check: on vectors
+    /// a simulation takes half as long again. The operations are the same, and so are the bits.
+    fn values(&self, job: &Job<'_>) -> Result<Recording, Failure> {
+        fn array<const N: usize>(x: &[f64]) -> [f64; N] {
             x.try_into().expect("the size was looked at")
         }
         let few = self.compiled.layout.registers <= 256;
         match self.compiled.states {
-            1 if few => self.run::<S, [S; 1], Few<S>>(job, p, array),
-            2 if few => self.run::<S, [S; 2], Few<S>>(job, p, array),
-            3 if few => self.run::<S, [S; 3], Few<S>>(job, p, array),
-            4 if few => self.run::<S, [S; 4], Few<S>>(job, p, array),
-            _ if few => self.run::<S, Vec<S>, Few<S>>(job, p, <[S]>::to_vec),
-            _ => self.run::<S, Vec<S>, Many<S>>(job, p, <[S]>::to_vec),
+            1 if few => self.run::<f64, [f64; 1], Few>(job, job.parameters, array),
+            2 if few => self.run::<f64, [f64; 2], Few>(job, job.parameters, array),
+            3 if few => self.run::<f64, [f64; 3], Few>(job, job.parameters, array),
+            4 if few => self.run::<f64, [f64; 4], Few>(job, job.parameters, array),
+            _ if few => self.run::<f64, Vec<f64>, Few>(job, job.parameters, <[f64]>::to_vec),
+            _ => self.simulate(job, job.parameters),
         }
     }
-}
-
-/// The parameters of the model: those declared, then start values; and where each state starts.
-fn parameters(d: &Definition, system: &System) -> Result<(Vec<Parameter>, Vec<Start>), Mistake> {
-    let declared = |p: &definition::Settable| Parameter {
-        variable: Variable {
-            name: p.quantity.name.clone(),
-            unit: p.quantity.unit.clone(),
-            about: p.quantity.about.clone(),
-        },
-        default: p.default,
-        range: p.range,
-    };
-    let mut parameters: Vec<Parameter> = d.parameters.iter().map(declared).collect();
-    let mut starts = Vec::new();
-    for (state, start) in d.states.iter().zip(&system.starts) {
-        if let Some(Op::Parameter(index)) = start.map(|id| system.graph.op(id)) {
-            starts.push(Start::Parameter(index));
-            continue;
-        }
-        let name = match state.name.split_once('[') {
-            Some((family, index)) => format!("{family}0[{index}"),
-            None => format!("{}0", state.name),
-        };
-        if let Some(taken) = d.parameters.iter().find(|p| p.quantity.name == name) {
-            let mistake = Mistake::here(format!("the start value of `{}` is a parameter of this name", state.name));
-            return Err(under(&taken.quantity.path, mistake).with_help(format!(
-                "say start = {{ {} = \"{name}\" }} if it is meant, or take another name",
-                state.name
-            )));
-        }
-        let value = start.map_or(Some(0.0), |id| system.graph.constant(id));
-        let about = format!("{} at the start", state.name);
-        starts.push(match value {
-            Some(_) => Start::Parameter(parameters.len()),
-            None => Start::Expression(parameters.len()),
-        });
-        parameters.push(Parameter {
-            variable: Variable { name, unit: state.unit.clone(), about },
-            default: Some(value.unwrap_or(f64::NAN)),
-            range: [f64::NEG_INFINITY, f64::INFINITY],
-        });
-    }
-    Ok((parameters, starts))
-}
-
-/// Joints and the equations of all states but positions; inputs; states and outputs.
-fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistake> {
-    let name = |s: usize| d.states[s].name.clone();
-    let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);
-    for (_, joint, path) in &d.ports {
-        if !system.joints.iter().any(|&(position, _)| d.states[position].name == *joint) {
-            let names = system.joints.iter().map(|&(position, _)| d.states[position].name.as_str());
-            return Err(under(path, Mistake::here(format!("`{joint}` is not the position of a joint")))
-                .with_help(mops_core::suggestion(joint, names)));
-        }
-    }
-    let mut ports = Vec::new();
-    for s in 0..d.states.len() {
-        if system.joints.iter().any(|&(position, _)| position == s) {
-            continue;
-        }
-        let position = system.joints.iter().find(|&&(_, velocity)| velocity == s).map(|&(position, _)| position);
-        let place = position.map_or_else(|| name(s), |p| given(p).map_or_else(|| name(p), |(name, ..)| name.clone()));
-        if let Some(position) = position {
-            ports.push(Port::Joint { name: place.clone(), position: name(position), velocity: name(s) });
-        }
-        ports.push(Port::Process { name: place, state: name(s) });
-    }
-    ports.extend(d.inputs.iter().map(|input| Port::Actuator { input: input.name.clone() }));
-    let signals = d.states.iter().chain(d.outputs.iter().map(|(output, _)| output));
-    ports.extend(signals.map(|signal| Port::Sensor { output: signal.name.clone() }));
-    Ok(ports)
 }
 
 #[cfg(test)]

@@ -3,31 +3,37 @@
 use std::cell::RefCell;
 use std::marker::PhantomData;
 
-use mops_core::{Case, Dual, Failure, Scalar};
+use mops_core::{Dual, Failure, Scalar};
 
+use super::bank::{Bank, Large};
 use super::compiled::{Compiled, Signal};
-use super::program::{Bank, Large, Program, Small};
+use super::program::Program;
 use crate::kernel::drive::Drive;
 use crate::kernel::{Dynamics, Tolerance};
 
 /// The dynamics of a compiled model; `X` is the state vector, `B` the registers.
 pub struct Running<'a, S, X, B> {
-    model: &'a Compiled,
-    bank: RefCell<B>,
-    drives: Vec<Drive<'a>>,
+    pub(super) model: &'a Compiled,
+    pub(super) bank: RefCell<B>,
+    drives: Vec<Drive<'a, S>>,
     parameters: &'a [S],
-    tolerance: Tolerance,
+    pub(super) tolerance: Tolerance,
     started: bool,
     /// Present values of the modes.
-    modes: Vec<f64>,
+    pub(super) modes: Vec<f64>,
     /// What is added to the guard of a switch: a kink is only left when it is clear that it is.
-    slack: Vec<f64>,
+    pub(super) slack: Vec<f64>,
     /// How often each switch has switched.
     flips: Vec<usize>,
     /// Whether an event waits for its guard to become negative, rather than positive again, and where the guard began.
     armed: Vec<(bool, f64)>,
+    /// Registers in which the Jacobian is computed, from its first use on.
+    jacobian: RefCell<Option<Large<Dual<CHUNK>>>>,
     state: PhantomData<X>,
 }
+
+/// Columns of the Jacobian that are computed at once.
+const CHUNK: usize = 8;
 
 /// What a mode's guard is about.
 enum Guard {
@@ -38,19 +44,14 @@ enum Guard {
 
 impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, S, X, B> {
     /// A simulation with these parameters, the start values among them left aside.
-    pub fn new(
-        model: &'a Compiled,
-        inputs: &[&str],
-        case: &'a Case,
-        parameters: &'a [S],
-        tolerance: Tolerance,
-    ) -> Self {
+    pub fn new(model: &'a Compiled, drives: Vec<Drive<'a, S>>, parameters: &'a [S], tolerance: Tolerance) -> Self {
         let mut bank = B::with(model.layout.registers);
         set_up(model, &mut bank, parameters.iter().copied());
         Self {
             model,
             bank: RefCell::new(bank),
-            drives: inputs.iter().map(|name| Drive::new(case.input(name))).collect(),
+            drives,
+            jacobian: RefCell::new(None),
             parameters,
             tolerance,
             started: false,
@@ -71,19 +72,19 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
     }
 
     #[inline(always)]
-    fn load(&self, bank: &mut B, t: f64, x: &[S]) {
+    pub(super) fn load(&self, bank: &mut B, t: f64, x: &[S]) {
         let layout = &self.model.layout;
         for (i, &x) in x.iter().enumerate() {
             bank.set(layout.state(i), x);
         }
         for (i, drive) in self.drives.iter().enumerate() {
-            bank.set(layout.input(i), S::from(drive.at(t)));
+            bank.set(layout.input(i), drive.at(t));
         }
         bank.set(layout.time(), S::from(t));
     }
 
     /// Results of a tape at a time and a state.
-    fn results<const N: usize>(&self, tape: &Program, t: f64, x: &[S]) -> [S; N] {
+    pub(super) fn results<const N: usize>(&self, tape: &Program, t: f64, x: &[S]) -> [S; N] {
         let mut bank = self.bank.borrow_mut();
         self.load(&mut bank, t, x);
         tape.run(&mut *bank);
@@ -94,92 +95,9 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
     pub fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         match &self.model.signals[signal] {
             Signal::State(state) => x[*state],
-            Signal::Input(input) => S::from(self.drives[*input].at(t)),
+            Signal::Input(input) => self.drives[*input].at(t),
             Signal::Tape(tape) => self.results::<1>(tape, t, x)[0],
         }
-    }
-
-    fn set_mode(&mut self, mode: usize, value: f64) {
-        self.modes[mode] = value;
-        self.bank.borrow_mut().set(self.model.layout.mode(mode), S::from(value));
-    }
-
-    fn is(&self, mode: usize) -> bool {
-        self.modes[mode] > 0.0
-    }
-
-    /// Puts every condition and contact into the mode that fits this moment.
-    fn settle(&mut self, t: f64, x: &[S]) {
-        for k in 0..self.model.switches.len() {
-            let switch = &self.model.switches[k];
-            let [difference, right] = self.results(&switch.sides, t, x).map(Scalar::value);
-            let holds = difference > 0.0 || difference == 0.0 && !switch.strict;
-            self.set_mode(switch.mode, f64::from(u8::from(holds)));
-            self.set_slack(k, 0.0, right);
-        }
-        self.find_contacts(t, x);
-    }
-
-    /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly, or
-    /// from where rounding left it.
-    fn set_slack(&mut self, k: usize, guard: f64, right: f64) {
-        self.slack[k] = if self.model.switches[k].jumps {
-            (-guard).max(0.0)
-        } else {
-            0.1 * (self.tolerance.absolute + self.tolerance.relative * right.abs())
-        };
-    }
-
-    /// Joints that move slide the way they move. Of those at rest each is stuck if the torque it takes is within its
-    /// limit, else it slides the way it accelerates: the choice in which all agree, as in [`crate::kernel::friction`].
-    fn find_contacts(&mut self, t: f64, x: &[S]) {
-        let model = self.model;
-        let mut resting = Vec::new();
-        for (j, joint) in model.joints.iter().enumerate() {
-            let speed = x[joint.contact.velocity].value();
-            let [_, limit, ..] = self.results::<4>(&joint.balance, t, x).map(Scalar::value);
-            if speed == 0.0 && limit > 0.0 {
-                resting.push(j);
-            }
-            self.set_contact(j, if speed >= 0.0 { 1.0 } else { -1.0 });
-        }
-        let mut best = (f64::INFINITY, 0);
-        let choices = 3_usize.pow(u32::try_from(resting.len()).expect("few joints"));
-        for code in 0..choices {
-            self.choose_contacts(&resting, code);
-            let discord = resting.iter().map(|&j| {
-                let joint = &model.joints[j];
-                let [torque, limit, coulomb, acceleration] = self.results(&joint.balance, t, x).map(Scalar::value);
-                let direction = self.modes[joint.contact.direction];
-                if direction == 0.0 {
-                    torque.abs() / limit - 1.0
-                } else {
-                    // Rounding leaves an acceleration of about 0 with either sign.
-                    -direction * acceleration / (acceleration.abs() + coulomb.abs() + f64::MIN_POSITIVE)
-                }
-            });
-            let discord = discord.fold(f64::NEG_INFINITY, f64::max).max(0.0);
-            if discord < best.0 {
-                best = (discord, code);
-            }
-            if discord == 0.0 {
-                break;
-            }
-        }
-        self.choose_contacts(&resting, best.1);
-    }
-
-    fn choose_contacts(&mut self, resting: &[usize], mut code: usize) {
-        for &j in resting {
-            self.set_contact(j, [0.0, 1.0, -1.0][code % 3]);
-            code /= 3;
-        }
-    }
-
-    fn set_contact(&mut self, joint: usize, direction: f64) {
-        let contact = self.model.joints[joint].contact;
-        self.set_mode(contact.direction, direction);
-        self.set_mode(contact.stuck, f64::from(u8::from(direction == 0.0)));
     }
 
     fn kind(&self, index: usize) -> Guard {
@@ -207,7 +125,8 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
             bank.set(layout.state(i), Dual { value: x.value(), tangent: [slope.value()] });
         }
         for (i, drive) in self.drives.iter().enumerate() {
-            bank.set(layout.input(i), Dual { value: drive.at(t), tangent: [(drive.at(t + 1e-6) - drive.at(t)) * 1e6] });
+            let [now, soon] = [drive.at(t), drive.at(t + 1e-6)].map(Scalar::value);
+            bank.set(layout.input(i), Dual { value: now, tangent: [(soon - now) * 1e6] });
         }
         bank.set(layout.time(), Dual::variable(t, 0));
         let tape = &self.model.happenings[happening].guard;
@@ -231,25 +150,6 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         }
         failure
     }
-
-    /// Whether equations that are solved together have a solution here.
-    pub fn check_start(&self, x: &X) -> Result<(), Failure> {
-        let mut slope = x.clone();
-        self.derivative(0.0, x, &mut slope);
-        if slope.as_ref().iter().all(|d| d.value().is_finite()) {
-            return Ok(());
-        }
-        let mut bank = self.bank.borrow_mut();
-        for tape in &self.model.matrices {
-            self.load(&mut bank, 0.0, x.as_ref());
-            tape.run(&mut *bank);
-            let entries: Vec<f64> = tape.results.iter().map(|&r| bank.get(r).value()).collect();
-            if determinant(entries) == 0.0 {
-                return Err(Failure::Undefined("the mass matrix is singular at the start".to_owned()));
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Writes the parameters into a bank, and all that follows from them alone.
@@ -258,29 +158,6 @@ fn set_up<S: Scalar>(model: &Compiled, bank: &mut impl Bank<S>, parameters: impl
         bank.set(model.layout.parameter(i), value);
     }
     model.setup.run(bank);
-}
-
-/// Determinant of a square matrix, row by row.
-fn determinant(mut m: Vec<f64>) -> f64 {
-    let n = m.len().isqrt();
-    let mut product = 1.0;
-    for k in 0..n {
-        let pivot = (k..n).fold(k, |best, i| if m[i * n + k].abs() > m[best * n + k].abs() { i } else { best });
-        product *= m[pivot * n + k];
-        if product == 0.0 {
-            return 0.0;
-        }
-        for j in 0..n {
-            m.swap(k * n + j, pivot * n + j);
-        }
-        for i in k + 1..n {
-            let factor = m[i * n + k] / m[k * n + k];
-            for j in k..n {
-                m[i * n + j] -= factor * m[k * n + j];
-            }
-        }
-    }
-    product
 }
 
 impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for Running<'_, S, X, B> {
@@ -375,6 +252,48 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         }
     }
 
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        Some(self.model.pattern.clone())
+    }
+
+    /// Columns that share no row are differentiated together, eight such groups in one run of the tape.
+    fn jacobian(&self, t: f64, x: &X, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        let model = self.model;
+        let mut bank = self.jacobian.borrow_mut();
+        let bank = bank.get_or_insert_with(|| {
+            let mut bank = Large::with(model.layout.registers);
+            set_up(model, &mut bank, self.parameters.iter().map(|p| Dual::from(p.value())));
+            bank
+        });
+        let layout = &model.layout;
+        for (mode, &value) in self.modes.iter().enumerate() {
+            bank.set(layout.mode(mode), Dual::from(value));
+        }
+        for (i, drive) in self.drives.iter().enumerate() {
+            bank.set(layout.input(i), Dual::from(drive.at(t).value()));
+        }
+        bank.set(layout.time(), Dual::from(t));
+        for groups in model.columns.chunks(CHUNK) {
+            for (i, x) in x.as_ref().iter().enumerate() {
+                bank.set(layout.state(i), Dual::from(x.value()));
+            }
+            for (direction, group) in groups.iter().enumerate() {
+                for (column, _) in group {
+                    bank.set(layout.state(*column), Dual::variable(x.as_ref()[*column].value(), direction));
+                }
+            }
+            model.derivative.run(bank);
+            for (direction, group) in groups.iter().enumerate() {
+                for (column, rows) in group {
+                    for &row in rows {
+                        entry(row, *column, bank.get(model.derivative.results[row]).tangent[direction]);
+                    }
+                }
+            }
+        }
+        true
+    }
+
     fn next_break(&self, t: f64) -> f64 {
         self.drives.iter().map(|drive| drive.next_break(t)).fold(f64::INFINITY, f64::min)
     }
@@ -395,8 +314,3 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         }
     }
 }
-
-/// Registers of models that fit into few.
-pub type Few<S> = Small<S>;
-/// Registers of all others.
-pub type Many<S> = Large<S>;

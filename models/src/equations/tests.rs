@@ -366,6 +366,42 @@ fn a_heat_rod_of_a_hundred_nodes_takes_few_lines() {
 }
 
 #[test]
+fn a_stiff_rod_by_the_stiff_method_takes_few_steps_and_comes_to_the_same() {
+    // A radiating rod, so that the Jacobian changes; with exact columns, eight of them at once.
+    let text = "
+        states = { 'T[1..100]' = 'K' }
+        parameters = { k = '1/s' }
+        start = { 'T[i]' = 300 }
+        [der]
+        'T[i]'   = 'k*(T[i-1] - 2*T[i] + T[i+1]) - 1e-10*(T[i]^4 - 300^4)'
+        'T[1]'   = 'k*(400 - 2*T[1] + T[2]) - 1e-10*(T[1]^4 - 300^4)'
+        'T[100]' = 'k*(T[99] - T[100]) - 1e-10*(T[100]^4 - 300^4)'
+        [tolerance]
+        relative = 1e-8
+        absolute = 1e-8
+        ";
+    let explicit = respond(&read(text).unwrap(), &[], &[("k", 1000.0)], 1.0);
+    let stiff = respond(&read(&format!("{text}method = 'stiff'")).unwrap(), &[], &[("k", 1000.0)], 1.0);
+    for signal in ["T[1]", "T[20]", "T[50]"] {
+        let (a, b) = (at(&explicit, signal, 1.0), at(&stiff, signal, 1.0));
+        assert!((a - b).abs() < 1e-4, "{signal}: {a} {b}");
+    }
+    assert!(stiff.work.steps * 5 < explicit.work.steps, "{:?} {:?}", stiff.work, explicit.work);
+}
+
+#[test]
+fn the_slopes_at_an_operating_point_are_those_of_the_equations() {
+    use mops_core::OperatingPoint;
+    let model = model(&format!("{}friction.q = {{ coulomb = 0.3 }}", text!("servo")));
+    let (j, b) = (2.0, 0.5);
+    let point = OperatingPoint { parameters: &[j, b, 0.0, 0.0], states: &[0.1, 0.0], inputs: &[3.0] };
+    let local = model.local(&point).unwrap().unwrap();
+    assert_eq!(local.rates, [0.0, 0.052 * 3.0 / j]);
+    assert!((local.slopes[(1, 1)] + b / j).abs() < 1e-15 && (local.slopes[(1, 2)] - 0.052 / j).abs() < 1e-15);
+    assert_eq!(local.slopes[(0, 1)], 1.0);
+}
+
+#[test]
 fn places_of_effects_have_the_names_of_joints_states_inputs_and_signals() {
     let places =
         |text: &str| -> Vec<String> { model(text).interface().ports.iter().map(ToString::to_string).collect() };
@@ -427,6 +463,7 @@ fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
     assert!((at(&response, "x", 1.0) - (0.1 * 3f64.cos() + 3f64.sin())).abs() < 1e-9);
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1), ("v0", 0.0)], 1.0);
     assert!((at(&response, "x", 1.0) - 0.1 * 3f64.cos()).abs() < 1e-9, "a start value that is given goes over it");
+    assert_eq!(model.start_values(&[3.0, 0.5, 0.1, f64::NAN]), Some(vec![0.1, 3.0]));
     assert_eq!(model.interface().states[0].start, "s");
     assert_eq!(model.interface().states[1].rate_of.as_deref(), Some("x"));
 }
@@ -438,7 +475,8 @@ fn every_mistake_names_its_place() {
         (mistake.path.join("."), mistake.span.clone().map(|s| (s.start, s.end)), mistake.to_string())
     };
     let base = "states = { x = 'm', v = 'm/s' }\n";
-    let cases: [(&str, &str, Option<(usize, usize)>, &str); 14] = [
+    type Wrong = (&'static str, &'static str, Option<(usize, usize)>, &'static str);
+    let cases: [Wrong; 14] = [
         ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
         ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
         ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),

@@ -176,10 +176,10 @@ mod tests {
         let Equation { left, right } = equation("J*w' = k*i - der(b)").unwrap();
         let rates = |node: &Node| {
             let mut spans = Vec::new();
-            node.walk(&mut |n| spans.extend(matches!(n.form, Form::Rate(_)).then(|| n.span.clone())));
+            node.walk(&mut |n| spans.extend(matches!(n.form, Form::Rate(_)).then_some((n.span.start, n.span.end))));
             spans
         };
-        assert_eq!((rates(&left.unwrap()), rates(&right)), (vec![2..4], vec![13..19]));
+        assert_eq!((rates(&left.unwrap()), rates(&right)), (vec![(2, 4)], vec![(13, 19)]));
         assert_eq!(equation("T[i-1] - 2*T[i]").unwrap().left, None);
         assert_eq!(equation("a = b = c").unwrap_err().span, 6..7);
     }

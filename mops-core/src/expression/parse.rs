@@ -16,7 +16,7 @@
 use std::ops::Range;
 
 use winnow::ascii::{float, multispace0};
-use winnow::combinator::{alt, cut_err, delimited, opt, peek, preceded, repeat, separated};
+use winnow::combinator::{alt, cut_err, delimited, fail, opt, peek, preceded, repeat, separated};
 use winnow::error::{StrContext, StrContextValue};
 use winnow::prelude::*;
 use winnow::stream::LocatingSlice;
@@ -291,9 +291,13 @@ fn power(input: &mut Input<'_>) -> ModalResult<Spanned> {
 
 fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let number = preceded(peek(one_of(('0'..='9', '.'))), float).with_span();
-    alt((bracketed, number.map(|(value, span)| Spanned { raw: Raw::Number(value), span }), name_or_call))
-        .context(expected("a number, a name or `(`"))
-        .parse_next(input)
+    alt((
+        bracketed,
+        number.map(|(value, span)| Spanned { raw: Raw::Number(value), span }),
+        name_or_call,
+        fail.context(expected("a number, a name or `(`")),
+    ))
+    .parse_next(input)
 }
 
 fn bracketed(input: &mut Input<'_>) -> ModalResult<Spanned> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::sections::{ChannelTable, ExperimentSection, InputTable};
 use super::tree::Node;
-use super::{Files, UNIT_HELP, at_key, read_seconds, read_unit};
+use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
 use crate::data::{Column, DataFile};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::experiment::Input;
@@ -17,6 +17,9 @@ use crate::unit::{Quantity, Unit};
 pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<CaseDraft, Diagnostic> {
     let section: ExperimentSection = node.read()?;
     let file = open(node, &section.file, files)?;
+    if section.frequency.is_some() || !section.responses.0.is_empty() {
+        return frequency::read(name, node, section, &file);
+    }
     let table = Table::new(node, &section, &file)?;
 
     let mut channels = Vec::new();
@@ -41,11 +44,11 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         parameters: section.parameters.0,
         inputs,
         horizon: None,
-        measured: Some(Measured { channels, role: section.role, free: free.collect() }),
+        measured: Some(Measured { channels, responses: Vec::new(), role: section.role, free: free.collect() }),
     })
 }
 
-fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
+pub(super) fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
     node.child(table).and_then(|table| table.child(key)).expect("it was just read")
 }
 
@@ -197,7 +200,7 @@ fn guess_time(file: &DataFile) -> Option<String> {
 }
 
 /// A column, with the study's place where the file does not have it.
-fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Column<'f>, Diagnostic> {
+pub(super) fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Column<'f>, Diagnostic> {
     file.column(name).map_err(|error| {
         let located = place.diagnostic(error.message);
         Diagnostic { help: error.help, ..located }
@@ -205,7 +208,13 @@ fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Col
 }
 
 /// The unit that the header of the file gives a column; `key` says it in the study.
-fn unit_of_header(place: &Node<'_>, file: &DataFile, column: &str, unit: &str, key: &str) -> Result<Unit, Diagnostic> {
+pub(super) fn unit_of_header(
+    place: &Node<'_>,
+    file: &DataFile,
+    column: &str,
+    unit: &str,
+    key: &str,
+) -> Result<Unit, Diagnostic> {
     Unit::parse(unit).map_err(|_| {
         let name = &file.source.name;
         place

@@ -3,10 +3,12 @@
 
 mod entries;
 mod experiment;
+mod frequency;
 mod schema;
 mod sections;
 mod shape;
 mod syntax;
+mod tasks;
 mod tree;
 
 use std::io;
@@ -67,7 +69,8 @@ pub fn read(
 
 fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
-    root.check_keys(&["study", "models", "tuners", "cases", "experiments", "criteria", "solver"])?;
+    let tables = ["study", "models", "tuners", "cases", "experiments", "criteria", "solver"];
+    root.check_keys(&[&tables[..], &tasks::TABLES[..]].concat())?;
     let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
 
     let mut draft = Draft {
@@ -97,6 +100,7 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
     for (name, node) in root.table("criteria")? {
         draft.criteria.push((name, read_criterion(catalogue, &node)?));
     }
+    draft.tasks = tasks::read(&root)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()) })

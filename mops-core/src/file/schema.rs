@@ -8,6 +8,7 @@ use super::entries::Entries;
 use super::sections::{
     CaseOptions, CriterionCommon, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
 };
+use super::tasks::{ExcitationSection, SensitivitySection, SweepSection};
 use crate::catalogue::Catalogue;
 use crate::unit::Quantity;
 
@@ -35,7 +36,7 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
         "title": "mops study",
         "type": "object",
         "additionalProperties": false,
-        "required": ["study", "models", "criteria"],
+        "required": ["study", "models"],
         "properties": {
             "study": value(schema_of::<StudySection>()),
             "models": named(one_kind(value(schema_of::<ModelCommon>()), models, true)),
@@ -44,6 +45,9 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "experiments": value(schema_of::<Entries<ExperimentSection>>()),
             "criteria": named(one_kind(value(schema_of::<CriterionCommon>()), criteria, true)),
             "solver": one_kind(value(schema_of::<SolverCommon>()), solvers, false),
+            "excitation": value(schema_of::<ExcitationSection>()),
+            "sensitivity": value(schema_of::<SensitivitySection>()),
+            "sweep": value(schema_of::<SweepSection>()),
         },
     })
 }
@@ -127,6 +131,9 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("experiments", schema_of::<ExperimentSection>()),
         ("criteria", schema_of::<CriterionCommon>()),
         ("solver", schema_of::<SolverCommon>()),
+        ("excitation", schema_of::<ExcitationSection>()),
+        ("sensitivity", schema_of::<SensitivitySection>()),
+        ("sweep", schema_of::<SweepSection>()),
     ]
 }
 

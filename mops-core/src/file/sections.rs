@@ -19,7 +19,7 @@ use crate::unit::Quantity;
 pub(super) struct StudySection {
     /// Name, as it stands in reports.
     pub name: String,
-    /// What it is for: `design` (the default) or `calibration`.
+    /// What it is for: `design` (the default), `calibration`, `excitation`, `sensitivity` or `sweep`.
     #[serde(default)]
     pub task: Task,
     /// How scaled values are combined: `max` (of a design) or `sum` (of a calibration).
@@ -169,6 +169,15 @@ pub(super) struct ExperimentSection {
     pub time: Option<String>,
     /// Unit of the time column, where its header does not say.
     pub time_unit: Option<String>,
+    /// Column of the frequency, where frequency responses were measured instead of signals over time; its unit is the
+    /// header's, else rad/s.
+    pub frequency: Option<String>,
+    /// Unit of the frequency column, where its header does not say: `Hz` or `rad/s`.
+    pub frequency_unit: Option<String>,
+    /// Measured frequency responses, by the output of a linear model: `y = { magnitude = "column", phase = "column" }` or
+    /// `y = { real = "column", imaginary = "column" }`.
+    #[serde(default)]
+    pub responses: Entries<ResponseTable>,
     /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
     #[serde(default)]
     pub channels: Entries<ChannelSection>,
@@ -193,6 +202,23 @@ pub(super) struct ExperimentSection {
     pub skip: usize,
     /// `false` keeps the times of the file; otherwise the first sample used is at time 0.
     pub reset_time: Option<bool>,
+}
+
+/// Where a measured frequency response stands in the file.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ResponseTable {
+    /// Column of the real part.
+    pub real: Option<String>,
+    /// Column of the imaginary part.
+    pub imaginary: Option<String>,
+    /// Column of the magnitude: in dB where its header or `decibel` says so, else a factor.
+    pub magnitude: Option<String>,
+    /// Column of the phase: in the unit of its header, else deg.
+    pub phase: Option<String>,
+    /// `true` for a magnitude in dB whose header does not say so.
+    #[serde(default)]
+    pub decibel: bool,
 }
 
 /// Where a measured signal stands in the file, and what makes it the model's.

@@ -47,7 +47,7 @@ impl Loop {
         }
         let response = system.response()?;
         let mut found = Self { system, response, gain_crossovers: Vec::new(), is_stable: false };
-        found.gain_crossovers = found.passes(1.0)?;
+        found.gain_crossovers = crossings(&found.system, &found.response, 1.0)?;
         found.is_stable = found.stability()?;
         Ok(found)
     }
@@ -57,31 +57,26 @@ impl Loop {
         self.response.scalar(frequency)
     }
 
-    /// Frequencies above 0 at which `|L|` passes a level.
+    /// The angular frequency, rad/s, from which on the gain of the closed loop `T = L/(1 + L)` is more than 3 dB below that
+    /// at frequency 0.
     ///
     /// # Errors
-    /// An entry that is not finite.
-    pub fn passes(&self, level: f64) -> Result<Vec<Crossing>, String> {
-        let candidates = level_frequencies(&self.system, level)?;
-        Ok(self.exact(candidates, |response| response.norm().ln() - level.ln()))
-    }
-
-    /// Makes candidates exact: `passed` changes its sign there. Those at which it does not are dropped.
-    fn exact(&self, candidates: Vec<f64>, passed: impl Fn(Complex) -> f64) -> Vec<Crossing> {
-        let f = |omega: f64| passed(self.at(omega));
-        let mut found: Vec<f64> = Vec::new();
-        for candidate in candidates.into_iter().filter(|w| *w > 0.0 && w.is_finite()) {
-            for width in [1e-9, 1e-7, 1e-5, 1e-3] {
-                let (low, high) = (candidate * (1.0 - width), candidate * (1.0 + width));
-                if f(low) * f(high) <= 0.0 {
-                    found.push(bisect(f, low, high));
-                    break;
-                }
-            }
+    /// A closed loop that is not stable; a gain that starts at 0, or never falls so far.
+    pub fn closed_loop_bandwidth(&self) -> Result<f64, String> {
+        if !self.is_stable {
+            return Err("the closed loop is not stable".to_owned());
         }
-        found.sort_by(f64::total_cmp);
-        found.dedup_by(|b, a| (*b - *a) <= 1e-9 * *a);
-        found.into_iter().map(|frequency| Crossing { frequency, response: self.at(frequency) }).collect()
+        if self.system.delay == 0.0 {
+            return bandwidth(&self.system.complementary_sensitivity()?);
+        }
+        let points = self.followed()?;
+        let gain = |l: Complex| (l / (l + 1.0)).norm();
+        let at_zero = self.at(0.0);
+        let start = if at_zero.is_finite() { gain(at_zero) } else { 1.0 };
+        let level = start * 0.5f64.sqrt();
+        let fall = points.windows(2).find(|p| gain(p[0].1) >= level && gain(p[1].1) < level);
+        let fall = fall.ok_or_else(never_falls)?;
+        Ok(bisect(|w| gain(self.at(w)) - level, fall[0].0, fall[1].0))
     }
 
     /// Where L is real and negative.
@@ -99,7 +94,7 @@ impl Loop {
             both.view_mut((n, n), (n, n)).copy_from(&-a);
             let difference = StateSpace::new(both, above(b, b), beside(c, c), DMatrix::zeros(1, 1));
             let near = |z: &&Complex| z.im > 0.0 && z.re.abs() <= 1e-4 * z.norm();
-            self.exact(zeros(&difference)?.iter().filter(near).map(|z| z.im).collect(), sine)
+            exact(&self.response, zeros(&difference)?.iter().filter(near).map(|z| z.im).collect(), sine)
         } else {
             let points = self.followed()?;
             let turned = points.windows(2).filter(|p| p[0].1.re < 0.0 && p[0].1.im * p[1].1.im <= 0.0);
@@ -197,6 +192,23 @@ impl Loop {
         self.signed(turns.fold(f64::INFINITY, f64::min))
     }
 
+    /// The gain margin: the smallest factor above 1 by which L may be multiplied until it meets -1, in dB; infinite where
+    /// none does. Negative where the closed loop is unstable: the smallest change of the gain, either way, with which L
+    /// meets -1. With `both` a stable loop is judged by the smallest change either way too, for loops that become unstable
+    /// with less gain.
+    ///
+    /// # Errors
+    /// As [`Loop::phase_crossovers`].
+    pub fn gain_margin(&self, both: bool) -> Result<f64, String> {
+        let gains = self.phase_crossovers()?.into_iter().map(|c| -20.0 * c.response.norm().log10());
+        let margin = if self.is_stable && !both {
+            gains.filter(|&gain| gain >= 0.0).fold(f64::INFINITY, f64::min)
+        } else {
+            gains.map(f64::abs).fold(f64::INFINITY, f64::min)
+        };
+        Ok(self.signed(margin))
+    }
+
     /// The delay margin: the smallest further delay that makes the closed loop unstable, s; infinite where none does.
     /// Negative where it is unstable: what the delay would have to lose.
     pub fn delay_margin(&self) -> f64 {
@@ -252,6 +264,49 @@ impl Loop {
     }
 }
 
+/// The bandwidth: the lowest angular frequency, rad/s, at which the gain of a system with one input and one output is 3 dB
+/// (a factor of `sqrt 2`) below that at frequency 0.
+///
+/// # Errors
+/// A gain at frequency 0 that is 0 or infinite, or that is never so far below.
+pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
+    let response = system.response()?;
+    let start = response.scalar(0.0).norm();
+    if !(start > 0.0 && start.is_finite()) {
+        return Err(format!("the gain at frequency 0 is {start}: there is no bandwidth"));
+    }
+    let found = crossings(system, &response, start * 0.5f64.sqrt())?;
+    found.first().map(|crossing| crossing.frequency).ok_or_else(never_falls)
+}
+
+fn never_falls() -> String {
+    "the gain is never 3 dB below that at frequency 0: the bandwidth is infinite".to_owned()
+}
+
+/// Frequencies above 0 at which the gain passes a level, rising.
+fn crossings(system: &StateSpace, response: &FrequencyResponse, level: f64) -> Result<Vec<Crossing>, String> {
+    let candidates = level_frequencies(system, level)?;
+    Ok(exact(response, candidates, |response| response.norm().ln() - level.ln()))
+}
+
+/// Makes candidates exact: `passed` changes its sign there. Those at which it does not are dropped.
+fn exact(response: &FrequencyResponse, candidates: Vec<f64>, passed: impl Fn(Complex) -> f64) -> Vec<Crossing> {
+    let f = |omega: f64| passed(response.scalar(omega));
+    let mut found: Vec<f64> = Vec::new();
+    for candidate in candidates.into_iter().filter(|w| *w > 0.0 && w.is_finite()) {
+        for width in [1e-9, 1e-7, 1e-5, 1e-3] {
+            let (low, high) = (candidate * (1.0 - width), candidate * (1.0 + width));
+            if f(low) * f(high) <= 0.0 {
+                found.push(bisect(f, low, high));
+                break;
+            }
+        }
+    }
+    found.sort_by(f64::total_cmp);
+    found.dedup_by(|b, a| (*b - *a) <= 1e-9 * *a);
+    found.into_iter().map(|frequency| Crossing { frequency, response: response.scalar(frequency) }).collect()
+}
+
 /// The lag, from 0 to 2 pi, that turns a response to the negative real axis.
 fn angle_to_minus_one(response: Complex) -> f64 {
     (response.arg() + PI).rem_euclid(TAU)
@@ -296,6 +351,7 @@ mod tests {
         assert_near(crossing[0].response.re, -0.5, 1e-12);
         let w = (4.0f64.powf(2.0 / 3.0) - 1.0).sqrt();
         assert_near(l.gain_crossovers[0].frequency, w, 1e-12);
+        assert_near(l.gain_margin(false).unwrap(), 20.0 * 2.0f64.log10(), 1e-11);
         assert_near(l.phase_margin(), PI - 3.0 * w.atan(), 1e-12);
         assert_near(l.delay_margin(), (PI - 3.0 * w.atan()) / w, 1e-12);
     }
@@ -361,6 +417,29 @@ mod tests {
         // |S|^2 = x (x + 4 z^2)/((1 - x)^2 + 4 z^2 x) with x = (w/w0)^2.
         let s2 = |x: f64| x * (x + 4.0 * z * z) / ((1.0 - x) * (1.0 - x) + 4.0 * z * z * x);
         assert_near(l.peak_sensitivity().unwrap(), s2(maximise(s2, 0.5, 3.0)).sqrt(), 1e-9);
+    }
+
+    #[test]
+    fn an_unstable_plant_may_lose_less_gain_than_it_may_gain() {
+        // 2 (s + 3)/((s - 1)(s + 10)): -0.6 at frequency 0, so unstable; with the gain 4 it is -1.2 and stable.
+        let at = |k: f64| loop_of(&[k, 3.0 * k], &[1.0, 9.0, -10.0], 0.0);
+        assert!(!at(2.0).is_stable && at(4.0).is_stable);
+        assert_near(at(4.0).gain_margin(true).unwrap(), 20.0 * 1.2f64.log10(), 1e-11);
+        assert_eq!(at(4.0).gain_margin(false).unwrap(), f64::INFINITY);
+        assert_near(at(2.0).gain_margin(false).unwrap(), 20.0 * 0.6f64.log10(), 1e-11);
+    }
+
+    #[test]
+    fn the_bandwidth_has_its_closed_form_with_and_without_delay() {
+        // 1/(T s + 1): 1/T. The closed loop of an integrator k/s: k.
+        let lag = TransferFunction::new(vec![3.0], vec![0.5, 1.0]).state_space().unwrap();
+        assert_near(bandwidth(&lag).unwrap(), 2.0, 1e-12);
+        assert_near(loop_of(&[7.0], &[1.0, 0.0], 0.0).closed_loop_bandwidth().unwrap(), 7.0, 1e-11);
+        // k exp(-s T)/s: |j w exp(j w T) + k|^2 = 2 k^2, that is w^2 - 2 k w sin(w T) = k^2.
+        let w = loop_of(&[1.0], &[1.0, 0.0], 0.3).closed_loop_bandwidth().unwrap();
+        assert_near(w * w - 2.0 * w * (0.3 * w).sin(), 1.0, 1e-9);
+        let lead = TransferFunction::new(vec![2.0, 1.0], vec![1.0, 1.0]).state_space().unwrap();
+        assert!(bandwidth(&lead).unwrap_err().contains("never"));
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub use controllability::check_controllable;
 pub use eigen::eigenvalues;
 pub use equilibrium::{Balance, equilibrium};
 pub use lyapunov::{h2_norm, lyapunov};
-pub use margins::{Crossing, Loop};
+pub use margins::{Crossing, Loop, bandwidth};
 pub use norms::{Peak, hinf_norm, peak_gain};
 pub use place::place;
 pub use response::FrequencyResponse;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, TunerDraft};
-use super::{JobPlan, Objective, ParameterSource, Row, Study, Task};
+use super::{JobPlan, Objective, ParameterSource, Row, Study, Task, Tasks, tasks};
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
 use crate::diagnostic::suggestion;
@@ -54,10 +54,15 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         }
     }
 
-    let objective = draft.objective.unwrap_or(match draft.task {
-        Task::Design => Objective::Max,
-        Task::Calibration => Objective::Sum,
-    });
+    let objective =
+        draft.objective.unwrap_or(match draft.task {
+            Task::Design => Objective::Max,
+            Task::Calibration => Objective::Sum,
+            // As the study of which they tell would be solved.
+            Task::Excitation | Task::Sensitivity | Task::Sweep => {
+                if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
+            }
+        });
     let mut study = Study {
         name: draft.name,
         task: draft.task,
@@ -68,9 +73,11 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         tuners,
         rows: Vec::new(),
         jobs: Vec::new(),
+        tasks: Tasks::default(),
         warnings,
     };
-    if draft.criteria.is_empty() {
+    // How rich an input is can be told without a criterion.
+    if draft.criteria.is_empty() && study.task != Task::Excitation {
         return Err(Mistake::new("criteria", "the study has no criterion").with_help(
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
         ));
@@ -84,6 +91,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
             .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
+    study.tasks = tasks::build(draft.tasks, &study)?;
     Ok(study)
 }
 
@@ -183,7 +191,9 @@ fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) ->
         Some(measured) => Some(build_experiment(&draft.name, measured, models, warnings)?),
         None => None,
     };
-    let horizon = draft.horizon.or_else(|| experiment.as_ref().map(Experiment::end));
+    // Frequency responses end at no time.
+    let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
+    let horizon = draft.horizon.or(end);
     check_horizon(draft.horizon)?;
     Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon })
 }
@@ -239,10 +249,22 @@ fn build_experiment(
         warnings.extend(suspicious_start(name, &built));
         channels.push(built);
     }
-    if channels.is_empty() {
+    for response in &draft.responses {
+        let known: Vec<&str> = models
+            .iter()
+            .filter(|(_, m)| m.interface().analysis == AnalysisKind::Linear)
+            .flat_map(|(_, m)| signal_names(&m.interface().signals))
+            .collect();
+        if !known.contains(&response.signal.as_str()) {
+            let fact = format!("no linear model has an output `{}`", response.signal);
+            let help = suggestion(&response.signal, known.iter().copied());
+            return Err(Mistake::new(&response.signal, fact).with_help(help).within("responses"));
+        }
+    }
+    if channels.is_empty() && draft.responses.is_empty() {
         return Err(Mistake::new("channels", "the experiment measures nothing").with_help("name at least one channel"));
     }
-    Ok(Experiment { channels, role: draft.role })
+    Ok(Experiment { channels, responses: draft.responses.clone(), role: draft.role })
 }
 
 fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
@@ -603,13 +625,21 @@ fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: 
 }
 
 fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake> {
-    let measures = |case: &Case| {
-        draft
-            .criterion
-            .needs_measurement()
-            .is_none_or(|signal| case.experiment.as_ref().is_some_and(|e| e.channel(signal).is_some()))
+    let reads = draft.criterion.reads();
+    let measures = |case: &Case| match (draft.criterion.needs_measurement(), &case.experiment, reads) {
+        (Some(signal), Some(experiment), AnalysisKind::Time) => experiment.channel(signal).is_some(),
+        (Some(signal), Some(experiment), AnalysisKind::Linear) => experiment.response(signal).is_some(),
+        (Some(_), None, _) => false,
+        // Where only frequency responses were measured, nothing is simulated over time.
+        (None, Some(experiment), AnalysisKind::Time) => !experiment.channels.is_empty(),
+        (None, ..) => true,
     };
     let signal = draft.criterion.needs_measurement().unwrap_or_default();
+    let way_out = match (reads, signal) {
+        (_, "") => "name cases without a measurement over frequency, or experiments with `channels`".to_owned(),
+        (AnalysisKind::Time, _) => format!("name experiments with `{signal}` among their `channels`"),
+        (AnalysisKind::Linear, _) => format!("name experiments with `{signal}` among their `responses`"),
+    };
     let chosen: Vec<usize> = match &draft.cases {
         None => (0..study.cases.len()).filter(|&i| measures(&study.cases[i])).collect(),
         Some(wanted) => wanted
@@ -623,16 +653,27 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
                 if measures(&study.cases[found]) {
                     Ok(found)
                 } else {
-                    Err(Mistake::new(name, format!("nothing in `{name}` measures `{signal}`"))
-                        .with_help(format!("name experiments with `{signal}` among their `channels`"))
-                        .within("cases"))
+                    let fact = match signal {
+                        "" => {
+                            format!("nothing is simulated over time in `{name}`, only frequency responses are measured")
+                        }
+                        signal => format!("nothing in `{name}` measures `{signal}`"),
+                    };
+                    Err(Mistake::new(name, fact).with_help(way_out.clone()).within("cases"))
                 }
             })
             .collect::<Result<_, _>>()?,
     };
     if chosen.is_empty() {
-        return Err(Mistake::new("signal", format!("no experiment measures `{signal}`"))
-            .with_help("add it to the `channels` of an experiment"));
+        let help = match reads {
+            AnalysisKind::Time => "add it to the `channels` of an experiment",
+            AnalysisKind::Linear => "add it to the `responses` of an experiment with `frequency`",
+        };
+        return Err(match signal {
+            "" => Mistake::here("no case is simulated over time: only frequency responses are measured")
+                .with_help("add a case under [cases]"),
+            signal => Mistake::new("signal", format!("no experiment measures `{signal}`")).with_help(help),
+        });
     }
     Ok(chosen)
 }

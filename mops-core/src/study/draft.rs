@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::{Objective, Study, Task};
+use super::{Objective, Study, Task, TasksDraft};
 use crate::criterion::{CriterionSpec, Usage};
-use crate::experiment::{Input, Role};
+use crate::experiment::{Input, ResponseData, Role};
 use crate::model::Model;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
@@ -83,6 +83,8 @@ pub struct Draft {
     pub cases: Vec<CaseDraft>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionDraft)>,
+    /// What tasks other than design and calibration are asked.
+    pub tasks: TasksDraft,
 }
 
 impl Draft {
@@ -168,6 +170,8 @@ pub struct CaseDraft {
 pub struct Measured {
     /// Measured signals.
     pub channels: Vec<ChannelDraft>,
+    /// Measured frequency responses.
+    pub responses: Vec<ResponseData>,
     /// What it is used for.
     pub role: Role,
     /// States whose start values are estimated.

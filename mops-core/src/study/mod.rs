@@ -2,6 +2,7 @@
 
 mod build;
 mod draft;
+mod tasks;
 
 use std::sync::Arc;
 
@@ -9,6 +10,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
+pub use tasks::{
+    Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
+    SweepDraft, SweepTask, Tasks, TasksDraft,
+};
 
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
@@ -26,6 +31,12 @@ pub enum Task {
     Design,
     /// Estimate the tuners from measurements.
     Calibration,
+    /// Tell how rich the inputs are.
+    Excitation,
+    /// Tell which tuners, or which combinations of them, the criteria or the data determine.
+    Sensitivity,
+    /// Draw the objective over one tuner or two.
+    Sweep,
 }
 
 /// How the scaled values become one number to minimise.
@@ -60,6 +71,8 @@ pub struct Study {
     pub rows: Vec<Row>,
     /// One job per model and case that has a row.
     pub jobs: Vec<JobPlan>,
+    /// What tasks other than design and calibration are asked.
+    pub tasks: Tasks,
     /// What deserves a word before a run, such as a first sample that looks wrong.
     pub warnings: Vec<String>,
 }

@@ -1,0 +1,62 @@
+//! Bandwidth.
+
+use mops_core::linear::bandwidth;
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, Of, feedback};
+
+/// The bandwidth: the lowest `w` with `|G(j w)| = |G(0)|/sqrt 2` (3 dB below), in rad/s, found exactly. With `of =
+/// "closed-loop"` the model is the loop transfer function L, and `G = L/(1 + L)`.
+///
+/// Range: above 0. More is mostly better, so that a demand is the pair `good` and `bad`, such as `good = "2 Hz"`, `bad =
+/// "1 Hz"` (1 Hz is 6.28 rad/s). It has no value where the gain at frequency 0 is 0 or infinite or never falls so far, or where
+/// the closed loop is unstable.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 11.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Bandwidth {
+    /// Input of the system; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the system; the only one where absent.
+    pub output: Option<String>,
+    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    pub of: Of,
+}
+
+impl CriterionOptions for Bandwidth {
+    const KIND: &'static str = "bandwidth";
+}
+
+impl CriterionSpec for Bandwidth {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let of = self.of;
+        let value = move |system| match of {
+            Of::System => Ok(bandwidth(&system)?.into()),
+            Of::ClosedLoop => Ok(feedback(system)?.closed_loop_bandwidth()?.into()),
+        };
+        Ok(LinearCriterion::boxed(channel, Unit::known("rad/s"), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, undefined, value};
+
+    #[test]
+    fn a_lag_and_the_loop_of_an_integrator_have_their_closed_forms() {
+        let system = Bandwidth::default();
+        assert_near(value(&system, &linear(&[3.0], &[0.5, 1.0])).number, 2.0, 1e-12);
+        let closed = Bandwidth { of: Of::ClosedLoop, ..Bandwidth::default() };
+        assert_near(value(&closed, &linear(&[7.0], &[1.0, 0.0])).number, 7.0, 1e-11);
+        assert!(undefined(&system, &linear(&[7.0], &[1.0, 0.0])).contains("frequency 0"));
+    }
+}

@@ -1,0 +1,55 @@
+//! Gain crossover frequency of a feedback loop.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, feedback};
+
+/// The gain crossover frequency: the highest `w` with `|L(j w)| = 1`, in rad/s, found exactly. The model is the loop transfer
+/// function L; a delay does not matter.
+///
+/// Range: above 0. More is mostly better, so that a demand is the pair `good` and `bad`. It has no value where `|L|` never is 1.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct CrossoverFrequency {
+    /// Input of the loop transfer function; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for CrossoverFrequency {
+    const KIND: &'static str = "crossover-frequency";
+}
+
+impl CriterionSpec for CrossoverFrequency {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let value = |system| match feedback(system)?.gain_crossovers.last() {
+            Some(crossing) => Ok(crossing.frequency.into()),
+            None => Err("the gain of the loop never is 1".to_owned()),
+        };
+        Ok(LinearCriterion::boxed(channel, Unit::known("rad/s"), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, undefined, value};
+
+    #[test]
+    fn the_crossover_of_a_third_order_lag_has_its_closed_form() {
+        let found = value(&CrossoverFrequency::default(), &linear(&[4.0], &[1.0, 3.0, 3.0, 1.0])).number;
+        assert_near(found, (4.0f64.powf(2.0 / 3.0) - 1.0).sqrt(), 1e-12);
+        let never = undefined(&CrossoverFrequency::default(), &linear(&[0.5], &[1.0, 1.0]));
+        assert_eq!(never, "the gain of the loop never is 1");
+    }
+}

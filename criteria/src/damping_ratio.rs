@@ -1,0 +1,65 @@
+//! Smallest damping ratio of all poles.
+
+use mops_core::linear::Complex;
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, Of, poles};
+
+/// The damping ratio of the least damped pole, `min -Re p/|p|`, dimensionless. With `of = "closed-loop"` the model is the loop
+/// transfer function L, and the poles are those of `L/(1 + L)`. Poles that neither input nor output touches count too.
+///
+/// Range: -1 to 1; 1 for real stable poles, negative for unstable ones, 0 for a pole at the origin. More is better, so that a
+/// demand is the pair `good` and `bad`, such as `good = 0.7`, `bad = 0.5`. A closed loop with a delay has no finite number of
+/// poles, and no value.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 6.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct DampingRatio {
+    /// Input of the system; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the system; the only one where absent.
+    pub output: Option<String>,
+    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    pub of: Of,
+}
+
+impl CriterionOptions for DampingRatio {
+    const KIND: &'static str = "damping-ratio";
+}
+
+impl CriterionSpec for DampingRatio {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let of = self.of;
+        let damping = |p: &Complex| if p.norm() == 0.0 { 0.0 } else { -p.re / p.norm() };
+        let value = move |system| Ok(poles(&system, of)?.iter().map(damping).fold(1.0, f64::min).into());
+        Ok(LinearCriterion::boxed(channel, Unit::one(), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, value};
+
+    #[test]
+    fn the_least_damped_pole_counts_whichever_its_speed() {
+        // (s + 9)(s^2 + 2 s + 100): 0.1.
+        let poles = [1.0, 11.0, 118.0, 900.0];
+        assert_near(value(&DampingRatio::default(), &linear(&[1.0], &poles)).number, 0.1, 1e-13);
+        assert_near(value(&DampingRatio::default(), &linear(&[1.0], &[1.0, -1.0, 100.0])).number, -0.05, 1e-13);
+    }
+
+    #[test]
+    fn the_closed_loop_of_a_second_order_loop_has_its_damping() {
+        let closed = DampingRatio { of: Of::ClosedLoop, ..DampingRatio::default() };
+        assert_near(value(&closed, &linear(&[9.0], &[1.0, 6.0 * 0.3, 0.0])).number, 0.3, 1e-13);
+    }
+}

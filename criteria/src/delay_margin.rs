@@ -1,0 +1,59 @@
+//! Delay margin of a feedback loop.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, capped, feedback, second};
+
+/// The delay margin: the smallest further delay with which the closed loop becomes unstable, `min (pi + arg L(j w))/w` over
+/// the frequencies at which `|L(j w)| = 1` (the turn counted from 0 to 2 pi), in s. The model is the loop transfer function L,
+/// with unity negative feedback around it.
+///
+/// Crossings are found exactly, not on a grid; a delay that the model has already enters exactly.
+///
+/// Range: any number. More is better, so that a demand is the pair `good` and `bad`, such as `good = "0.2 s"`, `bad =
+/// "0.1 s"`. Negative where the closed loop is unstable: the delay that would have to go. An infinite margin counts as 1e6 s.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct DelayMargin {
+    /// Input of the loop transfer function; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for DelayMargin {
+    const KIND: &'static str = "delay-margin";
+}
+
+impl CriterionSpec for DelayMargin {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let value = |system| Ok(capped(feedback(system)?.delay_margin(), 1e6));
+        Ok(LinearCriterion::boxed(channel, second(), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, linear_delayed, value};
+
+    #[test]
+    fn the_margin_of_an_integrator_has_its_closed_form_and_a_delay_uses_it_up() {
+        // k/s: pi/(2 k).
+        let margin = value(&DelayMargin::default(), &linear(&[4.0], &[1.0, 0.0])).number;
+        assert_near(margin, std::f64::consts::FRAC_PI_2 / 4.0, 1e-13);
+        let left = value(&DelayMargin::default(), &linear_delayed(&[4.0], &[1.0, 0.0], 0.5)).number;
+        assert_near(left, std::f64::consts::FRAC_PI_2 / 4.0 - 0.5, 1e-12);
+        let never = value(&DelayMargin::default(), &linear(&[0.5], &[1.0, 1.0]));
+        assert_eq!(never.number, 1e6);
+    }
+}

@@ -1,0 +1,144 @@
+//! Fit to a measured frequency response.
+
+use mops_core::linear::Complex;
+use mops_core::{
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::Channel;
+
+/// `J = 1/N sum_i |G(j w_i)/G_i - 1|^2`, dimensionless: the mean square of the relative deviation from a measured frequency
+/// response `G_i` at the angular frequencies `w_i`. With `absolute = true`: `1/N sum_i |G(j w_i) - G_i|^2`, in the square of
+/// the unit of the output over that of the input.
+///
+/// Deviations are complex, so that magnitude and phase count together: 1 % and 0.01 rad alike. Their real and imaginary
+/// parts, over `sqrt N`, are the residuals that least-squares solvers use. A relative deviation gives a resonance and the
+/// response far below it the same weight, as a Bode plot does.
+///
+/// The response is measured in an experiment with `frequency` and `responses`. Range: from 0 up; a relative noise of
+/// standard deviation s in magnitude and phase leaves about 2 s^2.
+///
+/// Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition (2012), section 9.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FrequencyFit {
+    /// Output that is compared with its measurement.
+    pub signal: String,
+    /// Input of the response; the only one where absent.
+    pub input: Option<String>,
+    /// `true` compares the responses themselves instead of their ratio.
+    #[serde(default)]
+    pub absolute: bool,
+}
+
+impl CriterionOptions for FrequencyFit {
+    const KIND: &'static str = "frequency-fit";
+}
+
+impl CriterionSpec for FrequencyFit {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), Some(&self.signal))
+            .map_err(|m| if m.path == ["output"] { Mistake { path: vec!["signal".to_owned()], ..m } } else { m })?;
+        Ok(Box::new(Bound { channel, signal: self.signal.clone(), absolute: self.absolute }))
+    }
+
+    fn needs_measurement(&self) -> Option<&str> {
+        Some(&self.signal)
+    }
+}
+
+struct Bound {
+    channel: Channel,
+    signal: String,
+    absolute: bool,
+}
+
+impl Criterion for Bound {
+    fn unit(&self) -> Unit {
+        if self.absolute { self.channel.unit.power(2, 0) } else { Unit::one() }
+    }
+
+    fn signals(&self) -> Vec<String> {
+        vec![self.signal.clone()]
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let data = case.experiment.as_ref().and_then(|experiment| experiment.response(&self.signal));
+        let data = data.ok_or_else(|| format!("`{}` does not measure the response of `{}`", case.name, self.signal))?;
+        let response = self.channel.system(analysis).response()?;
+        let weight = 1.0 / (data.values.len() as f64).sqrt();
+        let mut residuals = Vec::with_capacity(2 * data.values.len());
+        for (&frequency, &[re, im]) in data.frequencies.iter().zip(&data.values) {
+            let measured = Complex::new(re, im);
+            let computed = response.scalar(frequency);
+            let deviation = if self.absolute { computed - measured } else { computed / measured - 1.0 };
+            if !deviation.is_finite() {
+                return Err(format!("at {frequency} rad/s the computed or measured response is 0 or infinite"));
+            }
+            residuals.extend([deviation.re * weight, deviation.im * weight]);
+        }
+        Ok(Value::sum_of_squares(residuals))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::{Experiment, ResponseData};
+
+    use super::*;
+    use crate::common::testing::{assert_near, bound, linear, mistake, undefined_in, value_in};
+
+    fn measured(response: impl Fn(f64) -> Complex) -> Case {
+        let frequencies: Vec<f64> = (1..=20).map(|i| 0.3 * f64::from(i)).collect();
+        let values = frequencies.iter().map(|&w| response(w)).map(|g| [g.re, g.im]).collect();
+        let data = ResponseData { signal: "y".into(), frequencies, values };
+        Case { experiment: Some(Experiment { responses: vec![data], ..Experiment::default() }), ..Case::default() }
+    }
+
+    fn lag(w: f64) -> Complex {
+        Complex::new(3.0, 0.0) / Complex::new(2.0, w)
+    }
+
+    fn fit() -> FrequencyFit {
+        FrequencyFit { signal: "y".into(), ..FrequencyFit::default() }
+    }
+
+    #[test]
+    fn the_right_system_fits_exactly_and_a_gain_error_is_its_square() {
+        let case = measured(lag);
+        assert_near(value_in(&case, &fit(), &linear(&[3.0], &[1.0, 2.0])).number, 0.0, 1e-28);
+        let off = value_in(&case, &fit(), &linear(&[3.3], &[1.0, 2.0]));
+        assert_near(off.number, 0.01, 1e-14);
+        assert_eq!((off.residuals.len(), off.number), (40, off.residuals.iter().map(|r| r * r).sum::<f64>()));
+    }
+
+    #[test]
+    fn a_phase_error_counts_as_much_as_one_of_the_magnitude() {
+        let turned = measured(|w| lag(w) * Complex::from_polar(1.0, 1e-3));
+        let larger = measured(|w| lag(w) * (1.0 + 1e-3));
+        let at = |case: &Case| value_in(case, &fit(), &linear(&[3.0], &[1.0, 2.0])).number;
+        assert_near(at(&turned) / at(&larger), 1.0, 3e-3);
+    }
+
+    #[test]
+    fn an_absolute_deviation_has_the_unit_of_the_response_squared() {
+        let absolute = FrequencyFit { absolute: true, ..fit() };
+        let off = value_in(&measured(|w| lag(w) + 0.2), &absolute, &linear(&[3.0], &[1.0, 2.0]));
+        assert_near(off.number, 0.04, 1e-14);
+        assert_eq!(bound(&absolute).unit(), Unit::known("m2/V2"));
+        assert_eq!(
+            undefined_in(&Case::default(), &fit(), &linear(&[3.0], &[1.0, 2.0])),
+            "`` does not measure the response of `y`"
+        );
+        assert!(
+            mistake(&FrequencyFit { signal: "z".into(), ..fit() }).starts_with("signal: the model has no output `z`")
+        );
+    }
+}

@@ -1,0 +1,54 @@
+//! H2 norm.
+
+use mops_core::linear::h2_norm;
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion};
+
+/// The H2 norm `sqrt(1/(2 pi) integral |G(j w)|^2 dw)`: the root mean square of the output for white noise of unit intensity at
+/// the input, and the root of the integrated square of the impulse response. In the unit of the output over that of the input,
+/// times s^(-1/2), which is left out.
+///
+/// From a Lyapunov equation, not from an integral. Range: from 0 up. It has no value where the system is unstable or passes its
+/// input on directly.
+///
+/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct H2Norm {
+    /// Input of the system; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the system; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for H2Norm {
+    const KIND: &'static str = "h2-norm";
+}
+
+impl CriterionSpec for H2Norm {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let unit = channel.unit.clone();
+        Ok(LinearCriterion::boxed(channel, unit, |system| Ok(h2_norm(&system)?.into())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, undefined, value};
+
+    #[test]
+    fn the_norm_of_a_lag_has_its_closed_form() {
+        // k/(s + p): k/sqrt(2 p).
+        assert_near(value(&H2Norm::default(), &linear(&[3.0], &[1.0, 2.0])).number, 1.5, 1e-14);
+        assert!(undefined(&H2Norm::default(), &linear(&[1.0], &[1.0, -1.0])).contains("not stable"));
+    }
+}

@@ -1,0 +1,56 @@
+//! Hinf norm.
+
+use mops_core::linear::hinf_norm;
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion};
+
+/// The Hinf norm `max_w |G(j w)|`: the largest amplification of any sine, in the unit of the output over that of the input. Of
+/// the linearised closed loop from setpoint to actuator it is the largest effort of the controller.
+///
+/// The peak is found by the eigenvalues of a Hamiltonian matrix, not on a grid. Range: from 0 up. It has no value where the
+/// system is unstable.
+///
+/// Source: N. A. Bruinsma, M. Steinbuch, A fast algorithm to compute the Hinf norm of a transfer function matrix, Systems and
+/// Control Letters 14 (1990) 287-293.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct HinfNorm {
+    /// Input of the system; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the system; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for HinfNorm {
+    const KIND: &'static str = "hinf-norm";
+}
+
+impl CriterionSpec for HinfNorm {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let unit = channel.unit.clone();
+        Ok(LinearCriterion::boxed(channel, unit, |system| Ok(hinf_norm(&system)?.gain.into())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, linear, undefined, value};
+
+    #[test]
+    fn the_norm_of_a_resonance_has_its_closed_form() {
+        // w^2/(s^2 + 2 z w s + w^2): 1/(2 z sqrt(1 - z^2)).
+        let found = value(&HinfNorm::default(), &linear(&[9.0], &[1.0, 0.06, 9.0])).number;
+        assert_near(found, 1.0 / (0.02 * f64::sqrt(1.0 - 1e-4)), 1e-6);
+        assert!(undefined(&HinfNorm::default(), &linear(&[1.0], &[1.0, -1.0])).contains("not stable"));
+        assert_eq!(bound(&HinfNorm::default()).unit(), mops_core::Unit::known("m/V"));
+    }
+}

@@ -1,0 +1,54 @@
+//! Largest complementary sensitivity of a feedback loop.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, feedback};
+
+/// `Mt = max_w |L(j w)/(1 + L(j w))|`, dimensionless: the resonance peak of the closed loop. The model is the loop transfer
+/// function L, with unity negative feedback around it.
+///
+/// The peak is found by the eigenvalues of a Hamiltonian matrix, with a delay by following L, never on a grid.
+///
+/// Range: from 0 up; 1 to 1.5 is usual. It has no value where the closed loop is unstable.
+///
+/// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), section 4.5.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct MaximumComplementarySensitivity {
+    /// Input of the loop transfer function; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for MaximumComplementarySensitivity {
+    const KIND: &'static str = "maximum-complementary-sensitivity";
+}
+
+impl CriterionSpec for MaximumComplementarySensitivity {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        Ok(LinearCriterion::boxed(channel, Unit::one(), |system| Ok(feedback(system)?.peak_complementary()?.into())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, value};
+
+    #[test]
+    fn the_peak_of_the_second_order_loop_has_its_closed_form() {
+        // w^2/(s (s + 2 z w)): 1/(2 z sqrt(1 - z^2)).
+        for z in [0.05f64, 0.3, 0.6] {
+            let peak = value(&MaximumComplementarySensitivity::default(), &linear(&[9.0], &[1.0, 6.0 * z, 0.0])).number;
+            assert_near(peak, 0.5 / (z * (1.0 - z * z).sqrt()), 1e-7);
+        }
+    }
+}

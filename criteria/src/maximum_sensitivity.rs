@@ -1,0 +1,60 @@
+//! Largest sensitivity of a feedback loop.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, feedback};
+
+/// `Ms = max_w |1/(1 + L(j w))|`, dimensionless: one over the smallest distance of L from -1. The model is the loop transfer
+/// function L, with unity negative feedback around it.
+///
+/// The peak is found by the eigenvalues of a Hamiltonian matrix, with a delay by following L, never on a grid.
+///
+/// Range: from 1 up (nearly always); 1.2 to 2 is usual. It has no value where the closed loop is unstable.
+///
+/// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), section 4.5; S. Skogestad, I. Postlethwaite,
+/// Multivariable Feedback Control, 2nd edition (2005), section 2.4.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct MaximumSensitivity {
+    /// Input of the loop transfer function; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for MaximumSensitivity {
+    const KIND: &'static str = "maximum-sensitivity";
+}
+
+impl CriterionSpec for MaximumSensitivity {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        Ok(LinearCriterion::boxed(channel, Unit::one(), |system| Ok(feedback(system)?.peak_sensitivity()?.into())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
+
+    #[test]
+    fn the_peak_of_an_integrator_with_delay_has_the_value_of_another_computation() {
+        // exp(-s/2)/s: the minimum of |1 + L| on a grid of 2e7 frequencies (NumPy).
+        let peak = value(&MaximumSensitivity::default(), &linear_delayed(&[1.0], &[1.0, 0.0], 0.5)).number;
+        assert_near(peak, 1.590_490_233_19, 1e-8);
+    }
+
+    #[test]
+    fn one_lag_has_no_peak_and_an_unstable_loop_no_value() {
+        assert_near(value(&MaximumSensitivity::default(), &linear(&[3.0], &[1.0, 1.0])).number, 1.0, 1e-9);
+        let unstable = undefined(&MaximumSensitivity::default(), &linear(&[9.0], &[1.0, 3.0, 3.0, 1.0]));
+        assert_eq!(unstable, "the closed loop is not stable");
+    }
+}

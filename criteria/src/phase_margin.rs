@@ -1,0 +1,66 @@
+//! Phase margin of a feedback loop.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, capped, feedback};
+
+/// The phase margin: `min |pi + arg L(j w)|` over the frequencies at which `|L(j w)| = 1`, in rad. The model is the loop
+/// transfer function L, with unity negative feedback around it.
+///
+/// Crossings are found exactly, not on a grid; a delay of the model enters exactly. Of several crossings the one with the
+/// smallest turn to -1, either way, counts.
+///
+/// Range: -pi to pi. More is better, so that a demand is the pair `good` and `bad`, such as `good = "60 deg"`, `bad =
+/// "45 deg"`. Negative where the closed loop is unstable, so that the value passes 0 where stability is lost. Where `|L|` never
+/// is 1 it counts as pi.
+///
+/// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct PhaseMargin {
+    /// Input of the loop transfer function; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; the only one where absent.
+    pub output: Option<String>,
+}
+
+impl CriterionOptions for PhaseMargin {
+    const KIND: &'static str = "phase-margin";
+}
+
+impl CriterionSpec for PhaseMargin {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let value = |system| Ok(capped(feedback(system)?.phase_margin(), std::f64::consts::PI));
+        Ok(LinearCriterion::boxed(channel, Unit::known("rad"), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, linear_delayed, value};
+
+    #[test]
+    fn the_margin_of_the_second_order_loop_has_its_closed_form() {
+        // w^2/(s (s + 2 z w)): atan(2 z/sqrt(sqrt(1 + 4 z^4) - 2 z^2)).
+        for z in [0.1f64, 0.5, 0.9] {
+            let margin = value(&PhaseMargin::default(), &linear(&[9.0], &[1.0, 6.0 * z, 0.0])).number;
+            let exact = (2.0 * z / ((1.0 + 4.0 * z.powi(4)).sqrt() - 2.0 * z * z).sqrt()).atan();
+            assert_near(margin, exact, 1e-11);
+        }
+    }
+
+    #[test]
+    fn a_delay_takes_its_part_until_nothing_is_left() {
+        let margin = |delay| value(&PhaseMargin::default(), &linear_delayed(&[1.0], &[1.0, 0.0], delay)).number;
+        assert_near(margin(0.3), std::f64::consts::FRAC_PI_2 - 0.3, 1e-12);
+        assert_near(margin(1.7), std::f64::consts::FRAC_PI_2 - 1.7, 1e-12);
+    }
+}

@@ -1,0 +1,62 @@
+//! Slowest pole.
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, Of, poles};
+
+/// The largest real part of all poles, `max Re p`, in 1/s: negative for a stable system, and the more so the faster its slowest
+/// mode dies out. With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
+/// Poles that neither input nor output touches count too.
+///
+/// Range: any number. It is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay
+/// has no finite number of poles, and no value.
+///
+/// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 7.4 (stability degree).
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct SlowestPole {
+    /// Input of the system; the only one where absent.
+    pub input: Option<String>,
+    /// Output of the system; the only one where absent.
+    pub output: Option<String>,
+    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    pub of: Of,
+}
+
+impl CriterionOptions for SlowestPole {
+    const KIND: &'static str = "slowest-pole";
+}
+
+impl CriterionSpec for SlowestPole {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let of = self.of;
+        let value = move |system| {
+            let poles = poles(&system, of)?;
+            Ok(poles.iter().map(|p| p.re).fold(f64::NEG_INFINITY, f64::max).into())
+        };
+        Ok(LinearCriterion::boxed(channel, Unit::known("1/s"), value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
+
+    #[test]
+    fn the_pole_farthest_to_the_right_counts() {
+        assert_near(value(&SlowestPole::default(), &linear(&[1.0], &[1.0, 3.0, 2.0])).number, -1.0, 1e-14);
+        // 5/((s - 1)(s + 4)) in feedback: s^2 + 3 s + 1.
+        let closed = SlowestPole { of: Of::ClosedLoop, ..SlowestPole::default() };
+        let exact = -1.5 + 1.25f64.sqrt();
+        assert_near(value(&closed, &linear(&[5.0], &[1.0, 3.0, -4.0])).number, exact, 1e-13);
+        assert!(undefined(&closed, &linear_delayed(&[5.0], &[1.0, 3.0, -4.0], 0.1)).contains("delay"));
+    }
+}

@@ -1,0 +1,89 @@
+//! What a model from text offers: parameters with start values, and places of effects.
+
+use mops_core::{Mistake, Parameter, Port, Variable, suggestion};
+
+use super::definition::{self, Definition, under};
+use super::graph::Op;
+use super::system::System;
+
+/// Where a state starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Start {
+    /// At a parameter.
+    Parameter(usize),
+    /// At an expression, unless this parameter is given.
+    Expression(usize),
+}
+
+/// The parameters of the model: those declared, then start values; and where each state starts.
+pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Parameter>, Vec<Start>), Mistake> {
+    let declared = |p: &definition::Settable| Parameter {
+        variable: Variable {
+            name: p.quantity.name.clone(),
+            unit: p.quantity.unit.clone(),
+            about: p.quantity.about.clone(),
+        },
+        default: p.default,
+        range: p.range,
+    };
+    let mut parameters: Vec<Parameter> = d.parameters.iter().map(declared).collect();
+    let mut starts = Vec::new();
+    for (state, start) in d.states.iter().zip(&system.starts) {
+        if let Some(Op::Parameter(index)) = start.map(|id| system.graph.op(id)) {
+            starts.push(Start::Parameter(index));
+            continue;
+        }
+        let name = match state.name.split_once('[') {
+            Some((family, index)) => format!("{family}0[{index}"),
+            None => format!("{}0", state.name),
+        };
+        if let Some(taken) = d.parameters.iter().find(|p| p.quantity.name == name) {
+            let mistake = Mistake::here(format!("the start value of `{}` is a parameter of this name", state.name));
+            return Err(under(&taken.quantity.path, mistake).with_help(format!(
+                "say start = {{ {} = \"{name}\" }} if it is meant, or take another name",
+                state.name
+            )));
+        }
+        let value = start.map_or(Some(0.0), |id| system.graph.constant(id));
+        let about = format!("{} at the start", state.name);
+        starts.push(match value {
+            Some(_) => Start::Parameter(parameters.len()),
+            None => Start::Expression(parameters.len()),
+        });
+        parameters.push(Parameter {
+            variable: Variable { name, unit: state.unit.clone(), about },
+            default: Some(value.unwrap_or(f64::NAN)),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+        });
+    }
+    Ok((parameters, starts))
+}
+
+/// Joints and the equations of all states but positions; inputs; states and outputs.
+pub(super) fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistake> {
+    let name = |s: usize| d.states[s].name.clone();
+    let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);
+    for (_, joint, path) in &d.ports {
+        if !system.joints.iter().any(|&(position, _)| d.states[position].name == *joint) {
+            let names = system.joints.iter().map(|&(position, _)| d.states[position].name.as_str());
+            return Err(under(path, Mistake::here(format!("`{joint}` is not the position of a joint")))
+                .with_help(suggestion(joint, names)));
+        }
+    }
+    let mut ports = Vec::new();
+    for s in 0..d.states.len() {
+        if system.joints.iter().any(|&(position, _)| position == s) {
+            continue;
+        }
+        let position = system.joints.iter().find(|&&(_, velocity)| velocity == s).map(|&(position, _)| position);
+        let place = position.map_or_else(|| name(s), |p| given(p).map_or_else(|| name(p), |(name, ..)| name.clone()));
+        if let Some(position) = position {
+            ports.push(Port::Joint { name: place.clone(), position: name(position), velocity: name(s) });
+        }
+        ports.push(Port::Process { name: place, state: name(s) });
+    }
+    ports.extend(d.inputs.iter().map(|input| Port::Actuator { input: input.name.clone() }));
+    let signals = d.states.iter().chain(d.outputs.iter().map(|(output, _)| output));
+    ports.extend(signals.map(|signal| Port::Sensor { output: signal.name.clone() }));
+    Ok(ports)
+}

@@ -1,0 +1,146 @@
+//! The modes of a model from text: which branch holds, which joint is stuck.
+
+use mops_core::{Failure, Scalar};
+
+use super::bank::Bank;
+use super::running::Running;
+use crate::kernel::Dynamics;
+
+impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X, B> {
+    pub(super) fn set_mode(&mut self, mode: usize, value: f64) {
+        self.modes[mode] = value;
+        self.bank.borrow_mut().set(self.model.layout.mode(mode), S::from(value));
+    }
+
+    pub(super) fn is(&self, mode: usize) -> bool {
+        self.modes[mode] > 0.0
+    }
+
+    /// Puts every condition and contact into the mode that fits this moment.
+    pub(super) fn settle(&mut self, t: f64, x: &[S]) {
+        for k in 0..self.model.switches.len() {
+            let switch = &self.model.switches[k];
+            let [difference, right] = self.results(&switch.sides, t, x).map(Scalar::value);
+            let holds = difference > 0.0 || difference == 0.0 && !switch.strict;
+            self.set_mode(switch.mode, f64::from(u8::from(holds)));
+            self.set_slack(k, 0.0, right);
+        }
+        self.find_contacts(t, x);
+    }
+
+    /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly, or
+    /// from where rounding left it.
+    pub(super) fn set_slack(&mut self, k: usize, guard: f64, right: f64) {
+        self.slack[k] = if self.model.switches[k].jumps {
+            (-guard).max(0.0)
+        } else {
+            0.1 * (self.tolerance.absolute + self.tolerance.relative * right.abs())
+        };
+    }
+
+    /// Joints that move slide the way they move. Of those at rest each is stuck if the torque it takes is within its
+    /// limit, else it slides the way it accelerates: the choice in which all agree, as in [`crate::kernel::friction`].
+    pub(super) fn find_contacts(&mut self, t: f64, x: &[S]) {
+        let model = self.model;
+        let mut resting = Vec::new();
+        for (j, joint) in model.joints.iter().enumerate() {
+            let speed = x[joint.contact.velocity].value();
+            let [_, limit, ..] = self.results::<4>(&joint.balance, t, x).map(Scalar::value);
+            if speed == 0.0 && limit > 0.0 {
+                resting.push(j);
+            }
+            self.set_contact(j, if speed >= 0.0 { 1.0 } else { -1.0 });
+        }
+        let mut best = (f64::INFINITY, 0);
+        let choices = 3_usize.pow(u32::try_from(resting.len()).expect("few joints"));
+        for code in 0..choices {
+            self.choose_contacts(&resting, code);
+            let discord = resting.iter().map(|&j| {
+                let joint = &model.joints[j];
+                let [torque, limit, coulomb, acceleration] = self.results(&joint.balance, t, x).map(Scalar::value);
+                let direction = self.modes[joint.contact.direction];
+                if direction == 0.0 {
+                    torque.abs() / limit - 1.0
+                } else {
+                    // Rounding leaves an acceleration of about 0 with either sign.
+                    -direction * acceleration / (acceleration.abs() + coulomb.abs() + f64::MIN_POSITIVE)
+                }
+            });
+            let discord = discord.fold(f64::NEG_INFINITY, f64::max).max(0.0);
+            if discord < best.0 {
+                best = (discord, code);
+            }
+            if discord == 0.0 {
+                break;
+            }
+        }
+        self.choose_contacts(&resting, best.1);
+    }
+
+    pub(super) fn choose_contacts(&mut self, resting: &[usize], mut code: usize) {
+        for &j in resting {
+            self.set_contact(j, [0.0, 1.0, -1.0][code % 3]);
+            code /= 3;
+        }
+    }
+
+    pub(super) fn set_contact(&mut self, joint: usize, direction: f64) {
+        let contact = self.model.joints[joint].contact;
+        self.set_mode(contact.direction, direction);
+        self.set_mode(contact.stuck, f64::from(u8::from(direction == 0.0)));
+    }
+
+    /// Takes the modes of this moment, for a look at the equations alone: joints at rest have no dry friction, which has no
+    /// slope there.
+    pub fn look(&mut self, x: &[S]) {
+        self.settle(0.0, x);
+        for j in 0..self.model.joints.len() {
+            let contact = self.model.joints[j].contact;
+            let speed = x[contact.velocity].value();
+            self.set_mode(contact.direction, if speed == 0.0 { 0.0 } else { speed.signum() });
+            self.set_mode(contact.stuck, 0.0);
+        }
+    }
+
+    /// Whether equations that are solved together have a solution here.
+    pub fn check_start(&self, x: &X) -> Result<(), Failure> {
+        let mut slope = x.clone();
+        self.derivative(0.0, x, &mut slope);
+        if slope.as_ref().iter().all(|d| d.value().is_finite()) {
+            return Ok(());
+        }
+        let mut bank = self.bank.borrow_mut();
+        for tape in &self.model.matrices {
+            self.load(&mut bank, 0.0, x.as_ref());
+            tape.run(&mut *bank);
+            let entries: Vec<f64> = tape.results.iter().map(|&r| bank.get(r).value()).collect();
+            if determinant(entries) == 0.0 {
+                return Err(Failure::Undefined("the mass matrix is singular at the start".to_owned()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Determinant of a square matrix, row by row.
+fn determinant(mut m: Vec<f64>) -> f64 {
+    let n = m.len().isqrt();
+    let mut product = 1.0;
+    for k in 0..n {
+        let pivot = (k..n).fold(k, |best, i| if m[i * n + k].abs() > m[best * n + k].abs() { i } else { best });
+        product *= m[pivot * n + k];
+        if product == 0.0 {
+            return 0.0;
+        }
+        for j in 0..n {
+            m.swap(k * n + j, pivot * n + j);
+        }
+        for i in k + 1..n {
+            let factor = m[i * n + k] / m[k * n + k];
+            for j in k..n {
+                m[i * n + j] -= factor * m[k * n + j];
+            }
+        }
+    }
+    product
+}

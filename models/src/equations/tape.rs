@@ -1,0 +1,288 @@
+//! From the graph to tapes: each node once, products in sums, sine with cosine, registers used again.
+
+use std::collections::HashMap;
+
+use mops_core::expression::Function;
+
+use super::bank::Register;
+use super::graph::{Graph, Id, Op};
+use super::layout::{Layout, TooLarge, register};
+use super::program::{Instruction, Program};
+
+/// Compiles tapes that share a layout: first all that run in the loop, then the one that runs before it.
+pub fn compile(graph: &Graph, layout: &mut Layout, wanted: &[Vec<Id>]) -> Result<(Program, Vec<Program>), TooLarge> {
+    // All places that tapes share must be known before the first temporary register is given away.
+    for roots in wanted {
+        Tape::new(graph, layout, roots, false).gather()?;
+    }
+    let programs =
+        wanted.iter().map(|roots| Tape::new(graph, layout, roots, false).compile()).collect::<Result<_, _>>()?;
+    let hoisted = layout.hoisted.clone();
+    let mut setup = Tape::new(graph, layout, &hoisted, true);
+    for &id in &hoisted {
+        setup.count(id);
+    }
+    for &id in &hoisted {
+        let from = setup.emit(id)?;
+        let to = setup.layout.places[&id];
+        setup.program.instructions.push(Instruction::Copy(to, from));
+    }
+    Ok((setup.finish(), programs))
+}
+
+/// A tape in the making.
+struct Tape<'g> {
+    graph: &'g Graph,
+    layout: &'g mut Layout,
+    roots: &'g [Id],
+    /// Whether it is the tape that computes the hoisted numbers.
+    setup: bool,
+    uses: HashMap<Id, usize>,
+    done: HashMap<Id, Register>,
+    solved: Vec<usize>,
+    free: Vec<Register>,
+    next: usize,
+    program: Program,
+}
+
+impl<'g> Tape<'g> {
+    fn new(graph: &'g Graph, layout: &'g mut Layout, roots: &'g [Id], setup: bool) -> Self {
+        let next = layout.first_free();
+        Self {
+            graph,
+            layout,
+            roots,
+            setup,
+            uses: HashMap::new(),
+            done: HashMap::new(),
+            solved: Vec::new(),
+            free: Vec::new(),
+            next,
+            program: Program::default(),
+        }
+    }
+
+    /// Finds the shared places that the tape needs.
+    fn gather(mut self) -> Result<(), TooLarge> {
+        let mut stack = self.roots.to_vec();
+        while let Some(id) = stack.pop() {
+            *self.uses.entry(id).or_insert(0) += 1;
+            if self.uses[&id] > 1 || self.layout.shared(self.graph, id)?.is_some() {
+                continue;
+            }
+            stack.extend(self.graph.operands(id));
+        }
+        Ok(())
+    }
+
+    fn compile(mut self) -> Result<Program, TooLarge> {
+        for &root in self.roots {
+            self.count(root);
+            // A result stays to the end.
+            *self.uses.get_mut(&root).expect("just counted") += 1;
+        }
+        for &root in self.roots {
+            let register = self.emit(root)?;
+            self.program.results.push(register);
+        }
+        Ok(self.finish())
+    }
+
+    fn finish(self) -> Program {
+        self.layout.registers = self.layout.registers.max(self.next);
+        self.program
+    }
+
+    fn home(&mut self, id: Id) -> Result<Option<Register>, TooLarge> {
+        if self.setup && !matches!(self.graph.op(id), Op::Parameter(_)) {
+            return Ok(None);
+        }
+        self.layout.shared(self.graph, id)
+    }
+
+    /// Counts how often each node is used.
+    fn count(&mut self, id: Id) {
+        let uses = self.uses.entry(id).or_insert(0);
+        *uses += 1;
+        let first = *uses == 1;
+        let leaf = matches!(self.home(id), Ok(Some(_)));
+        if !first || leaf {
+            return;
+        }
+        if let Op::Solution(block, _) = self.graph.op(id) {
+            if self.solved.contains(&block) {
+                return;
+            }
+            self.solved.push(block);
+        }
+        for operand in self.graph.operands(id) {
+            self.count(operand);
+        }
+    }
+
+    fn take(&mut self) -> Result<Register, TooLarge> {
+        match self.free.pop() {
+            Some(register) => Ok(register),
+            None => {
+                self.next += 1;
+                register(self.next - 1)
+            }
+        }
+    }
+
+    /// One use less: after the last, the register is free again.
+    fn release(&mut self, id: Id) {
+        let uses = self.uses.get_mut(&id).expect("every use was counted");
+        *uses -= 1;
+        let last = *uses == 0;
+        let leaf = matches!(self.home(id), Ok(Some(_))) || matches!(self.graph.op(id), Op::Solution(..));
+        if last && !leaf {
+            self.free.extend(self.done.get(&id));
+        }
+    }
+
+    /// The two factors of a product that nothing else uses: it needs no register of its own.
+    fn product(&mut self, id: Id) -> Option<[Id; 2]> {
+        match self.graph.op(id) {
+            Op::Mul(a, b) => {
+                let alone = self.uses[&id] == 1 && !self.done.contains_key(&id);
+                let plain = !self.is_minus(id) && !matches!(self.home(id), Ok(Some(_)));
+                (alone && plain).then_some([a, b])
+            }
+            _ => None,
+        }
+    }
+
+    fn is_minus(&self, id: Id) -> bool {
+        matches!(self.graph.op(id), Op::Mul(a, _) if self.graph.is(a, -1.0))
+    }
+
+    /// Computes a node; the register is released by whoever uses it.
+    fn emit(&mut self, id: Id) -> Result<Register, TooLarge> {
+        use Instruction as I;
+        if let Some(register) = self.home(id)? {
+            return Ok(register);
+        }
+        if let Some(&register) = self.done.get(&id) {
+            return Ok(register);
+        }
+        let register = match self.graph.op(id) {
+            Op::Constant(bits) => {
+                let place = register(self.program.numbers.len())?;
+                self.program.numbers.push(f64::from_bits(bits));
+                let o = self.take()?;
+                self.program.instructions.push(I::Set(o, place));
+                o
+            }
+            Op::Add(a, b) => match (self.product(a), self.product(b)) {
+                (Some([p, q]), Some([s, t])) => {
+                    self.instruction(&[p, q, s, t], |o, r| I::Dot(o, r[0], r[1], r[2], r[3]))?
+                }
+                (Some([p, q]), None) => self.instruction(&[p, q, b], |o, r| I::MulAdd(o, r[0], r[1], r[2]))?,
+                (None, Some([p, q])) => self.instruction(&[p, q, a], |o, r| I::MulAdd(o, r[0], r[1], r[2]))?,
+                (None, None) => self.instruction(&[a, b], |o, r| I::Add(o, r[0], r[1]))?,
+            },
+            Op::Sub(a, b) => match (self.product(a), self.product(b)) {
+                (Some([p, q]), Some([s, t])) => {
+                    self.instruction(&[p, q, s, t], |o, r| I::Cross(o, r[0], r[1], r[2], r[3]))?
+                }
+                (Some([p, q]), None) => self.instruction(&[p, q, b], |o, r| I::MulSub(o, r[0], r[1], r[2]))?,
+                (None, Some([p, q])) => self.instruction(&[p, q, a], |o, r| I::SubMul(o, r[0], r[1], r[2]))?,
+                (None, None) => self.instruction(&[a, b], |o, r| I::Sub(o, r[0], r[1]))?,
+            },
+            Op::Mul(_, b) if self.is_minus(id) => {
+                // The factor -1 was counted too; it needs no register.
+                self.instruction(&[b], |o, r| I::Neg(o, r[0]))?
+            }
+            Op::Mul(a, b) => self.instruction(&[a, b], |o, r| I::Mul(o, r[0], r[1]))?,
+            Op::Div(a, b) => self.instruction(&[a, b], |o, r| I::Div(o, r[0], r[1]))?,
+            Op::Power(a, b) => self.instruction(&[a, b], |o, r| I::Power(o, r[0], r[1]))?,
+            Op::Atan2(a, b) => self.instruction(&[a, b], |o, r| I::Atan2(o, r[0], r[1]))?,
+            Op::Holds(c, a, b) => self.instruction(&[a, b], |o, r| I::Holds(c, o, r[0], r[1]))?,
+            Op::Choose(c, a, b) => self.instruction(&[c, a, b], |o, r| I::Choose(o, r[0], r[1], r[2]))?,
+            Op::Function(function, a) => self.function(function, a)?,
+            Op::Solution(block, unknown) => return self.solution(block, unknown),
+            Op::Parameter(_) | Op::State(_) | Op::Input(_) | Op::Time | Op::Mode(_) => {
+                unreachable!("leaves have a register")
+            }
+        };
+        self.done.insert(id, register);
+        Ok(register)
+    }
+
+    /// Computes the operands, then the instruction.
+    fn instruction(
+        &mut self,
+        operands: &[Id],
+        make: impl Fn(Register, &[Register]) -> Instruction,
+    ) -> Result<Register, TooLarge> {
+        let mut registers = Vec::with_capacity(operands.len());
+        for &operand in operands {
+            registers.push(self.emit(operand)?);
+        }
+        for &operand in operands {
+            self.release(operand);
+        }
+        let o = self.take()?;
+        self.program.instructions.push(make(o, &registers));
+        Ok(o)
+    }
+
+    /// A function; sine and cosine of the same angle are computed at once.
+    fn function(&mut self, function: Function, a: Id) -> Result<Register, TooLarge> {
+        use Instruction as I;
+        let other = match function {
+            Function::Sin => Some(Function::Cos),
+            Function::Cos => Some(Function::Sin),
+            _ => None,
+        };
+        let other =
+            other.and_then(|other| self.uses.keys().copied().find(|&id| self.graph.op(id) == Op::Function(other, a)));
+        let Some(other) = other else {
+            return self.instruction(&[a], |o, r| match function {
+                Function::Sin => I::Sin(o, r[0]),
+                Function::Cos => I::Cos(o, r[0]),
+                Function::Sqrt => I::Sqrt(o, r[0]),
+                _ => I::Function(function, o, r[0]),
+            });
+        };
+        let angle = self.emit(a)?;
+        let (mine, its) = (self.take()?, self.take()?);
+        let (sin, cos) = if function == Function::Sin { (mine, its) } else { (its, mine) };
+        self.program.instructions.push(I::SinCos(sin, cos, angle));
+        self.release(a);
+        self.release(a);
+        self.done.insert(other, its);
+        Ok(mine)
+    }
+
+    /// An unknown of a block, which is solved at the first need; its registers are not used again.
+    fn solution(&mut self, block: usize, unknown: usize) -> Result<Register, TooLarge> {
+        let graph = self.graph;
+        let block_of = &graph.blocks[block];
+        let n = block_of.right.len();
+        let operands: Vec<Id> = block_of.matrix.iter().chain(&block_of.right).copied().collect();
+        for &operand in &operands {
+            self.emit(operand)?;
+        }
+        let start = self.next;
+        self.next += n * n + n;
+        register(self.next)?;
+        for (k, &operand) in operands.iter().enumerate() {
+            let from = self.emit(operand)?;
+            self.program.instructions.push(Instruction::Copy(register(start + k)?, from));
+        }
+        for &operand in &operands {
+            self.release(operand);
+        }
+        self.program.instructions.push(Instruction::Solve(register(start)?, register(n)?));
+        for id in self.uses.keys().copied().collect::<Vec<_>>() {
+            if let Op::Solution(of, k) = graph.op(id)
+                && of == block
+            {
+                self.done.insert(id, register(start + n * n + k)?);
+            }
+        }
+        register(start + n * n + unknown)
+    }
+}

@@ -1,0 +1,187 @@
+//! Linearised models and linear systems against closed forms, differences and each other.
+
+use std::sync::Arc;
+
+use mops_core::linear::{Complex, Loop, TransferFunction};
+use mops_core::{
+    Analysis, Case, Job, Linearise, Linearised, Model, ModelOptions, OperatingPoint, Quantity, StateSpace,
+};
+
+use crate::furuta::Furuta;
+use crate::kernel::Tolerance;
+use crate::pid_loop::PidLoopOptions;
+use crate::pid_open_loop::PidOpenLoopOptions;
+use crate::state_space::StateSpaceOptions;
+use crate::transfer_function::TransferFunctionOptions;
+
+fn model<O: ModelOptions>(options: &str) -> Box<dyn Model> {
+    toml::from_str::<O>(options).expect("options are right").build().expect("options make sense")
+}
+
+fn system(model: &dyn Model, parameters: &[f64]) -> StateSpace {
+    let case = Case::default();
+    let job = Job { case: &case, parameters, signals: &[], horizon: 0.0 };
+    match model.analyse(&job).expect("it is defined") {
+        Analysis::Linear(system) => system,
+        Analysis::Time(_) => panic!("it is linear"),
+    }
+}
+
+/// Lumped parameters from table 4.5 of the thesis before its rounding, and the friction of both joints.
+const FURUTA: [f64; 12] =
+    [9.035_24e-4, 1.133_13e-3, 6.309_84e-4, 2.526_663e-2, 1e-4, 2.5287e-5, 1e-3, 1e-4, 0.0, 0.0, 0.0, 0.0];
+
+#[test]
+fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
+    let furuta: Arc<dyn Model> = Arc::new(Furuta::new(None, Tolerance::default()));
+    let linearised = Linearised::new(furuta, &Linearise::default()).unwrap();
+    let found = system(&linearised, &FURUTA);
+    // M q'' = f with M = [[a, c], [c, b]]: by hand.
+    let [a, b, c, d, ba, bp, ..] = FURUTA;
+    let determinant = a * b - c * c;
+    let rows = [
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, -a * ba / determinant, -c * d / determinant, c * bp / determinant],
+        [0.0, 0.0, 0.0, 1.0],
+        [0.0, c * ba / determinant, b * d / determinant, -b * bp / determinant],
+    ];
+    for i in 0..4 {
+        for j in 0..4 {
+            assert!((found.a[(i, j)] - rows[i][j]).abs() < 1e-12 * (1.0 + rows[i][j].abs()), "{i} {j}: {}", found.a);
+        }
+    }
+    assert!((found.b[(1, 0)] - a / determinant).abs() < 1e-9 && (found.b[(3, 0)] + c / determinant).abs() < 1e-9);
+    assert_eq!((found.states.join(" "), found.d[(4, 0)]), ("phi dphi theta dtheta".to_owned(), 1.0));
+    // The entries that the thesis prints (section 5.2), from the same parameters before rounding.
+    assert!((found.a[(1, 2)] + 25.4814).abs() < 0.002 && (found.b[(1, 0)] - 1444.1).abs() < 0.5);
+}
+
+#[test]
+fn slopes_at_any_state_agree_with_central_differences() {
+    let furuta = Furuta::new(None, Tolerance::default());
+    let (states, inputs) = ([0.3, -1.2, 2.1, 4.0], [0.01]);
+    let local = |states: &[f64], inputs: &[f64]| {
+        furuta.local(&OperatingPoint { parameters: &FURUTA, states, inputs }).unwrap().unwrap()
+    };
+    let here = local(&states, &inputs);
+    let h = 1e-5;
+    for j in 0..5 {
+        let moved = |sign: f64| {
+            let (mut x, mut u) = (states, inputs);
+            if j < 4 {
+                x[j] += sign * h
+            } else {
+                u[0] += sign * h
+            }
+            local(&x, &u)
+        };
+        let (high, low) = (moved(1.0), moved(-1.0));
+        for (i, (high, low)) in
+            high.rates.iter().chain(&high.signals).zip(low.rates.iter().chain(&low.signals)).enumerate()
+        {
+            let slope = (high - low) / (2.0 * h);
+            assert!((here.slopes[(i, j)] - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{i} {j}");
+        }
+    }
+}
+
+#[test]
+fn the_pendulum_finds_its_equilibrium_and_hangs_stably() {
+    let furuta: Arc<dyn Model> = Arc::new(Furuta::new(None, Tolerance::default()));
+    let at = |value: &str| vec![("theta".to_owned(), Quantity::parse(value).unwrap())];
+    let near = Linearise { at: at("2.9 rad"), equilibrium: true, free: vec!["theta".into()], ..Linearise::default() };
+    let resting = Linearised::new(furuta, &near).unwrap().at(&Case::default(), &FURUTA).unwrap();
+    assert!((resting.states[2] - std::f64::consts::PI).abs() < 1e-12, "{:?}", resting.states);
+    assert!(resting.rates.iter().all(|rate| rate.abs() < 1e-10));
+    let hanging = resting.system.poles().unwrap();
+    assert!(hanging.iter().all(|p| p.re < 1e-9), "{hanging:?}");
+}
+
+const PLANT: &str = "plant = { poles = ['a', 'b', 'c'], gain = 1.0 }\n";
+
+#[test]
+fn the_linearised_loop_and_the_loop_transfer_function_belong_together() {
+    // y/r = L/(1 + L), and y/d = G/(1 + L), at a complex frequency; parameters of table 5.1 of the thesis.
+    let closed: Arc<dyn Model> = model::<PidLoopOptions>(&format!("{PLANT}horizon = 60.0\nlimit = [-20, 20]")).into();
+    let closed =
+        Linearised::new(closed, &Linearise { outputs: Some(vec!["y".into()]), ..Linearise::default() }).unwrap();
+    let open = model::<PidOpenLoopOptions>(PLANT);
+    let (k, ti, td) = (5.48078, 4.6697, 1.41883);
+    let closed = system(&closed, &[k, ti, td, 10.0, 1.0, 1.0, 0.0, 0.2, -4.0, -1.0]);
+    let open = system(open.as_ref(), &[k, ti, td, 10.0, 0.0, 0.2, -4.0, -1.0]);
+    let s = Complex::new(0.1, 0.9);
+    let plant = ((s - 0.2) * (s + 4.0) * (s + 1.0)).inv();
+    let l = open.response().unwrap().at(s)[(0, 0)];
+    let controller = (s * ti).inv() + s * td / (s * td / 10.0 + 1.0) + 1.0;
+    assert!((l - controller * k * plant).norm() < 1e-12);
+    let from = closed.response().unwrap().at(s);
+    assert!((from[(0, 0)] - l / (l + 1.0)).norm() < 1e-12);
+    assert!((from[(0, 1)] - plant / (l + 1.0)).norm() < 1e-12);
+}
+
+#[test]
+fn without_integral_or_derivative_no_state_is_left_over() {
+    let open = model::<PidOpenLoopOptions>("plant = { poles = [-1.0, -1.0, -1.0] }");
+    let system = system(open.as_ref(), &[4.0, f64::INFINITY, 0.0, 10.0, 0.0]);
+    assert_eq!(system.order(), 3);
+    assert!((Loop::new(system).unwrap().phase_crossovers().unwrap()[0].response.re + 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn the_same_system_by_matrices_by_coefficients_and_by_roots() {
+    let s = Complex::new(0.0, 1.3);
+    let at = |system: StateSpace| system.response().unwrap().at(s)[(0, 0)];
+    let matrices = model::<StateSpaceOptions>(
+        "a = [[0, 1], ['-k/m', '-d/m']]\nb = [[0], ['1/m']]\nc = [[1, 0]]\ndelay = 'L'\nunits = { k = 'N/m', m = 'kg' }",
+    );
+    assert_eq!(matrices.interface().parameters.iter().map(|p| p.variable.name.as_str()).collect::<String>(), "kmdL");
+    let (k, m, d, l) = (8.0, 2.0, 12.0, 0.1);
+    let exact = (-s * l).exp() / (s * s * m + s * d + k);
+    assert!((at(system(matrices.as_ref(), &[k, m, d, l])) - exact).norm() < 1e-14);
+    let coefficients = model::<TransferFunctionOptions>("numerator = [1]\ndenominator = ['m', 'd', 'k']\ndelay = 'L'");
+    assert!((at(system(coefficients.as_ref(), &[m, d, k, l])) - exact).norm() < 1e-14);
+    // s^2 + 6 s + 4 has the roots -3 +- sqrt 5.
+    let roots = model::<TransferFunctionOptions>("gain = '1/m'\npoles = ['-3 + sqrt(5)', '-3 - sqrt(5)']\ndelay = 0.1");
+    assert!((at(system(roots.as_ref(), &[m])) - exact).norm() < 1e-13);
+}
+
+#[test]
+fn tangents_of_linear_systems_agree_with_central_differences() {
+    let open = model::<PidOpenLoopOptions>(PLANT);
+    let parameters = [4.0, 2.0, 1.0, 10.0, 0.2, 0.0, -4.0, -1.0];
+    let case = Case::default();
+    let seeds: Vec<Vec<f64>> = (0..8).map(|i| (0..8).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+    let job = Job { case: &case, parameters: &parameters, signals: &[], horizon: 0.0 };
+    let (_, tangents) = open.tangents(&job, &seeds).unwrap().unwrap();
+    let h = 1e-6;
+    for (i, tangent) in tangents.iter().enumerate() {
+        let moved = |sign: f64| {
+            let mut p = parameters;
+            p[i] += sign * h;
+            // A delay is not negative, nor is it here.
+            system(open.as_ref(), &p)
+        };
+        let (high, low, tangent) = (moved(1.0), moved(-1.0), tangent.linear().unwrap());
+        for [high, low, tangent] in
+            [[&high.a, &low.a, &tangent.a], [&high.b, &low.b, &tangent.b], [&high.c, &low.c, &tangent.c]]
+        {
+            assert!(((high - low) / (2.0 * h) - tangent).norm() < 1e-6, "{i}");
+        }
+        assert!(((high.delay - low.delay) / (2.0 * h) - tangent.delay).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn what_is_no_system_is_refused_with_a_way_out() {
+    let refused = |options: &str| {
+        let parsed = toml::from_str::<StateSpaceOptions>(options).expect("its shape is right");
+        parsed.build().err().expect("it makes no sense").to_string()
+    };
+    let rest = "b = [[0], [1]]\nc = [[1, 0]]";
+    assert!(refused(&format!("a = [[0, 1], [2]]\n{rest}")).starts_with("a: `a` must have 2 rows of 2"));
+    assert!(refused(&format!("a = [[0, 1], [2, 3]]\nstates = ['x']\n{rest}")).starts_with("states: 1 names"));
+    assert!(refused(&format!("a = [[0, 1], [2, 'k']]\nunits = {{ q = 'm' }}\n{rest}")).contains("`q`"));
+    let order = toml::from_str::<TransferFunctionOptions>("numerator = [1, 2]\ndenominator = [3]").unwrap().build();
+    assert!(order.err().unwrap().to_string().contains("order 1"));
+    assert!(TransferFunction::new(vec![1.0, 2.0], vec![3.0]).state_space().is_err());
+}

@@ -1,0 +1,149 @@
+//! A linear system given by its matrices.
+
+use std::collections::BTreeMap;
+
+use mops_core::{
+    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Scalar, Variable, WithTangents,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Units};
+
+/// `dx/dt = A x + B u(t - delay)`, `y = C x + D u(t - delay)`: a linear system by its matrices, for criteria of linear
+/// systems.
+///
+/// An entry is a number, or an expression whose names are parameters: tuners, cases and the study can set them. As in
+/// `a = [[0, 1], ["-k/m", "-d/m"]]`, `b = [[0], ["1/m"]]`, `c = [[1, 0]]`.
+///
+/// Signals are the outputs; inputs the inputs. Their units, and those of parameters, are pure numbers unless `units` says
+/// otherwise.
+///
+/// Source: T. Kailath, Linear Systems (1980), chapter 2.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct StateSpaceOptions {
+    /// `A`, a list of rows.
+    a: Rows<Entry>,
+    /// `B`, a list of rows.
+    b: Rows<Entry>,
+    /// `C`, a list of rows.
+    c: Rows<Entry>,
+    /// `D`, a list of rows; zero where absent.
+    d: Option<Rows<Entry>>,
+    /// Delay of all inputs, s; a number or an expression.
+    delay: Option<Entry>,
+    /// Names of the states; `x1`, `x2`, ... where absent.
+    states: Option<Vec<String>>,
+    /// Names of the inputs; `u`, or `u1`, `u2`, ... where absent.
+    inputs: Option<Vec<String>>,
+    /// Names of the outputs; `y`, or `y1`, `y2`, ... where absent.
+    outputs: Option<Vec<String>>,
+    /// Units of parameters, inputs and outputs, as in `{ k = "N/m" }`.
+    #[serde(default)]
+    units: BTreeMap<String, String>,
+}
+
+/// The model of the kind `state-space`.
+struct Given {
+    interface: Interface,
+    matrices: [Rows<Bound>; 4],
+    delay: Option<Bound>,
+    states: Vec<String>,
+}
+
+impl ModelOptions for StateSpaceOptions {
+    const KIND: &'static str = "state-space";
+
+    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+        let n = self.a.len();
+        let (inputs, outputs) = (self.b.first().map_or(0, Vec::len), self.c.len());
+        let zeros = || vec![vec![Entry(mops_core::Expression::parse("0").expect("a number")); inputs]; outputs];
+        let d = self.d.unwrap_or_else(zeros);
+        for (key, rows, [height, width]) in [
+            ("a", &self.a, [n, n]),
+            ("b", &self.b, [n, inputs]),
+            ("c", &self.c, [outputs, n]),
+            ("d", &d, [outputs, inputs]),
+        ] {
+            let fits = rows.len() == height && rows.iter().all(|row| row.len() == width);
+            if !fits || height == 0 || width == 0 {
+                let widths: Vec<usize> = rows.iter().map(Vec::len).collect();
+                let fact = format!("`{key}` must have {height} rows of {width}, but has rows of {widths:?}");
+                return Err(Mistake::new(key, fact).with_help(
+                    "a has as many rows and columns as there are states; b a column per input; c a row per output",
+                ));
+            }
+        }
+        let states = named("states", self.states, "x", n)?;
+        let inputs = named("inputs", self.inputs, "u", inputs)?;
+        let outputs = named("outputs", self.outputs, "y", outputs)?;
+        let mut names = Vec::new();
+        let matrices = [self.a, self.b, self.c, d]
+            .map(|rows| rows.iter().map(|row| Bound::all(row, &mut names)).collect::<Rows<Bound>>());
+        let delay = self.delay.map(|delay| Bound::new(&delay, &mut names));
+        let units: Vec<(String, String)> = self.units.into_iter().collect();
+        let units = Units(&units);
+        let known: Vec<&str> = names.iter().chain(&inputs).chain(&outputs).map(String::as_str).collect();
+        units.check(&known)?;
+        let variables = |names: &[String], about: &str| -> Vec<Variable> {
+            names.iter().map(|name| Variable::new(name, units.of(name), about)).collect()
+        };
+        let interface = Interface {
+            signals: variables(&outputs, "output of the system"),
+            inputs: variables(&inputs, "input of the system"),
+            parameters: units.parameters(&names),
+            analysis: AnalysisKind::Linear,
+            ..Interface::default()
+        };
+        Ok(Box::new(Given { interface, matrices, delay, states }))
+    }
+}
+
+/// The names given, of which there must be `count`, or numbered ones.
+fn named(key: &str, given: Option<Vec<String>>, letter: &str, count: usize) -> Result<Vec<String>, Mistake> {
+    match given {
+        Some(names) if names.len() != count => {
+            Err(Mistake::new(key, format!("{} names are given for {count} {key}", names.len()))
+                .with_help(format!("name all of them, or leave `{key}` out")))
+        }
+        Some(names) => {
+            match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+                Some((_, twice)) => Err(Mistake::new(key, format!("two {key} are called `{twice}`"))
+                    .with_help("give each a name of its own")),
+                None => Ok(names),
+            }
+        }
+        None if count == 1 && letter != "x" => Ok(vec![letter.to_owned()]),
+        None => Ok((1..=count).map(|i| format!("{letter}{i}")).collect()),
+    }
+}
+
+impl LinearSystem for Given {
+    fn matrices<S: Scalar>(&self, parameters: &[S]) -> Result<Matrices<S>, Failure> {
+        let values = |rows: &Rows<Bound>| -> Rows<S> {
+            rows.iter().map(|row| row.iter().map(|entry| entry.value(parameters)).collect()).collect()
+        };
+        let [a, b, c, d] = self.matrices.each_ref().map(values);
+        let delay = self.delay.as_ref().map_or(S::from(0.0), |delay| delay.value(parameters));
+        Ok(Matrices { a, b, c, d, delay, states: self.states.clone() })
+    }
+
+    fn channels(&self) -> [Vec<String>; 2] {
+        [&self.interface.inputs, &self.interface.signals].map(|list| list.iter().map(|v| v.name.clone()).collect())
+    }
+}
+
+impl Model for Given {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        linear_system::analyse(self, job)
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        Some(linear_system::tangents(self, job, seeds))
+    }
+}

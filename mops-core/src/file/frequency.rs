@@ -1,0 +1,175 @@
+//! Measured frequency responses of a study file: from columns to complex numbers over angular frequencies.
+
+use super::experiment::{column_at, entry, unit_of_header};
+use super::read_unit;
+use super::sections::{ExperimentSection, ResponseTable};
+use super::tree::Node;
+use crate::data::DataFile;
+use crate::diagnostic::Diagnostic;
+use crate::experiment::ResponseData;
+use crate::study::{CaseDraft, Measured};
+use crate::unit::Unit;
+
+/// Reads an experiment over frequency.
+pub(super) fn read(
+    name: String,
+    node: &Node<'_>,
+    section: ExperimentSection,
+    file: &DataFile,
+) -> Result<CaseDraft, Diagnostic> {
+    for (key, is_there) in [("channels", !section.channels.0.is_empty()), ("inputs", !section.inputs.0.is_empty())] {
+        if let (true, Some(place)) = (is_there, node.child(key)) {
+            return Err(place
+                .key_diagnostic(format!("`{key}` are measured over time, `responses` over frequency"))
+                .with_help("make an experiment of its own for each"));
+        }
+    }
+    let Some(column) = &section.frequency else {
+        let place = node.child("responses").expect("it was just read");
+        return Err(place
+            .key_diagnostic("nothing says at which frequencies the responses were measured".to_owned())
+            .with_help("name the column: frequency = \"...\""));
+    };
+    let place = node.child("frequency").expect("it was just read");
+    let frequencies = frequencies(node, &place, column, &section, file)?;
+    let mut responses = Vec::new();
+    for (signal, table) in &section.responses.0 {
+        let place = entry(node, "responses", signal);
+        let values = values(&place, table, file)?;
+        if values.len() != frequencies.len() {
+            let fact = format!(
+                "the response has {} samples, the frequency `{column}` has {}",
+                values.len(),
+                frequencies.len()
+            );
+            return Err(place.key_diagnostic(fact).with_help("both must come from the same rows of the file"));
+        }
+        let kept = frequencies.iter().zip(&values).filter(|(_, v)| v.iter().all(|x| x.is_finite()));
+        let (frequencies, values): (Vec<f64>, Vec<[f64; 2]>) = kept.map(|(f, v)| (*f, *v)).unzip();
+        if frequencies.is_empty() {
+            return Err(place
+                .key_diagnostic(format!("every sample of `{signal}` is a gap"))
+                .with_help("take other columns"));
+        }
+        responses.push(ResponseData { signal: signal.clone(), frequencies, values });
+    }
+    let measured = Measured { responses, role: section.role, ..Measured::default() };
+    Ok(CaseDraft { name, parameters: section.parameters.0, measured: Some(measured), ..CaseDraft::default() })
+}
+
+/// The frequencies, rad/s.
+fn frequencies<'t>(
+    node: &Node<'t>,
+    place: &Node<'t>,
+    name: &str,
+    section: &ExperimentSection,
+    file: &DataFile,
+) -> Result<Vec<f64>, Diagnostic> {
+    let column = column_at(place, file, name)?;
+    let unit = match (&section.frequency_unit, column.unit) {
+        (Some(unit), _) => read_unit(node, "frequency-unit", unit)?,
+        (None, Some(unit)) => unit_of_header(place, file, name, unit, "frequency-unit")?,
+        (None, None) => Unit::known("rad/s"),
+    };
+    let factor = unit.factor_to(&Unit::known("rad/s")).ok_or_else(|| {
+        let place = node.child("frequency-unit").unwrap_or_else(|| place.clone());
+        place
+            .diagnostic(format!("the frequency column `{name}` is in `{unit}`, which is no unit of frequency"))
+            .with_help("say which it is: frequency-unit = \"Hz\"")
+    })?;
+    if let Some(row) = column.values.iter().position(|f| !(f.is_finite() && *f >= 0.0)) {
+        let fact = format!("sample {} of the frequency `{name}` is {}", row + 1, column.values[row]);
+        return Err(Diagnostic::new(fact)
+            .with_help("frequencies are numbers from 0 up: delete the row, or correct it")
+            .at(&file.source, file.span_of(name, row)));
+    }
+    Ok(column.values.iter().map(|f| f * factor).collect())
+}
+
+/// Real and imaginary parts.
+fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Vec<[f64; 2]>, Diagnostic> {
+    let at = |key: &str| place.child(key).expect("it was just read");
+    match (&table.real, &table.imaginary, &table.magnitude, &table.phase) {
+        (Some(real), Some(imaginary), None, None) => {
+            let real = column_at(&at("real"), file, real)?;
+            let imaginary = column_at(&at("imaginary"), file, imaginary)?;
+            Ok(real.values.iter().zip(imaginary.values).map(|(&re, &im)| [re, im]).collect())
+        }
+        (None, None, Some(magnitude), Some(phase)) => {
+            let size = column_at(&at("magnitude"), file, magnitude)?;
+            let decibel = table.decibel || size.unit == Some("dB");
+            let angle = column_at(&at("phase"), file, phase)?;
+            let unit = match angle.unit {
+                Some(unit) => unit_of_header(&at("phase"), file, phase, unit, "phase")?,
+                None => Unit::known("deg"),
+            };
+            let factor = unit.factor_to(&Unit::known("rad")).ok_or_else(|| {
+                at("phase")
+                    .diagnostic(format!("the phase column `{phase}` is in `{unit}`, which is no unit of an angle"))
+                    .with_help("take another column, or correct the unit in the header of the file")
+            })?;
+            let polar = |(&size, &angle): (&f64, &f64)| {
+                let size = if decibel { 10f64.powf(size / 20.0) } else { size };
+                let (sin, cos) = (angle * factor).sin_cos();
+                [size * cos, size * sin]
+            };
+            Ok(size.values.iter().zip(angle.values).map(polar).collect())
+        }
+        _ => Err(place
+            .key_diagnostic("a frequency response has a real and an imaginary part, or magnitude and phase".to_owned())
+            .with_help("as in { magnitude = \"mag\", phase = \"ph\" }, or { real = \"re\", imaginary = \"im\" }")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::super::Files;
+    use super::super::tree::Text;
+    use super::*;
+
+    struct Data(&'static str);
+
+    impl Files for Data {
+        fn read(&self, _: &str) -> io::Result<Vec<u8>> {
+            Ok(self.0.as_bytes().to_vec())
+        }
+        fn show(&self, path: &str) -> String {
+            path.to_owned()
+        }
+    }
+
+    fn responses(experiment: &str, data: &'static str) -> Result<Vec<ResponseData>, String> {
+        let text = Text::new("study.toml", &format!("[e]\nfile = 'sweep.csv'\n{experiment}\n"), &[]);
+        let root = text.parse().unwrap();
+        let read = super::super::experiment::read("e".into(), &root.child("e").unwrap(), &Data(data));
+        read.map(|case| case.measured.unwrap().responses).map_err(|diagnostic| diagnostic.to_string())
+    }
+
+    #[test]
+    fn decibels_and_degrees_become_complex_numbers_over_angular_frequencies() {
+        let data = "f [Hz],m [dB],p [deg],re,im\n1,20,90,0,10\n2,0,,1,0\n3,-20,180,-0.1,0\n";
+        let polar = responses("frequency = 'f'\nresponses = { y = { magnitude = 'm', phase = 'p' } }", data).unwrap();
+        let parts = responses("frequency = 'f'\nresponses = { y = { real = 're', imaginary = 'im' } }", data).unwrap();
+        assert_eq!((polar[0].values.len(), parts[0].values.len()), (2, 3), "a gap is left out");
+        assert!((polar[0].frequencies[1] - 6.0 * std::f64::consts::PI).abs() < 1e-12);
+        for (a, b) in polar[0].values.iter().zip([parts[0].values[0], parts[0].values[2]]) {
+            assert!((a[0] - b[0]).abs() < 1e-12 && (a[1] - b[1]).abs() < 1e-12, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_missing_or_wrong_is_told_at_its_place() {
+        let data = "f [m],re,im\n1,0,10\n-2,1,0\n";
+        let wrong = |experiment: &str| responses(experiment, data).unwrap_err();
+        let both = "responses = { y = { real = 're', imaginary = 'im' } }";
+        assert!(wrong(both).contains("study.toml:3:1: nothing says at which frequencies"), "{}", wrong(both));
+        let length = wrong(&format!("frequency = 'f'\n{both}"));
+        assert!(length.contains("study.toml:3:13: the frequency column `f` is in `m`"), "{length}");
+        let negative = wrong(&format!("frequency = 'f'\nfrequency-unit = 'Hz'\n{both}"));
+        assert!(negative.contains("sweep.csv:3:1: sample 2 of the frequency `f` is -2"), "{negative}");
+        let half = responses("frequency = 'f'\nresponses = { y = { real = 're' } }", "f,re\n1,0\n2,1\n").unwrap_err();
+        assert!(half.contains("a real and an imaginary part"), "{half}");
+    }
+}

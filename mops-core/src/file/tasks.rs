@@ -1,0 +1,131 @@
+//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`.
+
+use schemars::JsonSchema;
+
+use super::entries::{Entries, Short};
+use super::tree::Node;
+use super::{Diagnostic, read_seconds};
+use crate::study::{AxisDraft, ExcitationDraft, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft};
+use crate::unit::Quantity;
+
+/// What is asked of the inputs by `task = "excitation"`, and in the report of every calibration.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ExcitationSection {
+    /// The inputs that are looked at; all where absent.
+    pub inputs: Option<Vec<String>>,
+    /// Time between two samples; that of the recording where absent.
+    pub sample_time: Option<Quantity>,
+    /// Standard deviation of the noise on inputs, as in { u = 0.01 }; what is weaker does not count as excitation.
+    #[serde(default)]
+    pub noise: Entries<Quantity>,
+    /// Number of parameters to be estimated; that of the active tuners where absent.
+    pub parameters: Option<usize>,
+    /// FIR and ARX models by least squares, by name: { fir = { input = "u", output = "y", b = 20 } }.
+    #[serde(default)]
+    pub regressions: Entries<RegressionSection>,
+}
+
+/// A model `y(t) + a1 y(t-1) + ... = b1 u(t-delay) + ...`, by least squares and recursively.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct RegressionSection {
+    /// The experiment; the first with the output where absent.
+    pub experiment: Option<String>,
+    /// The input.
+    pub input: String,
+    /// The measured output.
+    pub output: String,
+    /// Number of past outputs; 0, the default, is a finite impulse response.
+    #[serde(default)]
+    pub a: usize,
+    /// Number of past inputs.
+    pub b: usize,
+    /// Samples from an input to the first output that it moves; 1 where absent.
+    pub delay: Option<usize>,
+    /// Forgetting factor of the recursive estimate; 1, the default, forgets nothing.
+    pub forgetting: Option<f64>,
+}
+
+/// Where `task = "sensitivity"` looks.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct SensitivitySection {
+    /// The point: `optimum` (the default: the study is solved first) or `start`.
+    #[serde(default)]
+    pub at: Place,
+    /// Share of the largest singular value below which one counts as zero; the accuracy of the slopes where absent.
+    pub zero: Option<f64>,
+}
+
+/// What `task = "sweep"` draws: the objective over one tuner, or over two.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct SweepSection {
+    /// The tuner along x: its name, or a table with `tuner`, `min`, `max`, `points`.
+    pub x: Short<AxisTable>,
+    /// The tuner along y; without it the sweep is a line.
+    pub y: Option<Short<AxisTable>>,
+    /// Where the other tuners stand: `optimum` (the default: the study is solved first) or `start`.
+    #[serde(default)]
+    pub at: Place,
+}
+
+/// A swept tuner.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct AxisTable {
+    /// Name of the tuner.
+    pub tuner: String,
+    /// Smallest value; that of the tuner where absent.
+    pub min: Option<Quantity>,
+    /// Largest value; that of the tuner where absent.
+    pub max: Option<Quantity>,
+    /// Number of values; 41 on a surface and 201 on a line where absent.
+    pub points: Option<usize>,
+}
+
+impl From<String> for AxisTable {
+    fn from(tuner: String) -> Self {
+        Self { tuner, min: None, max: None, points: None }
+    }
+}
+
+/// Names of the tables, as they stand at the top of a study file.
+pub(super) const TABLES: [&str; 3] = ["excitation", "sensitivity", "sweep"];
+
+/// Reads the tables of all tasks; what is absent has its defaults.
+pub(super) fn read(root: &Node<'_>) -> Result<TasksDraft, Diagnostic> {
+    let mut tasks = TasksDraft::default();
+    if let Some(node) = root.child("excitation") {
+        let section: ExcitationSection = node.read()?;
+        let regression = |(name, r): (String, RegressionSection)| {
+            let RegressionSection { experiment, input, output, a, b, delay, forgetting } = r;
+            let (delay, forgetting) = (delay.unwrap_or(1), forgetting.unwrap_or(1.0));
+            (name, RegressionDraft { experiment, input, output, a, b, delay, forgetting })
+        };
+        tasks.excitation = ExcitationDraft {
+            sample_time: read_seconds(&node, "sample-time", section.sample_time.as_ref())?,
+            inputs: section.inputs,
+            noise: section.noise.0,
+            parameters: section.parameters,
+            regressions: section.regressions.0.into_iter().map(regression).collect(),
+        };
+    }
+    if let Some(node) = root.child("sensitivity") {
+        let section: SensitivitySection = node.read()?;
+        tasks.sensitivity = SensitivityTask { at: section.at, zero: section.zero };
+    }
+    if let Some(node) = root.child("sweep") {
+        let section: SweepSection = node.read()?;
+        let points = if section.y.is_some() { 41 } else { 201 };
+        let axis = |Short(axis): Short<AxisTable>| AxisDraft {
+            tuner: axis.tuner,
+            min: axis.min,
+            max: axis.max,
+            points: axis.points.unwrap_or(points),
+        };
+        tasks.sweep = Some(SweepDraft { x: axis(section.x), y: section.y.map(axis), at: section.at });
+    }
+    Ok(tasks)
+}

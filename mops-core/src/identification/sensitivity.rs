@@ -1,0 +1,214 @@
+//! The sensitivity matrix: what the data say of the tuners, and what they do not.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::blind::{self, BlindDirection};
+
+/// Singular values that count as zero where slopes are exact: the integration keeps eight digits, and slopes lose a few.
+pub const TANGENTS: f64 = 1e-5;
+
+/// Singular values that count as zero where slopes come from differences: noise of 1e-9 over steps of 2e-4 leaves 5e-6 of
+/// a strong tuner's slope, and more of a weak one's.
+pub const DIFFERENCES: f64 = 1e-4;
+
+/// Columns below this share of the largest, over the tuners' ranges, are no effect at all.
+const NO_EFFECT: f64 = 1e-9;
+
+/// A tuner as the sensitivity matrix sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coordinate {
+    /// Name.
+    pub name: String,
+    /// Value at which the slopes were taken.
+    pub value: f64,
+    /// Largest minus smallest value; stands for the value where that is 0.
+    pub range: f64,
+    /// Unit of both.
+    pub unit: String,
+}
+
+impl Coordinate {
+    /// What one relative change is: the value, or the range of a tuner that is 0.
+    pub fn scale(&self) -> f64 {
+        if self.value == 0.0 { self.range } else { self.value.abs() }
+    }
+}
+
+/// Eigenvalues, falling, with their eigenvectors of unit length.
+pub type Eigen = Vec<(f64, Vec<f64>)>;
+
+/// The sensitivity matrix `J' J` of residuals `r` with `J = dr/dtuner`: half the Hessian of `r' r` where the residuals are
+/// small or nearly linear, and the information of the data by the variance of white noise. An eigenvector of eigenvalue
+/// zero is a direction along which, to first order, nothing changes: the tuners are not locally identifiable.
+///
+/// The rank is judged by the singular values of `J` with columns of unit length, so that no choice of units matters: a
+/// value below `zero` times the largest is what the accuracy of the slopes leaves of an exact zero.
+///
+/// Source: E. Walter, L. Pronzato, Identification of Parametric Models from Experimental Data (1997), sections 2.6, 5.2;
+/// A. van der Sluis, Numerische Mathematik 14 (1969) 14-23 (columns of unit length are nearly the best scaling).
+#[derive(Debug, Clone)]
+pub struct Sensitivity {
+    /// The tuners.
+    pub coordinates: Vec<Coordinate>,
+    /// `J' J` in the tuners' own units.
+    pub matrix: DMatrix<f64>,
+    /// Its eigenvalues and eigenvectors.
+    pub own: Eigen,
+    /// The same for relative changes of the tuners: eigenvalues in the unit of `r' r`.
+    pub relative: Eigen,
+    /// Singular values for columns of unit length, falling.
+    pub singular_values: Vec<f64>,
+    /// Number of directions that the data determine.
+    pub rank: usize,
+    /// What counts as zero.
+    pub zero: f64,
+    /// Directions along which nothing changes.
+    pub blind: Vec<BlindDirection>,
+    /// Standard error of each tuner for residuals of unit variance, were all others known: `1/|J_k|`.
+    pub alone: Vec<f64>,
+    /// The same with all others estimated too: root of the diagonal of `(J' J)^-1`; NaN where undetermined.
+    pub together: Vec<f64>,
+    /// Correlation of the estimates; NaN where undetermined.
+    pub correlation: DMatrix<f64>,
+}
+
+impl Sensitivity {
+    /// From the Jacobian in the tuners' own units: one column per coordinate.
+    ///
+    /// # Panics
+    /// If there is no tuner, no residual, or another number of columns than of coordinates.
+    pub fn of(jacobian: &DMatrix<f64>, coordinates: Vec<Coordinate>, zero: f64) -> Self {
+        let n = coordinates.len();
+        assert!(n > 0 && jacobian.ncols() == n && jacobian.nrows() > 0, "a column for every tuner");
+        let scales: Vec<f64> = coordinates.iter().map(Coordinate::scale).collect();
+        let strength: Vec<f64> = (0..n).map(|k| jacobian.column(k).norm() * coordinates[k].range).collect();
+        let strongest = strength.iter().copied().fold(0.0, f64::max);
+        let norms: Vec<f64> =
+            (0..n).map(|k| if strength[k] > NO_EFFECT * strongest { jacobian.column(k).norm() } else { 0.0 }).collect();
+        // Fewer residuals than tuners leave directions that no singular value stands for: rows of zeros make them seen.
+        let rows = jacobian.nrows().max(n);
+        let unit = DMatrix::from_fn(rows, n, |i, k| {
+            if i < jacobian.nrows() && norms[k] > 0.0 { jacobian[(i, k)] / norms[k] } else { 0.0 }
+        });
+        let svd = unit.svd(false, true);
+        let v_t = svd.v_t.as_ref().expect("asked for");
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&i, &j| svd.singular_values[j].total_cmp(&svd.singular_values[i]));
+        let singular_values: Vec<f64> = order.iter().map(|&i| svd.singular_values[i]).collect();
+        let rank = singular_values.iter().filter(|&&s| s > zero * singular_values[0] && s > 0.0).count();
+        let null = DMatrix::from_fn(n - rank, n, |i, k| v_t[(order[rank + i], k)]);
+        // An effect that was too small to count has no length: any will do, since it stands alone.
+        let lengths: Vec<f64> = norms.iter().map(|&norm| if norm > 0.0 { norm } else { 1.0 }).collect();
+        let (blind, undetermined) = blind::directions(null, &lengths, &coordinates);
+
+        let covariance = |a: usize, b: usize| -> f64 {
+            if undetermined[a] || undetermined[b] {
+                return f64::NAN;
+            }
+            let sum = order[..rank].iter().map(|&i| v_t[(i, a)] * v_t[(i, b)] / svd.singular_values[i].powi(2));
+            sum.sum::<f64>() / (lengths[a] * lengths[b])
+        };
+        let together: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
+        let correlation =
+            DMatrix::from_fn(n, n, |a, b| if a == b { 1.0 } else { covariance(a, b) / (together[a] * together[b]) });
+        let matrix = jacobian.tr_mul(jacobian);
+        let scaled = DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
+        Self {
+            own: eigen(&matrix),
+            relative: eigen(&scaled),
+            matrix,
+            singular_values,
+            rank,
+            zero,
+            blind,
+            alone: norms.iter().map(|&norm| if norm > 0.0 { 1.0 / norm } else { f64::INFINITY }).collect(),
+            together,
+            correlation,
+            coordinates,
+        }
+    }
+
+    /// From the matrix `J' J` itself, in the tuners' own units: half of its digits are lost where it is near singular.
+    pub fn of_matrix(matrix: &DMatrix<f64>, coordinates: Vec<Coordinate>, zero: f64) -> Self {
+        let eigen = SymmetricEigen::new(matrix.clone());
+        let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+        let jacobian = DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose();
+        let sensitivity = Self::of(&jacobian, coordinates, zero);
+        Self { own: self::eigen(matrix), matrix: matrix.clone(), ..sensitivity }
+    }
+}
+
+/// Eigenvalues, falling; of every eigenvector the largest entry is positive.
+fn eigen(matrix: &DMatrix<f64>) -> Eigen {
+    let eigen = SymmetricEigen::new(matrix.clone());
+    let mut pairs: Eigen = (0..matrix.nrows())
+        .map(|i| {
+            let vector: Vec<f64> = eigen.eigenvectors.column(i).iter().copied().collect();
+            let largest = vector.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0);
+            (eigen.eigenvalues[i], vector.iter().map(|v| v * largest.signum()).collect())
+        })
+        .collect();
+    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
+        let of = |(name, value): &(&str, f64)| Coordinate {
+            name: (*name).into(),
+            value: *value,
+            range: value.abs().max(1.0),
+            unit: "1".into(),
+        };
+        values.iter().map(of).collect()
+    }
+
+    /// The matrix printed for the inertia about the centre of mass and the mass of an arm, 0.1225 m apart.
+    #[test]
+    fn of_inertia_and_mass_of_an_arm_only_one_combination_can_be_estimated() {
+        let matrix = DMatrix::from_row_slice(2, 2, &[431_064.0, 6456.3, 6456.3, 97.0671]);
+        // The digits printed leave 1e-3 of a singular value.
+        let found = Sensitivity::of_matrix(&matrix, coordinates(&[("J_c", 0.0014), ("m_arm", 0.165)]), 0.05);
+        let [(large, along), (small, across)] = &found.own[..] else { panic!("two of them") };
+        assert!((large - 431_160.70).abs() < 0.01 && (small - 0.367_20).abs() < 1e-4, "{large} {small}");
+        for (found, exact) in along.iter().chain(across).zip([0.999_888, 0.014_976, -0.014_976, 0.999_888]) {
+            assert!((found - exact).abs() < 1e-6, "{found} {exact}");
+        }
+        assert_eq!(found.rank, 1);
+        assert_eq!(found.blind[0].words, "only `J_c` + 0.0150 `m_arm` can be estimated");
+        assert!(found.together.iter().all(|error| error.is_nan()));
+    }
+
+    #[test]
+    fn standard_errors_and_correlations_are_those_of_a_straight_line() {
+        // y = a + b t at t = 0, ..., 9: covariance of a and b is the inverse of (n, sum t; sum t, sum t^2).
+        let jacobian = DMatrix::from_fn(10, 2, |t, k| if k == 0 { 1.0 } else { t as f64 });
+        let found = Sensitivity::of(&jacobian, coordinates(&[("a", 1.0), ("b", 2.0)]), TANGENTS);
+        let determinant: f64 = 10.0 * 285.0 - 45.0 * 45.0;
+        let exact = [(285.0 / determinant).sqrt(), (10.0 / determinant).sqrt()];
+        assert!(found.together.iter().zip(exact).all(|(a, b)| (a / b - 1.0).abs() < 1e-12));
+        assert!((found.correlation[(0, 1)] + 45.0 / 2850f64.sqrt()).abs() < 1e-12);
+        assert!((found.alone[1] - 1.0 / 285f64.sqrt()).abs() < 1e-12 && found.rank == 2 && found.blind.is_empty());
+    }
+
+    #[test]
+    fn the_rank_does_not_depend_on_units() {
+        let jacobian = DMatrix::from_fn(20, 3, |t, k| ((k + 1) as f64 * t as f64 * 0.1).sin() * [1e-9, 1.0, 1e9][k]);
+        let mut some = coordinates(&[("a", 1e9), ("b", 1.0), ("c", 1e-9)]);
+        for (coordinate, range) in some.iter_mut().zip([1e9, 1.0, 1e-9]) {
+            coordinate.range = range;
+        }
+        assert_eq!(Sensitivity::of(&jacobian, some, TANGENTS).rank, 3);
+    }
+
+    #[test]
+    fn fewer_residuals_than_tuners_leave_directions_open() {
+        let jacobian = DMatrix::from_row_slice(1, 2, &[1.0, 0.0]);
+        let found = Sensitivity::of(&jacobian, coordinates(&[("a", 1.0), ("b", 1.0)]), TANGENTS);
+        assert_eq!((found.rank, found.blind[0].words.as_str()), (1, "`b` has no effect"));
+        assert!((found.together[0] - 1.0).abs() < 1e-12 && found.together[1].is_nan());
+    }
+}

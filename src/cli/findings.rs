@@ -1,0 +1,122 @@
+//! What tasks found, and what the data of a calibration tell, as tables and sentences on the terminal.
+
+use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
+use mops_core::{Outcome, SweepReport};
+
+use super::tables::{number, table};
+use crate::report::{combination, significant};
+
+/// Everything that was found beside criteria and tuners; empty where there is nothing.
+pub(super) fn text(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    let calibration = outcome.calibration.as_ref();
+    let inputs = calibration.map(|c| c.excitation.as_slice()).unwrap_or_default();
+    if let Some(found) = calibration.and_then(|c| c.sensitivity.as_ref()) {
+        text += &format!("\nwhat the data can tell\n{}", sentences(&found.words));
+    }
+    if let Some(found) = &outcome.found.sensitivity {
+        text += &sensitivity(found);
+    }
+    if let Some(found) = &outcome.found.excitation {
+        text += &excitation(&found.inputs);
+        text += &found.regressions.iter().map(regression).collect::<String>();
+    }
+    if !inputs.is_empty() {
+        text += &excitation(inputs);
+    }
+    if let Some(found) = &outcome.found.sweep {
+        text += &sweep(found);
+    }
+    text
+}
+
+fn sentences(words: &[String]) -> String {
+    words.iter().map(|words| format!("- {words}\n")).collect()
+}
+
+fn share(value: f64) -> String {
+    if value.abs() < 1e-13 {
+        "0 %".to_owned()
+    } else if value.is_finite() {
+        format!("{} %", significant(100.0 * value, 3))
+    } else {
+        String::new()
+    }
+}
+
+fn known(value: f64) -> String {
+    if value.is_finite() { number(value) } else { String::new() }
+}
+
+fn sensitivity(found: &SensitivityReport) -> String {
+    let rows = found.tuners.iter().map(|t| {
+        vec![
+            t.name.clone(),
+            number(t.value),
+            t.unit.clone(),
+            significant(t.effect, 4),
+            known(t.std_error),
+            known(t.std_error_alone),
+            share(t.relative_error),
+            known(t.inflation),
+            if t.trust == "undetermined" || t.std_error.is_finite() { t.trust.to_owned() } else { String::new() },
+        ]
+    });
+    let header = ["tuner", "value", "unit", "effect", "std. error", "alone", "relative", "factor", ""];
+    let mut text = format!("\n{}", table(&header, &[1, 3, 4, 5, 6, 7], rows.collect()));
+    let largest = found.relative.eigenvalues.first().copied().unwrap_or(1.0);
+    let eigen = found.relative.eigenvalues.iter().zip(&found.relative.eigenvectors).map(|(value, vector)| {
+        let direction = combination(found, vector, 0.1).replace('`', "");
+        vec![significant(*value, 5), significant(value / largest, 2), direction]
+    });
+    let header = ["eigenvalue", "share", "direction, relative changes"];
+    text += &format!("\n{}\n{}", table(&header, &[0, 1], eigen.collect()), sentences(&found.words));
+    text
+}
+
+/// Inputs, one line each, and a sentence for each.
+pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
+    let rows = inputs.iter().map(|input| {
+        let least = if input.at_least { "at least " } else { "" };
+        vec![
+            input.case.clone(),
+            input.input.clone(),
+            format!("{least}{}", input.order),
+            input.parameters.to_string(),
+            if input.suffices { "yes".to_owned() } else { "in the long run, no".to_owned() },
+            share(input.eigenvalue),
+            input.next_eigenvalue.map_or_else(String::new, share),
+            input.transient.map_or_else(String::new, share),
+            input.samples.to_string(),
+            format!("{} s", number(input.sample_time)),
+        ]
+    });
+    let header = [
+        "case",
+        "input",
+        "order",
+        "tuners",
+        "suffices",
+        "weakest direction",
+        "next order",
+        "with transients",
+        "samples",
+        "every",
+    ];
+    let words: Vec<String> = inputs.iter().map(|input| input.words.clone()).collect();
+    format!("\n{}\n{}", table(&header, &[2, 3, 5, 6, 7, 8, 9], rows.collect()), sentences(&words))
+}
+
+fn regression(found: &RegressionReport) -> String {
+    let rows = found
+        .parameters
+        .iter()
+        .map(|(name, value, error, recursive)| vec![name.clone(), number(*value), known(*error), number(*recursive)]);
+    let recursive = format!("recursive, forgetting {}", number(found.forgetting));
+    let header = [found.name.as_str(), "least squares", "std. error", recursive.as_str()];
+    format!("\n{}\n- {}\n", table(&header, &[1, 2, 3], rows.collect()), found.words)
+}
+
+fn sweep(found: &SweepReport) -> String {
+    format!("\n{}", sentences(&found.words))
+}

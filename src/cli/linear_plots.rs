@@ -1,0 +1,122 @@
+//! Plots of a linear system: Bode, Nyquist, root locus.
+
+use mops_core::StateSpace;
+use mops_core::linear::{Complex, FrequencyResponse, eigenvalues, zeros};
+
+use crate::report::{Curve, CurveStyle, Ink, Plot, Sweep, bode, frequencies};
+
+/// The plots of a system with one input and one output, with the names of their files.
+pub(super) fn plots(system: &StateSpace, name: &str) -> Result<Vec<(&'static str, Plot)>, String> {
+    let response = system.response()?;
+    let omegas = frequencies(system)?;
+    let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
+    let of_result = Sweep { name: String::new(), values: &values, ..Sweep::default() };
+    let [magnitude, phase] = bode(&omegas, &[of_result], name);
+    let nyquist = nyquist(&response, &values, name);
+    Ok(vec![
+        ("bode-magnitude", magnitude),
+        ("bode-phase", phase),
+        ("nyquist", nyquist),
+        ("root-locus", root_locus(system, name)?),
+    ])
+}
+
+fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
+    // What is far away hides what happens around -1; a gain at frequency 0 is shown where it is moderate.
+    let limit = response.scalar(0.0).norm().clamp(2.0, 20.0) * 1.1;
+    let limit = if limit.is_finite() { limit } else { 3.0 };
+    let shown = |sign: f64| -> Vec<(f64, f64)> {
+        let inside = |z: &Complex| z.norm() <= limit;
+        values.iter().map(|z| if inside(z) { (z.re, sign * z.im) } else { (f64::NAN, f64::NAN) }).collect()
+    };
+    let circle = (0..=200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin_cos());
+    let curve = |name: &str, points, style, ink| Curve { name: name.into(), points, style, ink, may_leave: false };
+    Plot {
+        title: format!("Nyquist curve of {name}"),
+        x_label: "real part".into(),
+        y_label: "imaginary part".into(),
+        curves: vec![
+            curve("unit circle", circle.map(|(sin, cos)| (cos, sin)).collect(), CurveStyle::Line, Ink::Grid),
+            curve("negative frequencies", shown(-1.0), CurveStyle::Dashed, Ink::Start),
+            curve("positive frequencies", shown(1.0), CurveStyle::Line, Ink::Result),
+            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Dots, Ink::Demand),
+        ],
+        ..Plot::default()
+    }
+}
+
+/// The poles of the closed loop `k G/(1 + k G)` for gains k from 0 up, for a gain of the sign with which feedback is
+/// negative. A delay is left out.
+fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
+    let (poles, zeros) = (system.poles()?, zeros(system)?);
+    let size = poles.iter().chain(&zeros).map(|z| z.norm()).fold(0.0, f64::max);
+    let size = if size > 0.0 { size } else { 1.0 };
+    let direct = system.d[(0, 0)];
+    let closed = |k: f64| eigenvalues(&(&system.a - &system.b * &system.c * (k / (1.0 + k * direct))));
+    let mut branches: Vec<Vec<Complex>> = poles.iter().map(|&pole| vec![pole]).collect();
+    // From one gain to the next no pole may move by more than a small part of the picture.
+    let (mut k, mut step) = (0.0, 1e-9);
+    for _ in 0..6000 {
+        let next = k + step;
+        if !(next < 1e15) || (1.0 + k * direct) * (1.0 + next * direct) <= 0.0 {
+            break;
+        }
+        let roots = closed(next)?;
+        let moved = matched(&branches, roots);
+        let inside = |z: &Complex| z.norm() < 3.0 * size;
+        let farthest = branches.iter().zip(&moved).map(|(b, z)| (b, (z - b[b.len() - 1]).norm()));
+        let farthest = farthest.filter(|(b, _)| inside(&b[b.len() - 1])).map(|(_, d)| d).fold(0.0, f64::max);
+        if farthest > 0.02 * size && step > 1e-12 * (k + 1e-9) {
+            step *= 0.5;
+            continue;
+        }
+        branches.iter_mut().zip(&moved).for_each(|(branch, z)| branch.push(*z));
+        k = next;
+        if farthest < 0.005 * size {
+            step *= 2.0;
+        }
+    }
+    let limit = 2.0 * size;
+    let point =
+        |z: &Complex| if z.re.abs() <= limit && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
+    let dots = |name: &str, of: &[Complex], ink| Curve {
+        name: if of.is_empty() { String::new() } else { name.into() },
+        points: of.iter().map(point).collect(),
+        style: CurveStyle::Dots,
+        ink,
+        may_leave: false,
+    };
+    let lines = branches.iter().enumerate().map(|(i, branch)| Curve {
+        name: if i == 0 { "closed loop".into() } else { String::new() },
+        points: branch.iter().map(point).collect(),
+        ..Curve::default()
+    });
+    let axis = Curve { points: vec![(0.0, -1.05 * size), (0.0, 1.05 * size)], ink: Ink::Faint, ..Curve::default() };
+    Ok(Plot {
+        title: format!("root locus of {name}, for a growing gain in negative feedback"),
+        x_label: "real part (1/s)".into(),
+        y_label: "imaginary part (1/s)".into(),
+        curves: [axis]
+            .into_iter()
+            .chain(lines)
+            .chain([dots("poles", &poles, Ink::Demand), dots("zeros", &zeros, Ink::Measured)])
+            .collect(),
+        ..Plot::default()
+    })
+}
+
+/// The roots in the order of the branches they continue: nearest first.
+fn matched(branches: &[Vec<Complex>], roots: Vec<Complex>) -> Vec<Complex> {
+    let n = branches.len();
+    let end = |i: usize| branches[i][branches[i].len() - 1];
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
+    pairs.sort_by(|a, b| (end(a.0) - roots[a.1]).norm().total_cmp(&(end(b.0) - roots[b.1]).norm()));
+    let (mut of_branch, mut used) = (vec![None; n], vec![false; n]);
+    for (i, j) in pairs {
+        if of_branch[i].is_none() && !used[j] {
+            of_branch[i] = Some(roots[j]);
+            used[j] = true;
+        }
+    }
+    of_branch.into_iter().map(|root| root.expect("as many roots as branches")).collect()
+}

@@ -1,0 +1,135 @@
+//! Frequency responses of linear systems: magnitude and phase over the logarithm of the frequency.
+
+use mops_core::linear::{Complex, zeros};
+use mops_core::{Analysis, Failure, StateSpace};
+
+use super::plot::{Curve, CurveStyle, Ink, Plot};
+
+/// One response at the frequencies of a plot.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sweep<'a> {
+    /// Name in the legend.
+    pub(crate) name: String,
+    /// The response.
+    pub(crate) values: &'a [Complex],
+    /// How its curves are drawn.
+    pub(crate) style: CurveStyle,
+    /// What they stand for.
+    pub(crate) ink: Ink,
+}
+
+/// Angular frequencies around everything that happens, two decades to both sides; dense around sharp resonances.
+pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
+    let corners = [system.poles()?, zeros(system)?].concat();
+    let largest = corners.iter().map(|z| z.norm()).fold(0.0, f64::max);
+    let sizes = corners.iter().map(|z| z.norm()).filter(|size| *size > 1e-9 * largest);
+    let sizes = || sizes.clone().chain((system.delay > 0.0).then(|| 1.0 / system.delay));
+    let (low, high) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+    let (low, mut high) = if low.is_finite() { (1e-2 * low, 1e2 * high) } else { (1e-2, 1e2) };
+    if system.delay > 0.0 {
+        // Later the phase only turns and turns.
+        high = high.min((3.0 * corners.iter().map(|z| z.norm()).fold(0.0, f64::max)).max(6.0 / system.delay));
+    }
+    const COUNT: usize = 1200;
+    let step = (high / low).ln() / COUNT as f64;
+    let mut omegas: Vec<f64> = (0..=COUNT).map(|i| low * (step * i as f64).exp()).collect();
+    for resonance in corners.iter().filter(|z| z.im > 0.0) {
+        let width = resonance.re.abs().max(1e-6 * resonance.im);
+        omegas.extend((-60..=60).map(|i| resonance.im + 0.1 * f64::from(i) * width));
+    }
+    omegas.retain(|&omega| omega >= low && omega <= high);
+    omegas.sort_by(f64::total_cmp);
+    Ok(omegas)
+}
+
+/// Magnitude and phase of responses at the same frequencies.
+pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2] {
+    let of = |title: &str, y_label: &str, y: &dyn Fn(&[Complex]) -> Vec<f64>| Plot {
+        title: format!("{title} of {name}"),
+        x_label: "frequency (rad/s)".into(),
+        y_label: y_label.into(),
+        curves: sweeps
+            .iter()
+            .map(|sweep| Curve {
+                name: sweep.name.clone(),
+                points: omegas.iter().copied().zip(y(sweep.values)).collect(),
+                style: sweep.style,
+                ink: sweep.ink,
+                may_leave: sweep.ink == Ink::Start,
+            })
+            .collect(),
+        log_x: true,
+        ..Plot::default()
+    };
+    let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * g.norm().log10()).collect();
+    [of("magnitude", "magnitude (dB)", &decibel), of("phase", "phase (deg)", &followed)]
+}
+
+/// The phase, deg, followed from frequency to frequency: it does not jump by a turn.
+fn followed(values: &[Complex]) -> Vec<f64> {
+    let mut last = values.first().map_or(0.0, |g| g.arg());
+    let mut phase = Vec::with_capacity(values.len());
+    for (i, value) in values.iter().enumerate() {
+        last += if i == 0 { 0.0 } else { (value / values[i - 1]).arg() };
+        phase.push(last.to_degrees());
+    }
+    phase
+}
+
+/// The responses of every input at one output, at the start and at the reported point.
+pub(super) fn compared(
+    start: &Result<Analysis, Failure>,
+    best: (&Result<Analysis, Failure>, &str),
+    output: &str,
+    case: &str,
+) -> Vec<(String, Plot)> {
+    let system = |analysis: &Result<Analysis, Failure>| analysis.as_ref().ok()?.linear().cloned();
+    let (start, found) = (system(start), system(best.0));
+    let Some(shown) = found.as_ref().or(start.as_ref()) else { return Vec::new() };
+    let Some(place) = shown.outputs.iter().position(|name| name == output) else { return Vec::new() };
+    let mut plots = Vec::new();
+    for (input, name) in shown.inputs.iter().enumerate() {
+        let Ok(omegas) = frequencies(&shown.channel(input, place)) else { continue };
+        let values = |system: &Option<StateSpace>| -> Vec<Complex> {
+            let response = system.as_ref().and_then(|system| system.channel(input, place).response().ok());
+            response.map_or_else(Vec::new, |response| omegas.iter().map(|&omega| response.scalar(omega)).collect())
+        };
+        let (first, last) = (values(&start), values(&found));
+        let sweeps = [
+            Sweep { name: "start".into(), values: &first, style: CurveStyle::Dashed, ink: Ink::Start },
+            Sweep { name: best.1.into(), values: &last, style: CurveStyle::Line, ink: Ink::Result },
+        ];
+        let drawn: Vec<Sweep<'_>> = sweeps.into_iter().filter(|sweep| !sweep.values.is_empty()).collect();
+        let [magnitude, phase] = bode(&omegas, &drawn, &format!("{output}/{name} in case {case}"));
+        plots.extend([(format!("magnitude-{output}-{name}"), magnitude), (format!("phase-{output}-{name}"), phase)]);
+    }
+    plots
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::linear::TransferFunction;
+
+    use super::*;
+
+    #[test]
+    fn the_phase_of_a_delay_is_a_straight_line_that_does_not_jump() {
+        let late = TransferFunction { delay: 2.0, ..TransferFunction::new(vec![1.0], vec![1.0]) };
+        let response = late.state_space().unwrap().response().unwrap();
+        let omegas: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
+        let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
+        for (phase, omega) in followed(&values).iter().zip(&omegas) {
+            assert!((phase + (2.0 * omega).to_degrees()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_sharp_resonance_is_among_the_frequencies() {
+        let needle = TransferFunction::new(vec![1.0], vec![1.0, 1e-4, 100.0]).state_space().unwrap();
+        let omegas = frequencies(&needle).unwrap();
+        let response = needle.response().unwrap();
+        let highest = omegas.iter().map(|&omega| response.scalar(omega).norm()).fold(0.0, f64::max);
+        assert!((highest * 1e-3 - 1.0).abs() < 1e-3, "{highest}");
+        assert!(omegas.windows(2).all(|pair| pair[0] <= pair[1]));
+    }
+}

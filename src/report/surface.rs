@@ -1,0 +1,161 @@
+//! A surface seen from above: coloured by height, with lines of equal height and a scale.
+
+use super::axis::Axis;
+use super::clip::{Frame, Point};
+use super::contour::contour;
+use super::plot::{Ink, Surface};
+use super::range::{drawable, range_of};
+use super::scene::{Anchor, Mark, Scene};
+
+/// Room to the right of the picture for the scale.
+pub(super) const SCALE_WIDTH: f64 = 84.0;
+
+/// Number of colours, and of the lines between some of them.
+const COLOURS: usize = 32;
+const LINES: usize = 8;
+
+/// Heights above this share of all others, or so many decades above the lowest, are drawn as if they were there: what
+/// blows up next to a failure would flatten the rest.
+const HIGHEST: f64 = 0.9;
+const DECADES: f64 = 4.0;
+
+/// Red, green and blue from low to high; their lightness grows evenly, also for readers who see fewer colours.
+/// Source: S. van der Walt, N. Smith, viridis, Matplotlib 1.5 (2015), every 32nd colour.
+const VIRIDIS: [[f64; 3]; 9] = [
+    [68.0, 1.0, 84.0],
+    [71.0, 44.0, 122.0],
+    [59.0, 81.0, 139.0],
+    [44.0, 113.0, 142.0],
+    [33.0, 144.0, 141.0],
+    [39.0, 173.0, 129.0],
+    [92.0, 200.0, 99.0],
+    [170.0, 220.0, 50.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// The colour of a height between 0 and 1.
+fn colour(height: f64) -> [u8; 3] {
+    let at = height.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
+    let i = (at as usize).min(VIRIDIS.len() - 2);
+    let s = at - i as f64;
+    std::array::from_fn(|k| (VIRIDIS[i][k] + s * (VIRIDIS[i + 1][k] - VIRIDIS[i][k])).round() as u8)
+}
+
+impl Surface {
+    /// Range of a coordinate, or of its logarithm.
+    pub(super) fn range(values: &[f64], log: bool) -> Option<[f64; 2]> {
+        range_of(values.iter().filter_map(|&v| drawable(v, log)))
+    }
+
+    /// Range of the heights that are told apart, or of their logarithms.
+    fn heights(&self) -> Option<[f64; 2]> {
+        let mut all: Vec<f64> = self.values.iter().flatten().filter_map(|&v| drawable(v, self.log)).collect();
+        all.sort_by(f64::total_cmp);
+        let high = all.get(((all.len() as f64 * HIGHEST) as usize).min(all.len().saturating_sub(1)))?;
+        let high = if self.log { high.min(all[0] + DECADES) } else { *high };
+        range_of([all[0], high].into_iter())
+    }
+}
+
+impl Scene {
+    /// Draws the surface into the frame, and its scale beside it.
+    pub(super) fn surface(&mut self, surface: &Surface, x: &Axis, y: &Axis, frame: Frame) {
+        let Some([low, high]) = surface.heights() else { return };
+        let Frame { from: [left, top], to: [right, bottom] } = frame;
+        let height = |value: f64| drawable(value, surface.log).map(|v| ((v - low) / (high - low)).clamp(0.0, 1.0));
+        let band = |value: f64| height(value).map(|h| ((h * COLOURS as f64) as usize).min(COLOURS - 1));
+        let xs: Vec<f64> = surface.x.iter().map(|&v| left + x.position(v).unwrap_or(0.0) * (right - left)).collect();
+        let ys: Vec<f64> = surface.y.iter().map(|&v| bottom - y.position(v).unwrap_or(0.0) * (bottom - top)).collect();
+        let edges = |at: &[f64], i: usize| {
+            let between = |i: usize, j: usize| 0.5 * (at[i] + at[j]);
+            let before = if i == 0 { at[0] } else { between(i - 1, i) };
+            let after = if i + 1 == at.len() { at[i] } else { between(i, i + 1) };
+            [before.min(after), before.max(after)]
+        };
+        for (r, row) in surface.values.iter().enumerate() {
+            let [upper, lower] = edges(&ys, r);
+            let mut c = 0;
+            while c < row.len() {
+                // Neighbours of one colour are one box.
+                let of = band(row[c]);
+                let end = (c..row.len()).find(|&k| band(row[k]) != of).unwrap_or(row.len());
+                if let Some(of) = of {
+                    let box_ = Frame { from: [edges(&xs, c)[0], upper], to: [edges(&xs, end - 1)[1], lower] };
+                    self.marks.push(Mark::Cell { frame: box_, rgb: colour((of as f64 + 0.5) / COLOURS as f64) });
+                }
+                c = end;
+            }
+        }
+        let raised: Vec<Vec<f64>> =
+            surface.values.iter().map(|row| row.iter().map(|&v| height(v).unwrap_or(f64::NAN)).collect()).collect();
+        for line in 1..LINES {
+            for segment in contour(&raised, line as f64 / LINES as f64) {
+                let points = segment.map(|p| [along(&xs, p[0]), along(&ys, p[1])]).to_vec();
+                self.marks.push(Mark::Line { points, ink: Ink::Faint, width: 0.7, dashed: false });
+            }
+        }
+        self.scale(surface, [low, high], frame);
+    }
+
+    fn scale(&mut self, surface: &Surface, range: [f64; 2], Frame { from: [_, top], to: [right, bottom] }: Frame) {
+        let at = |share: f64| bottom - share * (bottom - top);
+        let [left, end] = [right + 14.0, right + 26.0];
+        for i in 0..COLOURS {
+            let [from, to] = [i, i + 1].map(|i| at(i as f64 / COLOURS as f64));
+            let frame = Frame { from: [left, to], to: [end, from] };
+            self.marks.push(Mark::Cell { frame, rgb: colour((i as f64 + 0.5) / COLOURS as f64) });
+        }
+        let axis = Axis::new(range, surface.log, 6.0);
+        for (share, label) in &axis.ticks {
+            self.text(label, [end + 5.0, at(*share)], Anchor::Start, Ink::Faint);
+        }
+        let factor = axis.factor.as_deref().map_or_else(String::new, |factor| format!(" {factor}"));
+        let label = format!("{}{factor}", surface.label);
+        self.text(&label, [right + SCALE_WIDTH - 4.0, top - 14.0], Anchor::End, Ink::Faint);
+    }
+}
+
+/// The place between grid points.
+fn along(places: &[f64], index: f64) -> f64 {
+    let i = (index as usize).min(places.len().saturating_sub(2));
+    places[i] + (index - i as f64) * (places[i + 1] - places[i])
+}
+
+/// The line where heights cross a level, as points over x and y with gaps between its segments.
+pub(super) fn border(surface: &Surface, heights: &[Vec<f64>], level: f64) -> Vec<(f64, f64)> {
+    let gap = (f64::NAN, f64::NAN);
+    let place = |p: Point| (along(&surface.x, p[0]), along(&surface.y, p[1]));
+    contour(heights, level).into_iter().flat_map(|[a, b]| [place(a), place(b), gap]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plot::Plot;
+    use super::*;
+
+    fn surface(values: Vec<Vec<f64>>) -> Plot {
+        let axis = |n: usize| (0..n).map(|i| i as f64).collect();
+        let (x, y) = (axis(values[0].len()), axis(values.len()));
+        Plot { surface: Some(Surface { x, y, values, ..Surface::default() }), ..Plot::default() }
+    }
+
+    #[test]
+    fn failed_points_are_left_blank_and_one_high_point_does_not_flatten_the_rest() {
+        let mut values: Vec<Vec<f64>> = (0..10).map(|r| (0..10).map(|c| f64::from(r * c)).collect()).collect();
+        values[9][9] = 1e9;
+        values[0][0] = f64::NAN;
+        let plot = surface(values);
+        let [low, high] = plot.surface.as_ref().unwrap().heights().unwrap();
+        assert!(low == 0.0 && high < 82.0, "{low} {high}");
+        let svg = plot.svg();
+        assert!(!svg.contains("NaN") && svg.contains("#440154") | svg.contains("crispEdges"));
+    }
+
+    #[test]
+    fn surfaces_without_a_value_and_flat_ones_are_drawn() {
+        for value in [f64::NAN, 0.0, 3.0, -1.0] {
+            let svg = surface(vec![vec![value; 3]; 3]).svg();
+            assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{value}");
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The objective over one tuner as a curve, over two as a surface.
+
+use mops_core::{FEASIBLE, SweepAxis, SweepReport};
+
+use super::figures::{Figure, Group};
+use super::numbers::labelled;
+use super::plot::{Curve, CurveStyle, Ink, Plot, Surface};
+use super::surface::border;
+
+/// The plot of a sweep.
+pub(super) fn group(sweep: &SweepReport, best_name: &str) -> Group {
+    let plot = match &sweep.y {
+        Some(y) => surface(sweep, y, best_name),
+        None => line(sweep, best_name),
+    };
+    Group {
+        about: sweep.words.clone(),
+        figures: vec![Figure { plots: vec![("sweep".into(), plot)], caption: Vec::new() }],
+        ..Group::default()
+    }
+}
+
+/// Whether all values are positive and some are a hundred times others.
+fn spans_decades(sweep: &SweepReport) -> bool {
+    let all = || sweep.objective.iter().flatten().copied().filter(|v| v.is_finite());
+    let low = all().fold(f64::INFINITY, f64::min);
+    low > 0.0 && all().fold(0.0, f64::max) > 100.0 * low
+}
+
+fn violated(sweep: &SweepReport) -> bool {
+    sweep.violation.iter().flatten().any(|&v| v > FEASIBLE)
+}
+
+fn dot(name: &str, [x, y]: [f64; 2], ink: Ink) -> Curve {
+    Curve { name: name.into(), points: vec![(x, y)], style: CurveStyle::Dots, ink, ..Curve::default() }
+}
+
+fn surface(sweep: &SweepReport, y: &SweepAxis, best_name: &str) -> Plot {
+    let surface = Surface {
+        label: "objective".into(),
+        x: sweep.x.values.clone(),
+        y: y.values.clone(),
+        values: sweep.objective.clone(),
+        log: spans_decades(sweep),
+    };
+    let mut curves = Vec::new();
+    if violated(sweep) {
+        let points = border(&surface, &sweep.violation, FEASIBLE);
+        curves.push(Curve { name: "constraints hold up to here".into(), points, ink: Ink::Demand, ..Curve::default() });
+    }
+    curves.push(dot("best of the sweep", [sweep.best[0], sweep.best[1]], Ink::Measured));
+    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[1]], Ink::Demand));
+    Plot {
+        title: format!("Objective over {} and {}", sweep.x.tuner, y.tuner),
+        x_label: labelled(&sweep.x.tuner, &sweep.x.unit),
+        y_label: labelled(&y.tuner, &y.unit),
+        log_x: sweep.x.log,
+        log_y: y.log,
+        curves,
+        surface: Some(surface),
+        ..Plot::default()
+    }
+}
+
+fn line(sweep: &SweepReport, best_name: &str) -> Plot {
+    let points = || sweep.x.values.iter().copied().zip(sweep.objective[0].iter().copied());
+    let mut curves = vec![Curve { name: "objective".into(), points: points().collect(), ..Curve::default() }];
+    if violated(sweep) {
+        let broken = |((x, y), v): ((f64, f64), &f64)| if *v > FEASIBLE { (x, y) } else { (x, f64::NAN) };
+        let points = points().zip(&sweep.violation[0]).map(broken).collect();
+        curves.push(Curve { name: "a constraint violated".into(), points, ink: Ink::Measured, ..Curve::default() });
+    }
+    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[2]], Ink::Demand));
+    Plot {
+        title: format!("Objective over {}", sweep.x.tuner),
+        x_label: labelled(&sweep.x.tuner, &sweep.x.unit),
+        y_label: "objective".into(),
+        log_x: sweep.x.log,
+        log_y: spans_decades(sweep),
+        curves,
+        ..Plot::default()
+    }
+}

@@ -1,0 +1,18 @@
+//! `task = "excitation"`: how rich the inputs are, without a simulation.
+
+use mops_core::identification::{excitations, regressions};
+use mops_core::{ExcitationFindings, Study, Watch};
+
+use crate::solve::{Options, Solved, look};
+
+pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let inputs = excitations(&study, &study.tasks.excitation.question);
+    let regressions = regressions(&study);
+    // Criteria have no say in this: nothing is simulated.
+    study.rows.clear();
+    study.jobs.clear();
+    let mut solved = look(study, options, watch);
+    solved.outcome.calibration = None;
+    solved.outcome.found.excitation = Some(ExcitationFindings { inputs, regressions });
+    solved
+}

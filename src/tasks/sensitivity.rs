@@ -1,0 +1,22 @@
+//! `task = "sensitivity"`: which tuners, or which combinations of them, the data or the criteria determine.
+
+use mops_core::identification::sensitivity_at;
+use mops_core::{Study, Watch};
+
+use super::at;
+use crate::solve::{Options, Solved, Unsuitable};
+
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let task = study.tasks.sensitivity;
+    let mut solved = at(task.at, study, options, watch)?;
+    // A calibration has found it already.
+    let known = solved.outcome.calibration.as_mut().and_then(|calibration| calibration.sensitivity.take());
+    let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, task.zero));
+    if found.is_none() {
+        let why =
+            "the sensitivities could not be computed: a simulation failed, or nothing that counts depends on a tuner";
+        solved.outcome.warnings.push(why.to_owned());
+    }
+    solved.outcome.found.sensitivity = found;
+    Ok(solved)
+}

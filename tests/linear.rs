@@ -1,0 +1,169 @@
+//! Linear systems from the command line: linearisation, state feedback, several models in a study, frequency responses.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+fn mops(arguments: &[&str]) -> Command {
+    let mut command = cargo_bin_cmd!("mops");
+    command.args(arguments);
+    command
+}
+
+fn study(folder: &Path, text: &str) -> String {
+    let path = folder.join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// `A` and `B` as the thesis prints them (section 5.2).
+const PENDULUM: &str = "
+[study]
+name = 'pendulum'
+[models.pendulum.state-space]
+a = [[0, 1, 0, 0], [-0.1082, 0, -25.4814, 0.0255], [0, 0, 0, 1], [0.0756, 0, 45.7597, -0.0458]]
+b = [[0], [1444.1], [0], [-1008.5]]
+c = [[1, 0, 0, 0], [0, 0, 1, 0]]
+states = ['phi', 'dphi', 'theta', 'dtheta']
+outputs = ['phi', 'theta']
+[criteria]
+slowest = { slowest-pole = { output = 'phi' }, usage = 'monitor' }
+";
+
+#[test]
+fn the_pendulum_of_the_thesis_gets_its_feedback_and_leaves_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (study(folder.path(), PENDULUM), folder.path().join("out"));
+    let placed = mops(&["linearise", &file, "--place=-5,-8,-10,-14", "--out", out.to_str().unwrap()]);
+    let printed = { placed }.output().unwrap();
+    let text = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.status.success() && text.contains("-0.138746") && text.contains("theta/u"), "{text}");
+    let found = json(&out.join("linearised.json"));
+    let k = found["feedback"]["k"][0].as_array().unwrap();
+    for (k, expected) in k.iter().zip([-0.138_746_07, -0.068_978_83, -0.734_559_28, -0.135_415_5]) {
+        assert!((k.as_f64().unwrap() - expected).abs() < 5e-9, "{k} {expected}");
+    }
+    for plot in ["bode-magnitude", "bode-phase", "nyquist", "root-locus"] {
+        for extension in ["svg", "png"] {
+            let size = std::fs::metadata(out.join(format!("{plot}-theta-u.{extension}"))).unwrap().len();
+            assert!(size > 1000, "{plot}.{extension}");
+        }
+    }
+}
+
+#[test]
+fn a_nonlinear_model_is_linearised_at_its_equilibrium() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let at = ["--at", "theta=3", "--equilibrium", "--free", "theta", "--case", "horizontal"];
+    let arguments = [&["linearise", "furuta-calibration", "--out", out.to_str().unwrap()], &at[..]].concat();
+    let printed = mops(&arguments).output().unwrap();
+    assert!(printed.status.success(), "{}", String::from_utf8_lossy(&printed.stderr));
+    let theta = json(&out.join("linearised.json"))["at"]["states"][2].as_f64().unwrap();
+    assert!((theta - std::f64::consts::PI).abs() < 1e-9, "{theta}");
+}
+
+#[test]
+fn what_linearise_cannot_do_is_a_mistake_with_a_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = study(folder.path(), PENDULUM);
+    for (arguments, fact) in [
+        (vec!["--place=-5,-8"], "2 poles are asked for, but the system has 4 states"),
+        (vec!["--place=-5,-8,-1+2i,-3"], "has no conjugate"),
+        (vec!["--lqr", "1,1"], "takes 4 weights of states and 1 of inputs"),
+        (vec!["--output", "thet"], "did you mean `theta`?"),
+        (vec!["--at", "theta=1"], "no such tuner or parameter"),
+    ] {
+        let output = mops(&[&["linearise", &file], &arguments[..]].concat()).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.replace('\n', " ").contains(fact), "{told}");
+    }
+}
+
+#[test]
+fn mistakes_in_the_linearisation_of_a_study_have_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = |linearise: &str, criterion: &str| {
+        let text = format!(
+            "[study]\nname = 'x'\n[models.a]\npid-loop = {{ plant = {{ poles = [-1] }}, horizon = 5 }}\n\
+             linearise = {linearise}\nparameters = {{ k = 1, Ti = 1, Td = 0 }}\n[criteria]\nc = {{ {criterion}, demand = 1 }}\n"
+        );
+        let output = mops(&["check", &study(folder.path(), &text)]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8(output.stderr).unwrap().replace('\n', " ")
+    };
+    let input = wrong("{ inputs = ['v'] }", "hinf-norm = {}");
+    assert!(input.contains("study.toml:5:25") && input.contains("no input `v`"), "{input}");
+    let at = wrong("{ at = { x1 = '1 s' } }", "hinf-norm = {}");
+    assert!(at.contains("study.toml:5:27"), "{at}");
+    let channel = wrong("{ inputs = ['r'] }", "hinf-norm = {}");
+    assert!(channel.contains("5 outputs") && channel.contains("add output ="), "{channel}");
+    let sort = wrong("{}", "overshoot = { signal = 'y' }");
+    assert!(sort.contains("`a` is a linear system"), "{sort}");
+}
+
+/// Found by two solvers; the margins and peaks at the optimum agree with NumPy on a grid of 4e6 frequencies.
+#[test]
+fn one_set_of_tuners_serves_a_simulation_and_its_margins() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let output = mops(&["run", "multi-model", "--json", "--out", out.to_str().unwrap()]).output().unwrap();
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(result["feasible"], true);
+    let worst = result["worst_scaled"].as_f64().unwrap();
+    assert!((worst - 0.631_02).abs() < 2e-4, "{worst}");
+    let criteria = result["criteria"].as_array().unwrap();
+    let value = |name: &str| criteria.iter().find(|c| c["name"] == name).unwrap()["value"].as_f64().unwrap();
+    assert!((value("sensitivity") - 1.4).abs() < 1e-5, "{}", value("sensitivity"));
+    assert!(out.join("plots/nominal-margins-magnitude-y-e.svg").is_file());
+}
+
+#[test]
+fn a_lag_with_delay_is_identified_from_its_frequency_response() {
+    let folder = tempfile::tempdir().unwrap();
+    let (k, t, l) = (3.0, 0.5, 0.2);
+    let mut data = "f [Hz],magnitude [dB],phase [deg]\n".to_owned();
+    for i in 0..30 {
+        let f = 0.05 * 1.15f64.powi(i);
+        let w = std::f64::consts::TAU * f;
+        let size: f64 = k / (1.0 + (w * t).powi(2)).sqrt();
+        let phase = (-(w * t).atan() - w * l).to_degrees();
+        data += &format!("{f},{},{phase}\n", 20.0 * size.log10());
+    }
+    std::fs::write(folder.path().join("sweep.csv"), data).unwrap();
+    let text = "
+[study]
+name = 'lag'
+task = 'calibration'
+[models.lag.transfer-function]
+numerator = ['K']
+denominator = ['T', 1]
+delay = 'L'
+units = { T = 's', L = 's' }
+[tuners]
+K = { start = 1, min = 0.1, max = 10 }
+T = { start = 1, min = 0.1, max = 10 }
+L = { start = 0, min = 0, max = 1 }
+[experiments.sweep]
+file = 'sweep.csv'
+frequency = 'f'
+responses = { y = { magnitude = 'magnitude', phase = 'phase' } }
+[criteria]
+response = { frequency-fit = { signal = 'y' }, demand = 1 }
+";
+    let (file, out) = (study(folder.path(), text), folder.path().join("out"));
+    let output = mops(&["run", &file, "--json", "--out", out.to_str().unwrap()]).output().unwrap();
+    let result: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
+    for (tuner, exact) in result["tuners"].as_array().unwrap().iter().zip([k, t, l]) {
+        let found = tuner["value"].as_f64().unwrap();
+        assert!((found - exact).abs() < 1e-6, "{tuner}");
+    }
+}
