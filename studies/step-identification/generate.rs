@@ -16,12 +16,14 @@ const DEVICE: Device = Device {
     torque: |_| 0.0,
 };
 
+/// A torque over time, N m.
+type Torque = fn(f64) -> f64;
+
 /// Name of the file, seed of its noise, torque on the arm (N m).
-pub const RECORDINGS: [(&str, u64, fn(f64) -> f64); 2] =
-    [("step.csv", 1, |_| 0.02), ("sine.csv", 2, |t| 0.02 * t.sin())];
+pub const RECORDINGS: [(&str, u64, Torque); 2] = [("step.csv", 1, |_| 0.02), ("sine.csv", 2, |t| 0.02 * t.sin())];
 
 /// The recording as a CSV text: from hanging at rest, noise of 0.01 rad.
-pub fn recording(seed: u64, torque: fn(f64) -> f64) -> String {
+pub fn recording(seed: u64, torque: Torque) -> String {
     let hanging = [[0.0, std::f64::consts::PI, 0.0], [0.0; 3]];
     device::recording(&Device { torque, ..DEVICE }, hanging, 0.01, seed, true)
 }

@@ -4,8 +4,6 @@
 mod furuta_calibration;
 #[path = "../furuta-swing/generate.rs"]
 mod furuta_swing;
-#[path = "../step-identification/generate.rs"]
-mod step_identification;
 
 fn check(study: &str, file: &str, generated: &str) {
     let studies = mops_studies::shipped();
@@ -27,12 +25,5 @@ fn the_recordings_of_the_calibrations_are_what_the_generator_makes() {
 fn the_recordings_of_furuta_swing_are_what_the_generator_makes() {
     for (name, seed, start) in furuta_swing::RECORDINGS {
         check("furuta-swing", name, &furuta_swing::recording(seed, start));
-    }
-}
-
-#[test]
-fn the_recordings_of_step_identification_are_what_the_generator_makes() {
-    for (name, seed, torque) in step_identification::RECORDINGS {
-        check("step-identification", name, &step_identification::recording(seed, torque));
     }
 }

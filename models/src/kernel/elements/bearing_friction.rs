@@ -27,10 +27,10 @@ impl<S: Scalar> BearingFriction<S> {
         if table[0][0].value() != 0.0 {
             return undefined(format!("a table of friction begins at speed 0, not at {}", table[0][0].value()));
         }
-        if !(table[0][1].value() >= 0.0) {
+        if !(0.0..).contains(&table[0][1].value()) {
             return undefined(format!("friction at rest is not negative, but {}", table[0][1].value()));
         }
-        if !(peak.value() >= 1.0) {
+        if !(1.0..).contains(&peak.value()) {
             return undefined(format!("breaking away takes at least the sliding torque: peak = {} < 1", peak.value()));
         }
         Ok(Self { table: function, peak })
