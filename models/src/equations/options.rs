@@ -37,6 +37,9 @@ use crate::kernel::Tolerance;
 /// A state whose derivative is another state, as `th` above, is a joint: friction acts on it with `friction.th = {
 /// coulomb = "c" }`, exactly at rest while it is stuck. The places where an effect may be missing are its joints, the
 /// equations of its states, its inputs and its signals.
+///
+/// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
+/// (discontinuities).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EquationsOptions {
