@@ -97,7 +97,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         };
         let guards = (0..N).flat_map(watched).collect();
         let events = std::array::from_fn(|i| joints[i].events);
-        let contact = [Contact::Stuck; N];
+        let contact = [Contact::Forward; N];
         Self { bodies, friction, contact, line: [0; N], drives: [false; N], guards, events, started: false }
     }
 
