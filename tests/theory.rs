@@ -22,6 +22,11 @@ fn run(study: &str, folder: &Path, settings: &[&str]) -> Value {
         .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
+/// The study of a free swing that lies beside the tests.
+fn swing() -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/swing/study.toml").to_str().unwrap().to_owned()
+}
+
 fn page(folder: &Path) -> String {
     std::fs::read_to_string(folder.join("out/report.html")).unwrap()
 }
@@ -119,9 +124,8 @@ fn a_column_of_a_data_file_can_be_asked_for_its_order() {
 #[test]
 fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
-    let settings =
-        ["study.task='sensitivity'", "sensitivity.at='start'", "tuners.a={start=9.035e-4,min=1e-4,max=1e-2}"];
-    let result = run("furuta-calibration", folder.path(), &settings);
+    let settings = ["study.task='sensitivity'", "sensitivity.at='start'", "tuners.a.active=true"];
+    let result = run(&swing(), folder.path(), &settings);
     let found = &result["sensitivity"];
     let tuners = found["tuners"].as_array().unwrap().len();
     assert_eq!((&result["solver"], &result["evaluations"]), (&"none".into(), &1.into()));
@@ -140,12 +144,8 @@ fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
 #[test]
 fn of_the_arms_inertia_and_mass_only_one_combination_can_be_estimated() {
     let folder = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/furuta-calibration");
-    std::fs::create_dir(folder.path().join("data")).unwrap();
-    for file in ["data/horizontal.csv", "data/upright.csv"] {
-        std::fs::copy(shipped.join(file), folder.path().join(file)).unwrap();
-    }
-    let text = std::fs::read_to_string(shipped.join("study.toml")).unwrap();
+    std::fs::copy(swing().replace("study.toml", "swing.csv"), folder.path().join("swing.csv")).unwrap();
+    let text = std::fs::read_to_string(swing()).unwrap();
     let arm = "Jc = { start = 1.4e-3, min = 1e-4, max = 1e-2, unit = \"kg m2\" }\n\
                m  = { start = 0.165, min = 0.05, max = 0.5, unit = \"kg\" }\n\
                b  = { tie = \"Jc + 0.01500625*m - 2.5e-3\" }\n";
@@ -166,7 +166,7 @@ fn of_the_arms_inertia_and_mass_only_one_combination_can_be_estimated() {
 #[test]
 fn a_calibration_tells_what_its_data_can_tell() {
     let folder = tempfile::tempdir().unwrap();
-    let result = run("furuta-calibration", folder.path(), &[]);
+    let result = run(&swing(), folder.path(), &[]);
     let found = &result["calibration"]["sensitivity"];
     assert_eq!((found["rank"].as_u64(), found["slopes"].as_str()), (Some(11), Some("tangents")));
     let pairs =
@@ -236,7 +236,7 @@ fn mistakes_in_the_tables_of_tasks_have_a_place_and_a_way_out() {
         ("study.task='sweep'", "nothing says which tuners are swept"),
         ("study.task='excitation'", "nothing drives the model: no case and no experiment has an input"),
     ] {
-        let output = mops(&["check", "furuta-calibration", "--set", setting]).output().unwrap();
+        let output = mops(&["check", &swing(), "--set", setting]).output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && text.contains(fact) && text.contains("--set:1:12"), "{text}");
     }

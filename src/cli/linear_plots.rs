@@ -58,7 +58,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let (mut k, mut step) = (0.0, 1e-9);
     for _ in 0..6000 {
         let next = k + step;
-        if !(next < 1e15) || (1.0 + k * direct) * (1.0 + next * direct) <= 0.0 {
+        if next >= 1e15 || (1.0 + k * direct) * (1.0 + next * direct) <= 0.0 {
             break;
         }
         let roots = closed(next)?;

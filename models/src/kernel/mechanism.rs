@@ -97,7 +97,8 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         };
         let guards = (0..N).flat_map(watched).collect();
         let events = std::array::from_fn(|i| joints[i].events);
-        let contact = [Contact::Forward; N];
+        // Until it settles at the start of a simulation; a joint without dry friction cannot stick.
+        let contact = std::array::from_fn(|i| if friction[i].is_viscous() { Contact::Forward } else { Contact::Stuck });
         Self { bodies, friction, contact, line: [0; N], drives: [false; N], guards, events, started: false }
     }
 
