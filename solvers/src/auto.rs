@@ -86,7 +86,7 @@ impl Solver for Auto {
 
 fn choose(shape: &Shape) -> Box<dyn Solver> {
     // The starts are counted here, not in the chosen solver.
-    let least_squares = LevenbergMarquardtOptions::default().from_one_start();
+    let least_squares = LevenbergMarquardtOptions::default().local();
     let sqp = SqpOptions::default().build();
     let choices = [least_squares, sqp, PatternSearchOptions::default().build()];
     choices.into_iter().find(|solver| solver.accepts(shape).is_ok()).expect("pattern search accepts every problem")

@@ -39,14 +39,14 @@ impl SolverOptions for LevenbergMarquardtOptions {
     const KIND: &'static str = "levenberg-marquardt";
 
     fn build(&self) -> Box<dyn Solver> {
-        let local = self.from_one_start();
+        let local = self.local();
         Box::new(LevenbergMarquardt { starts: Multistart::new(local, self.starts).until_nothing_changes() })
     }
 }
 
 impl LevenbergMarquardtOptions {
     /// The method itself, without further starts.
-    pub(crate) fn from_one_start(&self) -> Box<dyn Solver> {
+    pub(crate) fn local(&self) -> Box<dyn Solver> {
         Box::new(Local { options: self.clone(), state: None })
     }
 }

@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn several_inputs_may_repeat_a_pole_more_often_than_there_are_inputs() {
         let (a, b) = (random(5, 5, 8), random(5, 2, 9));
-        let k = place(&a, &b, &vec![c(-2.0, 0.0); 5]).unwrap();
+        let k = place(&a, &b, &[c(-2.0, 0.0); 5]).unwrap();
         // A defective eigenvalue: its computed copies lie on a circle around it.
         assert!(eigenvalues(&(&a - &b * k)).unwrap().iter().all(|z| (z + 2.0).norm() < 0.02));
     }
