@@ -3,8 +3,9 @@
 use std::hint::black_box;
 
 use criterion::Criterion;
-use mops::Scalar;
+use mops::models::equations::{Equations, EquationsOptions};
 use mops::models::kernel::{Dynamics, IntegrationMethod, Tolerance, integrate};
+use mops::{Case, Job, Model, Scalar};
 
 const CELLS: usize = 100;
 /// Exchange of heat between neighbouring cells, 1/s.
@@ -37,13 +38,51 @@ impl<S: Scalar> Dynamics<S> for Rod {
     }
 }
 
+/// The same from a study file.
+const TEXT: &str = r#"
+horizon = 10.0
+states  = { "T[1..100]" = "K" }
+start   = { "T[i]" = 300.0 }
+
+[let]
+"flow[i=1..99]" = "1000*(T[i] - T[i+1])"
+
+[der]
+"T[i]"   = "flow[i-1] - flow[i] - 1e-10*(T[i]^4 - 300^4)"
+"T[1]"   = "1000*(400 - T[1]) - flow[1] - 1e-10*(T[1]^4 - 300^4)"
+"T[100]" = "flow[99] - 1e-10*(T[100]^4 - 300^4)"
+
+[tolerance]
+method   = "stiff"
+relative = 1e-6
+absolute = 1e-6
+"#;
+
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let tolerance =
         Tolerance { relative: 1e-6, absolute: 1e-6, method: IntegrationMethod::Stiff, ..Tolerance::default() };
-    let run = || integrate(&mut Rod, 0.0, END, black_box(vec![COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
-    let (end, work) = run();
-    println!("{work:?}, end {:.9}, {:.9}, {:.9}", end[0], end[CELLS / 2], end[CELLS - 1]);
-    criterion.bench_function("heat rod, 100 states, rtol 1e-6", |b| b.iter(run));
+    let compiled =
+        || integrate(&mut Rod, 0.0, END, black_box(vec![COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
+    let (end, work) = compiled();
+    println!("compiled: {work:?}, end {:.9}, {:.9}, {:.9}", end[0], end[CELLS / 2], end[CELLS - 1]);
+
+    let options: EquationsOptions = toml::from_str(TEXT).expect("the text is right");
+    let model = Equations::new(&options).expect("so are its equations");
+    let case = Case::default();
+    // Start values that are expressions are parameters without a value of their own.
+    let parameters: Vec<f64> = model.interface().parameters.iter().map(|p| p.default.unwrap_or(f64::NAN)).collect();
+    let signals = [0, CELLS / 2, CELLS - 1];
+    let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: END };
+    let equations = || model.analyse(black_box(&job)).expect("it ends");
+    let analysis = equations();
+    let response = analysis.response().expect("a simulation");
+    let ends: Vec<f64> = response.traces.iter().map(|(_, trace)| trace.last()).collect();
+    println!("equations: {:?}, end {:.9}, {:.9}, {:.9}", response.work, ends[0], ends[1], ends[2]);
+
+    let mut group = criterion.benchmark_group("heat rod, 100 states, rtol 1e-6");
+    group.bench_function("compiled", |b| b.iter(compiled));
+    group.bench_function("equations", |b| b.iter(equations));
+    group.finish();
     criterion.final_summary();
 }
