@@ -150,7 +150,7 @@ struct Events(usize);
 
 impl<D: Dynamics<f64>> Sink<f64, D> for Events {
     fn step(&mut self, _: &Step<D::State>, _: &D) {}
-    fn event(&mut self, _: f64, _: &'static str) {
+    fn event(&mut self, _: f64, _: &str) {
         self.0 += 1;
     }
 }

@@ -270,7 +270,7 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
         }
     }
 
-    fn switch(&mut self, joint: usize, t: f64, x: &mut [S; 4]) -> &'static str {
+    fn switch(&mut self, joint: usize, t: f64, x: &mut [S; 4]) -> &str {
         if self.is_stuck(joint) {
             let torque = self.holding_torque(t, x, joint);
             self.contact[joint] = if torque.value() > 0.0 { Contact::Forward } else { Contact::Backward };

@@ -189,7 +189,7 @@ impl<S: Scalar> Dynamics<S> for Loop<S> {
         self.actuator.guard(self.demand(x))
     }
 
-    fn switch(&mut self, _: usize, _: f64, x: &mut [S; 5]) -> &'static str {
+    fn switch(&mut self, _: usize, _: f64, x: &mut [S; 5]) -> &str {
         let limited = self.actuator.switch(self.demand(x));
         if limited { "torque reaches its limit" } else { "torque leaves its limit" }
     }

@@ -499,7 +499,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
         }
     }
 
-    fn switch(&mut self, index: usize, _: f64, _: &mut X) -> &'static str {
+    fn switch(&mut self, index: usize, _: f64, _: &mut X) -> &str {
         let side = if index == 0 { -1.0 } else { 1.0 };
         self.saturated = if self.saturated == side { 0.0 } else { side };
         match (index, self.saturated == 0.0) {

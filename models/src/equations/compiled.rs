@@ -40,16 +40,16 @@ pub struct Joint {
     /// Gives the torque that holds it, what breaks it away, friction while it slides, and its acceleration.
     pub balance: Program,
     /// What is reported where it comes to rest.
-    pub sticks: &'static str,
+    pub sticks: String,
     /// What is reported where it breaks away.
-    pub slides: &'static str,
+    pub slides: String,
 }
 
 /// An event of the user's.
 #[derive(Debug)]
 pub struct Happening {
     /// Its name.
-    pub name: &'static str,
+    pub name: String,
     /// Gives its guard.
     pub guard: Program,
     /// Gives the new values of these states.
@@ -111,11 +111,6 @@ fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
     groups.into_iter().map(|(_, columns)| columns).collect()
 }
 
-/// A text that lives as long as the program: events are named by it, and a study is built once.
-fn lasting(text: String) -> &'static str {
-    Box::leak(text.into_boxed_str())
-}
-
 impl Compiled {
     /// Compiles a model whose states have these names.
     ///
@@ -156,12 +151,12 @@ impl Compiled {
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
-            sticks: lasting(format!("{} sticks", names[contact.position])),
-            slides: lasting(format!("{} slides", names[contact.position])),
+            sticks: format!("{} sticks", names[contact.position]),
+            slides: format!("{} slides", names[contact.position]),
         };
         let joints = system.contacts.iter().map(|contact| joint(contact, next())).collect();
         let happening = |h: &super::system::Happening, guard, resets| Happening {
-            name: lasting(h.name.clone()),
+            name: h.name.clone(),
             guard,
             resets: (h.resets.iter().map(|(state, _)| *state).collect(), resets),
         };

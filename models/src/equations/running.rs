@@ -205,7 +205,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         }
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut X) -> &'static str {
+    fn switch(&mut self, index: usize, t: f64, x: &mut X) -> &str {
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
@@ -216,7 +216,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                     x.as_mut()[joint.contact.velocity] = S::from(0.0);
                     self.find_contacts(t, x.as_ref());
                 }
-                if self.is(joint.contact.stuck) { joint.sticks } else { joint.slides }
+                if self.is(joint.contact.stuck) { &joint.sticks } else { &joint.slides }
             }
             Guard::Switch(k) => {
                 let switch = &self.model.switches[k];
@@ -247,7 +247,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                 self.settle(t, x.as_ref());
                 let guard = self.happening_guard(k, t, x.as_ref()).value();
                 self.armed[k] = (guard > 0.0 || self.rises(k, t, x), guard.min(0.0));
-                happening.name
+                &happening.name
             }
         }
     }

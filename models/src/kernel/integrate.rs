@@ -166,9 +166,8 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
             t += step.taken;
             let delay = event_delay(dynamics, index, &step, &mut spare);
             shift(dynamics, t, &mut at, &mut spare, delay);
-            let what = dynamics.switch(index, t, &mut at);
+            sink.event(t, dynamics.switch(index, t, &mut at));
             shift(dynamics, t, &mut at, &mut spare, -delay);
-            sink.event(t, what);
             std::mem::swap(&mut x, &mut at);
             rejected = false;
             // An event within rounding of a break must not swallow it.
@@ -320,7 +319,7 @@ mod tests {
         fn guard(&self, _: usize, _: f64, x: &[S; 2]) -> S {
             x[0]
         }
-        fn switch(&mut self, _: usize, t: f64, x: &mut [S; 2]) -> &'static str {
+        fn switch(&mut self, _: usize, t: f64, x: &mut [S; 2]) -> &str {
             *x = [S::from(0.0), -x[1] * self.rebound];
             self.bounces.push(t);
             "bounce"

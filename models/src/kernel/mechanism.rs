@@ -174,7 +174,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for
         }
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut [S; M]) -> &'static str {
+    fn switch(&mut self, index: usize, t: f64, x: &mut [S; M]) -> &str {
         match self.guards[index] {
             Guard::Line(i) => {
                 let (speed, _) = self.sliding(i, x[2 * i + 1]);

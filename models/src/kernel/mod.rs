@@ -44,7 +44,7 @@ pub trait Dynamics<S: Scalar> {
 
     /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
     /// event, whose time moves too. Returns what happened; an empty text where a user need not know.
-    fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &'static str {
+    fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &str {
         ""
     }
 
@@ -146,7 +146,7 @@ pub trait Sink<S: Scalar, D: Dynamics<S>> {
         true
     }
     /// The mode changed.
-    fn event(&mut self, _t: f64, _what: &'static str) {}
+    fn event(&mut self, _t: f64, _what: &str) {}
 }
 
 /// Nobody listens.

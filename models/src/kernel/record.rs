@@ -88,7 +88,7 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
         }
     }
 
-    fn event(&mut self, t: f64, what: &'static str) {
+    fn event(&mut self, t: f64, what: &str) {
         // Events without a name are between branches of an expression, nothing that happens to the plant.
         if !what.is_empty() {
             self.events.push(Event { time: t, what: what.to_owned() });

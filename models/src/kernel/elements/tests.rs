@@ -28,7 +28,7 @@ where
         self.trace.push(step.start + step.taken, values);
     }
 
-    fn event(&mut self, t: f64, _: &'static str) {
+    fn event(&mut self, t: f64, _: &str) {
         self.events.push(t);
     }
 }
@@ -169,7 +169,7 @@ impl<E: Element> Dynamics<f64> for Through<E> {
     fn guard(&self, _: usize, t: f64, _: &[f64; 1]) -> f64 {
         self.0.guard(2.0 * t.sin(), 2.0 * t.cos())
     }
-    fn switch(&mut self, _: usize, t: f64, _: &mut [f64; 1]) -> &'static str {
+    fn switch(&mut self, _: usize, t: f64, _: &mut [f64; 1]) -> &str {
         self.0.switch(2.0 * t.sin());
         ""
     }

@@ -16,15 +16,15 @@ const FIRST: Joint = joint(["first sticks", "first slides", "first driven", "fir
 const SECOND: Joint = joint(["second sticks", "second slides", "second driven", "second braked"]);
 
 #[derive(Default)]
-struct Events(Vec<(f64, &'static str)>);
+struct Events(Vec<(f64, String)>);
 
 impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for Events {
     fn step(&mut self, _: &Step<D::State>, _: &D) {}
     fn reads_steps(&self) -> bool {
         false
     }
-    fn event(&mut self, t: f64, what: &'static str) {
-        self.0.push((t, what));
+    fn event(&mut self, t: f64, what: &str) {
+        self.0.push((t, what.to_owned()));
     }
 }
 
@@ -54,7 +54,7 @@ fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
     let amplitude = (peak - 1.0) * force / k;
     let slip = 2.0 * (std::f64::consts::PI - (amplitude * w / belt).atan()) / w;
     let stick = 2.0 * amplitude / belt;
-    let (released, what) = events.0[0];
+    let (released, what) = events.0[0].clone();
     assert!(what == "first slides" && (released - peak * force / (k * belt)).abs() < 1e-9, "{released}");
     assert!(events.0.len() >= 20);
     for (i, pair) in events.0.windows(2).enumerate() {
