@@ -1,0 +1,152 @@
+//! Cases, inputs and experiments.
+
+use super::Models;
+use super::values::{check_horizon, converted, in_range, signal_names};
+use crate::case::Case;
+use crate::diagnostic::suggestion;
+use crate::experiment::{Channel, Experiment, Input};
+use crate::model::{AnalysisKind, Parameter, Variable};
+use crate::study::draft::{CaseDraft, ChannelDraft, Measured, Mistake};
+use crate::unit::Unit;
+
+pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {
+    let mut parameters = Vec::new();
+    for (name, quantity) in &draft.parameters {
+        // In a file, an experiment has a table of them.
+        let within = |mistake: Mistake| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
+        let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
+        let parameter = known.iter().find(|p| p.variable.name == *name).ok_or_else(|| {
+            within(Mistake::new(name, format!("no model has a parameter `{name}`")))
+                .with_help(suggestion(name, known.iter().map(|p| p.variable.name.as_str())))
+        })?;
+        parameters.push((name.clone(), in_range(quantity, parameter).map_err(|m| within(m.within(name)))?));
+    }
+    let inputs = draft.inputs.iter().map(|input| build_input(input, models)).collect::<Result<_, _>>()?;
+    let experiment = match &draft.measured {
+        Some(measured) => Some(build_experiment(&draft.name, measured, models, warnings)?),
+        None => None,
+    };
+    // Frequency responses end at no time.
+    let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
+    let horizon = draft.horizon.or(end);
+    check_horizon(draft.horizon)?;
+    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon })
+}
+
+fn build_input(
+    (name, input, unit): &(String, Input, Option<Unit>),
+    models: &Models,
+) -> Result<(String, Input), Mistake> {
+    let known: Vec<&Variable> = models.iter().flat_map(|(_, m)| &m.interface().inputs).collect();
+    let variable = known.iter().find(|v| v.name == *name).ok_or_else(|| {
+        Mistake::new(name, format!("no model has an input `{name}`"))
+            .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
+            .within("inputs")
+    })?;
+    let mut input = input.clone();
+    if let Some(unit) = unit {
+        let factor = unit.factor_to(&variable.unit).ok_or_else(|| {
+            Mistake::new(name, format!("the input `{name}` is given in `{unit}`, the model takes `{}`", variable.unit))
+                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
+                .within("inputs")
+        })?;
+        match &mut input {
+            Input::Constant(value) => *value *= factor,
+            Input::Step { before, after, .. } => {
+                *before *= factor;
+                *after *= factor;
+            }
+            Input::Sine { amplitude, offset, .. } => {
+                *amplitude *= factor;
+                *offset *= factor;
+            }
+            Input::Sampled { values, .. } => values.iter_mut().for_each(|v| *v *= factor),
+        }
+    }
+    Ok((name.clone(), input))
+}
+
+fn build_experiment(
+    name: &str,
+    draft: &Measured,
+    models: &Models,
+    warnings: &mut Vec<String>,
+) -> Result<Experiment, Mistake> {
+    let known: Vec<&Variable> = models.iter().flat_map(|(_, m)| &m.interface().signals).collect();
+    let mut channels = Vec::new();
+    for channel in &draft.channels {
+        let variable = known.iter().find(|v| v.name == channel.signal).ok_or_else(|| {
+            Mistake::new(&channel.signal, format!("no model has a signal `{}`", channel.signal))
+                .with_help(suggestion(&channel.signal, known.iter().map(|v| v.name.as_str())))
+                .within("channels")
+        })?;
+        let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
+        warnings.extend(suspicious_start(name, &built));
+        channels.push(built);
+    }
+    for response in &draft.responses {
+        let known: Vec<&str> = models
+            .iter()
+            .filter(|(_, m)| m.interface().analysis == AnalysisKind::Linear)
+            .flat_map(|(_, m)| signal_names(&m.interface().signals))
+            .collect();
+        if !known.contains(&response.signal.as_str()) {
+            let fact = format!("no linear model has an output `{}`", response.signal);
+            let help = suggestion(&response.signal, known.iter().copied());
+            return Err(Mistake::new(&response.signal, fact).with_help(help).within("responses"));
+        }
+    }
+    if channels.is_empty() && draft.responses.is_empty() {
+        return Err(Mistake::new("channels", "the experiment measures nothing").with_help("name at least one channel"));
+    }
+    Ok(Experiment { channels, responses: draft.responses.clone(), role: draft.role })
+}
+
+fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
+    let factor = match &draft.unit {
+        None => 1.0,
+        Some(unit) => unit.factor_to(to).ok_or_else(|| {
+            Mistake::new("column", format!("the column is in `{unit}`, the signal `{}` in `{to}`", draft.signal))
+                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
+        })?,
+    };
+    let noise = match &draft.noise {
+        None => None,
+        Some(noise) => {
+            let value = converted(noise, to).map_err(|m| m.within("noise"))?;
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}"))
+                    .with_help("leave `noise` out where it is not known; `mops data` estimates it"));
+            }
+            Some(value)
+        }
+    };
+    let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
+    let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, value * factor)).unzip();
+    if let Some(early) = times.first().filter(|&&t| t < 0.0) {
+        return Err(Mistake::new("column", format!("the first sample is at {early} s, before the simulation begins"))
+            .with_help("a simulation begins at 0 s: leave `reset-time` away, or cut with `from`"));
+    }
+    if times.len() < 2 {
+        let count = if times.is_empty() { "no sample" } else { "one sample" };
+        return Err(Mistake::new("column", format!("{count} of the column is left, and two are needed"))
+            .with_help("the others are gaps, or cut off by `from`, `to` and `skip`"));
+    }
+    Ok(Channel { signal: draft.signal.clone(), times, values, noise })
+}
+
+/// The thesis (4.2.3) found the very first sample wrong: say so where it lies far from what the next ones lead to.
+fn suspicious_start(experiment: &str, channel: &Channel) -> Option<String> {
+    let v = &channel.values;
+    if v.len() < 8 {
+        return None;
+    }
+    let expected = 2.0 * v[1] - v[2];
+    let typical = (2..7).map(|i| (v[i + 1] - 2.0 * v[i] + v[i - 1]).abs()).fold(0.0, f64::max);
+    ((v[0] - expected).abs() > 10.0 * typical && typical > 0.0).then(|| {
+        format!(
+            "the first sample of `{}` in `{experiment}` ({}) lies far from the next ones ({}, {}); drop it with `skip = 1`",
+            channel.signal, v[0], v[1], v[2]
+        )
+    })
+}

@@ -1,0 +1,90 @@
+//! Jobs: what is simulated, and where its parameters come from.
+
+use super::values::signal_names;
+use crate::diagnostic::suggestion;
+use crate::model::{AnalysisKind, Interface, Variable};
+use crate::study::draft::Mistake;
+use crate::study::{JobPlan, ParameterSource, Study};
+
+/// The job of a model in a case, made at the first need and still to be completed; the signals are added to those it
+/// computes.
+pub(super) fn job(
+    study: &mut Study,
+    model: usize,
+    case: usize,
+    wanted: &[String],
+    signals: &[Variable],
+) -> Result<usize, Mistake> {
+    let wanted = wanted.iter().map(|name| {
+        signals.iter().position(|s| s.name == *name).ok_or_else(|| {
+            Mistake::new("signal", format!("the model has no signal `{name}`"))
+                .with_help(suggestion(name, signal_names(signals)))
+        })
+    });
+    let wanted: Vec<usize> = wanted.collect::<Result<_, _>>()?;
+    let index = match study.jobs.iter().position(|j| j.model == model && j.case == case) {
+        Some(index) => index,
+        None => {
+            study.jobs.push(JobPlan { model, case, parameters: Vec::new(), signals: Vec::new(), horizon: 0.0 });
+            study.jobs.len() - 1
+        }
+    };
+    let job = &mut study.jobs[index];
+    job.signals.extend(wanted);
+    job.signals.sort_unstable();
+    job.signals.dedup();
+    Ok(index)
+}
+
+/// Gives a job its horizon and its parameters.
+pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), Mistake> {
+    let JobPlan { model, case, .. } = study.jobs[index];
+    let interface = study.models[model].1.interface();
+    let horizon = match (study.cases[case].horizon.or(interface.horizon), interface.analysis) {
+        (Some(horizon), _) => horizon,
+        (None, AnalysisKind::Linear) => 0.0,
+        (None, AnalysisKind::Time) => {
+            let fact = format!("nothing says how long `{}` is simulated", study.cases[case].name);
+            return Err(Mistake::here(fact).with_help("give the case or the model a `horizon`"));
+        }
+    };
+    let parameters = sources(study, interface, fixed, case)?;
+    let job = &mut study.jobs[index];
+    (job.horizon, job.parameters) = (horizon, parameters);
+    Ok(())
+}
+
+/// Where each parameter comes from: a tuner of the case, a value in the case, a tuner of the study, the model's table,
+/// the default.
+fn sources(
+    study: &Study,
+    interface: &Interface,
+    fixed: &[(String, f64)],
+    case: usize,
+) -> Result<Vec<ParameterSource>, Mistake> {
+    let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+    interface
+        .parameters
+        .iter()
+        .map(|p| {
+            let name = &p.variable.name;
+            let tuner = |of: Option<usize>| study.tuners.iter().position(|t| t.parameter == *name && t.case == of);
+            if let Some(tuner) = tuner(Some(case)) {
+                let factor = study.tuners[tuner].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
+                return Ok(ParameterSource::Tuner { tuner, factor });
+            }
+            if let Some(value) = find(&study.cases[case].parameters, name) {
+                return Ok(ParameterSource::Constant(value));
+            }
+            if let Some(tuner) = tuner(None) {
+                let factor = study.tuners[tuner].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
+                return Ok(ParameterSource::Tuner { tuner, factor });
+            }
+            find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
+                Mistake::here(format!("nothing gives a value to `{name}` in `{}`", study.cases[case].name)).with_help(
+                    format!("make `{name}` a tuner, or give it a value in the case or in the model's `parameters`"),
+                )
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,101 @@
+//! Checks a draft: every name, size, bound and unit, before anything runs.
+
+mod cases;
+mod criteria;
+mod jobs;
+mod tuners;
+mod values;
+
+use std::sync::Arc;
+
+use crate::case::Case;
+use crate::model::{Interface, Model};
+use crate::study::draft::{CaseDraft, Draft, Mistake};
+use crate::study::{JobPlan, Objective, Study, Task, Tasks, tasks};
+use cases::build_case;
+use criteria::add_rows;
+use jobs::complete;
+use tuners::{build_tuner, check_use, free_start, tie_tuners};
+use values::{check_horizon, fixed_values, section};
+
+type Models = [(String, Arc<dyn Model>)];
+
+pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
+    if draft.models.is_empty() {
+        return Err(Mistake::new("models", "the study has no model")
+            .with_help("add a table such as [models.loop.pid-loop]; `mops list` names the kinds"));
+    }
+    let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
+    let mut fixed = Vec::new();
+    for (name, draft) in draft.models {
+        let Interface { parameters, horizon, .. } = draft.model.interface();
+        let within = |mistake: Mistake| mistake.within(&name).within("models");
+        check_horizon(*horizon).map_err(within)?;
+        fixed.push(fixed_values(&draft.parameters, parameters).map_err(|m| within(m.within("parameters")))?);
+        models.push((name, Arc::from(draft.model)));
+    }
+    let mut warnings = Vec::new();
+    let drafts = if draft.cases.is_empty() {
+        vec![CaseDraft { name: "nominal".into(), ..CaseDraft::default() }]
+    } else {
+        draft.cases
+    };
+    let cases: Vec<Case> = drafts
+        .iter()
+        .map(|case| build_case(case, &models, &mut warnings).map_err(|m| m.within(&case.name).within(section(case))))
+        .collect::<Result<_, _>>()?;
+
+    check_use(&draft.tuners, &models)?;
+    let mut tuners = Vec::new();
+    for (name, tuner) in &draft.tuners {
+        build_tuner(name, tuner, &models, &cases, &mut tuners).map_err(|m| m.within(name).within("tuners"))?;
+    }
+    tie_tuners(&draft.tuners, &mut tuners)?;
+    for (index, (case, case_draft)) in cases.iter().zip(&drafts).enumerate() {
+        for free in case_draft.measured.iter().flat_map(|m| &m.free) {
+            let tuner = free_start(free, index, case, &models)
+                .map_err(|m| m.within("free").within(&case.name).within("experiments"))?;
+            tuners.push(tuner);
+        }
+    }
+
+    let objective =
+        draft.objective.unwrap_or(match draft.task {
+            Task::Design => Objective::Max,
+            Task::Calibration => Objective::Sum,
+            // As the study of which they tell would be solved.
+            Task::Excitation | Task::Sensitivity | Task::Sweep => {
+                if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
+            }
+        });
+    let mut study = Study {
+        name: draft.name,
+        task: draft.task,
+        objective,
+        seed: draft.seed,
+        models,
+        cases,
+        tuners,
+        rows: Vec::new(),
+        jobs: Vec::new(),
+        tasks: Tasks::default(),
+        warnings,
+    };
+    // How rich an input is can be told without a criterion.
+    if draft.criteria.is_empty() && study.task != Task::Excitation {
+        return Err(Mistake::new("criteria", "the study has no criterion").with_help(
+            "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
+        ));
+    }
+    for (name, criterion) in draft.criteria {
+        add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
+    }
+    for index in 0..study.jobs.len() {
+        let JobPlan { model, case, .. } = study.jobs[index];
+        complete(&mut study, index, &fixed[model])
+            .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
+    }
+    study.rows.sort_by_key(|row| study.jobs[row.job].case);
+    study.tasks = tasks::build(draft.tasks, &study)?;
+    Ok(study)
+}

@@ -1,0 +1,260 @@
+//! Tuners, their ties, and free start values.
+
+use super::Models;
+use super::values::{check_range, converted, names, parameter};
+use crate::case::Case;
+use crate::diagnostic::suggestion;
+use crate::experiment::Experiment;
+use crate::expression::Expression;
+use crate::model::Parameter;
+use crate::study::draft::{Free, Mistake, TunerDraft};
+use crate::tuner::{Grid, Scale, Tuner};
+use crate::unit::{Quantity, Unit};
+
+/// Adds the tuner, or one for every case.
+pub(super) fn build_tuner(
+    name: &str,
+    draft: &TunerDraft,
+    models: &Models,
+    cases: &[Case],
+    tuners: &mut Vec<Tuner>,
+) -> Result<(), Mistake> {
+    let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
+    let parameter = known.iter().find(|p| p.variable.name == name);
+    let unit = match (&draft.unit, parameter) {
+        (Some(unit), Some(p)) if !unit.is_compatible(&p.variable.unit) => {
+            return Err(Mistake::new(
+                "unit",
+                format!("`{name}` is in `{}` in the model, not in `{unit}`", p.variable.unit),
+            )
+            .with_help("give a unit that converts to it, or leave `unit` out"));
+        }
+        (Some(unit), _) => unit.clone(),
+        (None, Some(p)) => p.variable.unit.clone(),
+        (None, None) => Unit::one(),
+    };
+    let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, Mistake> {
+        let Some(quantity) = quantity else { return Ok(None) };
+        let value = converted(quantity, &unit).map_err(|m| m.within(key))?;
+        if value.is_finite() {
+            Ok(Some(value))
+        } else {
+            Err(Mistake::new(key, format!("`{key}` must be a finite number, not {value}"))
+                .with_help("every tuner moves between two finite bounds"))
+        }
+    };
+    let (start, mut min, mut max) =
+        (value("start", &draft.start)?, value("min", &draft.min)?, value("max", &draft.max)?);
+    let mut grid = if draft.integer { Grid::Integer } else { Grid::Continuous };
+    if let Some(list) = &draft.values {
+        let mut values: Vec<f64> = Vec::new();
+        for quantity in list {
+            values.push(converted(quantity, &unit).map_err(|m| m.within("values"))?);
+        }
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if values.len() < 2 {
+            return Err(Mistake::new("values", "a tuner needs at least two different values")
+                .with_help("add values, or say `active = false` to keep the one"));
+        }
+        (min, max) = (values.first().copied(), values.last().copied());
+        grid = Grid::List(values);
+    }
+    if let (Some(_), Some(key)) =
+        (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
+    {
+        return Err(Mistake::new(key.0, format!("a tied tuner follows others and has no `{}` of its own", key.0))
+            .with_help(format!("remove `{}`, or remove `tie`", key.0)));
+    }
+    let fixed = draft.inactive || draft.tie.is_some();
+    let start = match (start, &draft.tie) {
+        (Some(start), _) => start,
+        (None, Some(_)) => f64::NAN,
+        (None, None) => return Err(Mistake::here("the tuner has no start value").with_help("add `start = ...`")),
+    };
+    let bounds = match (min, max) {
+        (Some(min), Some(max)) => [min, max],
+        _ if fixed => [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)],
+        (None, Some(_)) => return Err(Mistake::here("the tuner has no lower bound").with_help("add `min = ...`")),
+        (Some(_), None) => return Err(Mistake::here("the tuner has no upper bound").with_help("add `max = ...`")),
+        (None, None) => {
+            return Err(Mistake::here("the tuner has no bounds").with_help("add `min = ...` and `max = ...`"));
+        }
+    };
+    let [min, max] = bounds;
+    if max <= min {
+        return Err(Mistake::new("max", format!("the range is empty: min is {min}, max is {max}")).with_help(
+            if max < min { "swap the bounds" } else { "widen the range, or say `active = false` to keep the value" },
+        ));
+    }
+    if !fixed && !(min..=max).contains(&start) {
+        let (start, max) = (unit.amount(start), unit.amount(max));
+        return Err(Mistake::new("start", format!("the start value {start} is outside the bounds, {min} to {max}"))
+            .with_help("correct it, or widen the bounds"));
+    }
+    let off_grid = match &grid {
+        Grid::Continuous => None,
+        Grid::Integer => {
+            let is_fraction = |(_, value): &(&str, f64)| value.fract() != 0.0;
+            let found = [("start", start), ("min", min), ("max", max)].into_iter().find(is_fraction);
+            found.map(|(key, value)| {
+                (key, value, "with `integer = true`, all of `start`, `min` and `max` are whole numbers")
+            })
+        }
+        Grid::List(values) => (!values.contains(&start)).then_some(("start", start, "start at one of `values`")),
+    };
+    if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
+        return Err(Mistake::new(key, format!("the tuner cannot be at {}", unit.amount(value))).with_help(way_out));
+    }
+    if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
+        return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
+            .with_help("raise `min`, or leave `scale` out"));
+    }
+    if let Some(parameter) = parameter {
+        let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
+        for (key, bound) in [("min", min), ("max", max)] {
+            if bound.is_finite() {
+                check_range(bound * factor, parameter).map_err(|m| m.within(key))?;
+            }
+        }
+    }
+    let tuner = Tuner {
+        name: name.to_owned(),
+        parameter: name.to_owned(),
+        start,
+        bounds,
+        scale: draft.scale,
+        grid,
+        unit,
+        case: None,
+        active: !fixed,
+        tie: None,
+    };
+    if draft.per_case {
+        for (index, case) in cases.iter().enumerate() {
+            tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), ..tuner.clone() });
+        }
+    } else {
+        tuners.push(tuner);
+    }
+    Ok(())
+}
+
+/// Every tuner must set a parameter, or be followed by one that does.
+pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Result<(), Mistake> {
+    let known: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
+    let ties: Vec<Expression> =
+        drafts.iter().filter_map(|(_, draft)| Expression::parse(draft.tie.as_ref()?).ok()).collect();
+    for (name, _) in drafts {
+        let followed = ties.iter().any(|tie| tie.names().contains(name));
+        if !followed && !known.contains(&name.as_str()) {
+            return Err(Mistake::new(name, format!("no model has a parameter `{name}`"))
+                .with_help(suggestion(name, known.iter().copied()))
+                .within("tuners"));
+        }
+    }
+    Ok(())
+}
+
+/// Binds the expressions of tied tuners, in an order in which each follows what it names.
+pub(super) fn tie_tuners(drafts: &[(String, TunerDraft)], tuners: &mut [Tuner]) -> Result<(), Mistake> {
+    for (position, (name, draft)) in drafts.iter().enumerate() {
+        let Some(text) = &draft.tie else { continue };
+        let wrong =
+            |message: String, help: &str| Mistake::new("tie", message).with_help(help).within(name).within("tuners");
+        let expression = Expression::parse(text).map_err(|e| wrong(e.message, "as in tie = \"2*Ti + 0.1\""))?;
+        let mut of = Vec::new();
+        for used in expression.names() {
+            let earlier: Vec<&str> = drafts[..position].iter().map(|(n, _)| n.as_str()).collect();
+            if used == name {
+                return Err(wrong("a tuner cannot follow itself".to_owned(), "name tuners that stand before it"));
+            }
+            if drafts[position..].iter().any(|(n, _)| n == used) {
+                let fact = format!("`{used}` stands after this tuner");
+                return Err(wrong(fact, &format!("a tie names tuners that stand before it: move `{used}` up")));
+            }
+            if !earlier.contains(&used.as_str()) {
+                return Err(wrong(format!("there is no tuner `{used}`"), &suggestion(used, earlier.iter().copied())));
+            }
+            of.push(tuners.iter().position(|t| t.name == *used).ok_or_else(|| {
+                wrong(format!("`{used}` has a value of its own in every case"), "tie to tuners of the whole study")
+            })?);
+        }
+        for tuner in tuners.iter_mut().filter(|t| t.parameter == *name) {
+            tuner.tie = Some((expression.clone(), of.clone()));
+        }
+    }
+    Ok(())
+}
+
+/// The tuner of a free start value; guess and bounds from the data where the study gives none.
+pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result<Tuner, Mistake> {
+    let states: Vec<_> = models.iter().flat_map(|(_, m)| m.interface().states.iter().map(move |s| (m, s))).collect();
+    let (model, state) = states.iter().find(|(_, s)| s.name == free.state).ok_or_else(|| {
+        Mistake::new(&free.state, format!("no model has a state `{}`", free.state))
+            .with_help(suggestion(&free.state, states.iter().map(|(_, s)| s.name.as_str())))
+    })?;
+    let parameter =
+        parameter(&model.interface().parameters, &state.start).expect("a state's start value is a parameter");
+    let unit = parameter.variable.unit.clone();
+    let given = |key: &str, q: &Option<Quantity>| {
+        q.as_ref().map(|q| converted(q, &unit).map_err(|m| m.within(key).within(&free.state))).transpose()
+    };
+    let (start, min, max) = (given("start", &free.start)?, given("min", &free.min)?, given("max", &free.max)?);
+    let in_case = case.parameters.iter().find(|(name, _)| *name == state.start).map(|(_, value)| *value);
+    let experiment = case.experiment.as_ref().expect("only experiments have free start values");
+    let guess = guess_start(state.signal.as_deref(), state.rate_of.as_deref(), experiment);
+    let (start, spread) = match (start.or(in_case), guess) {
+        (Some(start), Some((_, spread))) => (start, spread),
+        (None, Some(guess)) => guess,
+        (start, None) if min.is_some() && max.is_some() => {
+            (start.unwrap_or(0.5 * (min.unwrap_or(0.0) + max.unwrap_or(0.0))), 0.0)
+        }
+        _ => {
+            return Err(Mistake::new(&free.state, format!("nothing measured tells where `{}` starts", free.state))
+                .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
+        }
+    };
+    let [low, high] = parameter.range;
+    let bounds = [min.unwrap_or((start - spread).max(low)), max.unwrap_or((start + spread).min(high))];
+    if bounds[0] >= bounds[1] || !(bounds[0]..=bounds[1]).contains(&start) {
+        return Err(Mistake::new(
+            &free.state,
+            format!(
+                "the start value {} does not lie inside its bounds, {} to {}",
+                unit.amount(start),
+                bounds[0],
+                unit.amount(bounds[1])
+            ),
+        )
+        .with_help("correct `start`, `min` and `max`; what is left out is read off the data"));
+    }
+    Ok(Tuner {
+        name: format!("{}/{}", case.name, state.start),
+        parameter: state.start.clone(),
+        start,
+        bounds,
+        scale: Scale::Linear,
+        grid: Grid::Continuous,
+        unit,
+        case: Some(index),
+        active: true,
+        tie: None,
+    })
+}
+
+/// First value and half-width of the search: of a measured state, its first sample and half its range; of the rate of a
+/// measured signal, the slope over the first samples and the largest slope anywhere.
+fn guess_start(signal: Option<&str>, rate_of: Option<&str>, experiment: &Experiment) -> Option<(f64, f64)> {
+    if let Some(channel) = signal.and_then(|s| experiment.channel(s)) {
+        let (min, max) = channel.values.iter().fold((f64::MAX, f64::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        let floor = 4.0 * channel.noise.unwrap_or(0.0) + 1e-6 * max.abs().max(min.abs());
+        return Some((channel.values[0], (0.5 * (max - min)).max(floor).max(f64::MIN_POSITIVE)));
+    }
+    let channel = rate_of.and_then(|s| experiment.channel(s))?;
+    let slope = |i: usize, j: usize| (channel.values[j] - channel.values[i]) / (channel.times[j] - channel.times[i]);
+    let n = channel.values.len();
+    let span = (n - 1).min(3);
+    let largest = (0..n - span).map(|i| slope(i, i + span).abs()).fold(0.0, f64::max);
+    Some((slope(0, span), (1.5 * largest).max(f64::MIN_POSITIVE)))
+}

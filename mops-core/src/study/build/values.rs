@@ -1,0 +1,85 @@
+//! Names, units and ranges of single values.
+
+use crate::diagnostic::suggestion;
+use crate::model::{Parameter, Variable};
+use crate::study::draft::{CaseDraft, Mistake};
+use crate::unit::{Quantity, Unit};
+
+pub(super) fn section(case: &CaseDraft) -> &'static str {
+    if case.measured.is_some() { "experiments" } else { "cases" }
+}
+
+pub(super) fn parameter<'a>(parameters: &'a [Parameter], name: &str) -> Option<&'a Parameter> {
+    parameters.iter().find(|p| p.variable.name == name)
+}
+
+pub(super) fn names(parameters: &[Parameter]) -> impl Iterator<Item = &str> + Clone {
+    parameters.iter().map(|p| p.variable.name.as_str())
+}
+
+pub(super) fn signal_names(signals: &[Variable]) -> impl Iterator<Item = &str> + Clone {
+    signals.iter().map(|s| s.name.as_str())
+}
+
+pub(super) fn check_horizon(end: Option<f64>) -> Result<(), Mistake> {
+    match end {
+        Some(end) if !(end.is_finite() && end > 0.0) => {
+            Err(Mistake::new("horizon", format!("a simulation must end after its start, not at {end} s"))
+                .with_help("it starts at 0 s; give the time of its end, such as \"60 s\""))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Values of a model's parameters that the study fixes, in the parameters' units.
+pub(super) fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) -> Result<Vec<(String, f64)>, Mistake> {
+    given
+        .iter()
+        .map(|(name, quantity)| {
+            let parameter = parameter(known, name).ok_or_else(|| {
+                Mistake::new(name, format!("the model has no parameter `{name}`"))
+                    .with_help(suggestion(name, names(known)))
+            })?;
+            Ok((name.clone(), in_range(quantity, parameter).map_err(|m| m.within(name))?))
+        })
+        .collect()
+}
+
+/// The value of a parameter, in its unit.
+pub(super) fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64, Mistake> {
+    let value = converted(quantity, &parameter.variable.unit)?;
+    check_range(value, parameter)?;
+    Ok(value)
+}
+
+pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mistake> {
+    let [low, high] = parameter.range;
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    let Variable { name, unit, about } = &parameter.variable;
+    let wanted = if high < f64::INFINITY {
+        format!("lie between {low} and {}", unit.amount(high))
+    } else if low == 0.0 {
+        "not be negative".to_owned()
+    } else if low == f64::MIN_POSITIVE {
+        "be positive".to_owned()
+    } else if low > f64::NEG_INFINITY {
+        format!("be at least {}", unit.amount(low))
+    } else {
+        "be a number".to_owned()
+    };
+    Err(Mistake::here(format!("`{name}` must {wanted}, not {}", unit.amount(value)))
+        .with_help(format!("`{name}` is: {about}")))
+}
+
+/// The number in `unit`.
+pub(super) fn converted(quantity: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
+    quantity.to(unit).map_err(|why| {
+        let unit = unit.to_string();
+        Mistake::here(why).with_help(match unit.as_str() {
+            "1" => "write a pure number".to_owned(),
+            _ => format!("a number without a unit counts in `{unit}`"),
+        })
+    })
+}
