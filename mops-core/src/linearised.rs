@@ -96,6 +96,10 @@ impl Linearised {
         for name in &options.free {
             free[place(name).map_err(|m| m.within("free"))?] = true;
         }
+        if options.equilibrium && !free.contains(&true) {
+            return Err(Mistake::new("equilibrium", "every state and input is held: nothing is left to move")
+                .with_help("name fewer under `at`, or add one to `free`"));
+        }
         let start_of = |state: &Variable| {
             let start = &of.states.iter().find(|s| s.name == state.name)?.start;
             of.parameters.iter().position(|p| p.variable.name == *start)

@@ -93,7 +93,7 @@ impl Multistart {
         let (centre, objective) = best;
         let Round { begun, idle, objective: before } = self.round;
         let idle = if objective < before * (1.0 - 1e-3) { 0 } else { idle + 1 };
-        if idle > Round::IDLE || centre.is_empty() {
+        if idle >= Round::IDLE || centre.is_empty() {
             return Ok(false);
         }
         self.round = Round { begun: begun + 1, idle, objective };

@@ -50,10 +50,10 @@ impl Key {
             Some(text) => index(text.trim()).ok_or_else(|| wrong_bracket(key))?,
         };
         match index {
-            Index::Range(_, from, to) if from > to || to - from >= LARGEST => Err(Mistake::here(format!(
-                "a family has between 1 and {LARGEST} members, not those from {from} to {to}"
-            ))
-            .with_help("as in \"T[1..100]\"")),
+            Index::Range(_, from, to) if from > to || to.checked_sub(from).is_none_or(|n| n >= LARGEST) => Err(
+                Mistake::here(format!("a family has between 1 and {LARGEST} members, not those from {from} to {to}"))
+                    .with_help("as in \"T[1..100]\""),
+            ),
             index => Ok(Self { name: name.to_owned(), index }),
         }
     }

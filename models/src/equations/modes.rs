@@ -104,6 +104,16 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// Whether equations that are solved together have a solution here.
     pub fn check_start(&self, x: &X) -> Result<(), Failure> {
+        for joint in &self.model.joints {
+            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, 0.0, x.as_ref()).map(Scalar::value);
+            if coulomb < 0.0 || limit < coulomb {
+                return Err(Failure::Undefined(format!(
+                    "where it {}, its friction is {coulomb} and breaks away at {limit}: `coulomb` must not be negative, \
+                     and `peak` at least 1",
+                    joint.slides
+                )));
+            }
+        }
         let mut slope = x.clone();
         self.derivative(0.0, x, &mut slope);
         if slope.as_ref().iter().all(|d| d.value().is_finite()) {

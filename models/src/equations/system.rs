@@ -203,6 +203,9 @@ fn joints(graph: &Graph, rows: &[Row]) -> Vec<(usize, usize)> {
     rows.iter().enumerate().filter_map(pair).collect()
 }
 
+/// Joints with dry friction that one model can have: of every joint at rest three ways to go on are tried.
+const MOST_CONTACTS: usize = 8;
+
 fn friction(
     l: &mut Lowering<'_>,
     d: &Definition,
@@ -243,6 +246,13 @@ fn friction(
             None => coulomb,
         };
         let ((direction, _), (stuck, _)) = (l.mode(), l.mode());
+        if contacts.len() == MOST_CONTACTS {
+            let fact =
+                format!("at most {MOST_CONTACTS} joints can have dry friction: all their ways to stick are tried");
+            return Err(
+                under(&friction.path, Mistake::here(fact)).with_help("keep `coulomb` where joints come to rest")
+            );
+        }
         contacts.push(Contact { position, velocity, direction, stuck, coulomb, limit, torque: coulomb });
     }
     Ok(contacts)

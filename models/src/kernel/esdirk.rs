@@ -301,15 +301,19 @@ impl<X: Clone> Esdirk<X> {
     {
         for _ in 0..ITERATIONS {
             self.newton_step(f, t, h, z, work);
-            let (mut moved, mut size) = (0.0_f64, 0.0_f64);
             for (z, d) in z.as_mut().iter_mut().zip(self.update.as_ref()) {
                 *z += *d - d.value();
-                moved = d.tangents().iter().fold(moved, |m, t| m.max(t.abs()));
-                size = z.tangents().iter().fold(size, |m, t| m.max(t.abs()));
             }
-            if moved <= NEWTON * tolerance.relative * size {
+            let largest =
+                |x: &X, direction: usize| x.as_ref().iter().fold(0.0, |m: f64, x| m.max(x.tangents()[direction].abs()));
+            let arrived = |d: usize| largest(&self.update, d) <= NEWTON * tolerance.relative * largest(z, d);
+            if (0..S::DIRECTIONS).all(arrived) {
                 return;
             }
+        }
+        // Slopes that did not converge are none: whoever asked falls back on differences.
+        for z in z.as_mut() {
+            (0..S::DIRECTIONS).for_each(|direction| z.set_tangent(direction, f64::NAN));
         }
     }
 

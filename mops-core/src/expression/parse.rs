@@ -184,11 +184,29 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
         };
         return wrong(span.clone(), format!("`{name}` takes {wanted}, not {count}"));
     }
+    if function == Function::Table {
+        let places: Vec<_> = arguments.iter().skip(1).step_by(2).map(|x| (literal(x), x.span.clone())).collect();
+        for pair in places.windows(2) {
+            let [(Some(a), _), (Some(b), at)] = pair else { continue };
+            if b <= a {
+                return wrong(at.clone(), format!("the x of a `table` must rise, but {b} follows {a}"));
+            }
+        }
+    }
     let checked = arguments.into_iter().enumerate().map(|(i, argument)| {
         let is_condition = function == Function::If && i % 2 == 0 && i + 1 < count;
         if is_condition { condition_of(argument) } else { number_of(argument) }
     });
     Ok(Form::Call(function, checked.collect::<Result<_, _>>()?))
+}
+
+/// The number that stands there as such.
+fn literal(argument: &Spanned) -> Option<f64> {
+    match &argument.raw {
+        Raw::Number(number) => Some(*number),
+        Raw::Negative(of) => literal(of).map(|number| -number),
+        _ => None,
+    }
 }
 
 fn expected(what: &'static str) -> StrContext {

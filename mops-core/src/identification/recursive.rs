@@ -32,7 +32,7 @@ impl Recursive {
         Self { theta: DVector::zeros(n), p: DMatrix::identity(n, n) * p, forgetting }
     }
 
-    /// Takes a sample in: equations 3.3 and 3.4 of the recursion. Returns the error of its prediction.
+    /// Takes a sample in: lines 2 and 3 of the recursion. Returns the error of its prediction.
     pub fn update(&mut self, phi: &DVector<f64>, y: f64) -> f64 {
         let error = y - phi.dot(&self.theta);
         let p_phi = &self.p * phi;

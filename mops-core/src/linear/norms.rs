@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{Complex, FrequencyResponse, StateSpace, eigenvalues};
+use super::system::{above, beside};
+use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, zeros};
 
 /// A largest gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,8 +116,21 @@ pub(super) fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
 pub(super) fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     let (n, m) = (a.nrows(), b.ncols());
-    let Some(r) = (DMatrix::identity(m, m) * (level * level) - d.transpose() * d).try_inverse() else {
-        return Ok(Vec::new());
+    let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * z.norm();
+    let rest = DMatrix::identity(m, m) * (level * level) - d.transpose() * d;
+    let Some(r) = rest.clone().try_inverse() else {
+        // A level that the gain tends to for high frequencies: the zeros of `G(-s)' G(s) - level^2`.
+        let mut product = DMatrix::zeros(2 * n, 2 * n);
+        product.view_mut((0, 0), (n, n)).copy_from(a);
+        product.view_mut((n, 0), (n, n)).copy_from(&(-(c.transpose() * c)));
+        product.view_mut((n, n), (n, n)).copy_from(&-a.transpose());
+        let inputs = above(b, &-(c.transpose() * d));
+        let outputs = beside(&(d.transpose() * c), &b.transpose());
+        return Ok(zeros(&StateSpace::new(product, inputs, outputs, -rest))?
+            .iter()
+            .filter(|z| near(z))
+            .map(|z| z.im)
+            .collect());
     };
     let closed = a + b * &r * d.transpose() * c;
     let lower = c.transpose() * (DMatrix::identity(c.nrows(), c.nrows()) + d * &r * d.transpose()) * c;
@@ -126,7 +140,6 @@ pub(super) fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f
     hamiltonian.view_mut((0, n), (n, n)).copy_from(&(b * r * b.transpose() * level));
     hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-lower / level));
     hamiltonian.view_mut((n, n), (n, n)).copy_from(&-closed.transpose());
-    let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * z.norm();
     Ok(eigenvalues(&hamiltonian)?.iter().filter(|z| near(z)).map(|z| z.im).collect())
 }
 
@@ -149,6 +162,14 @@ mod tests {
             assert_near(peak.gain / exact, 1.0, 1e-9);
             assert_near(peak.frequency, w * (1.0 - 2.0 * z * z).sqrt(), 1e-4 * w);
         }
+    }
+
+    #[test]
+    fn a_level_that_the_gain_tends_to_is_passed_where_it_is() {
+        // |(s^2 + 0.2 s + 2)/(s^2 + 2 s + 1)| = 1 where 3 = 5.96 w^2.
+        let system = TransferFunction::new(vec![1.0, 0.2, 2.0], vec![1.0, 2.0, 1.0]).state_space().unwrap();
+        let passed = level_frequencies(&system, 1.0).unwrap();
+        assert!(passed.iter().any(|w| (w - (3.0f64 / 5.96).sqrt()).abs() < 1e-9), "{passed:?}");
     }
 
     #[test]

@@ -15,6 +15,9 @@ use super::{Complex, Schur, eigenvalues, lyapunov};
 /// weighted.
 pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
     let n = a.nrows();
+    if n == 0 {
+        return Ok(DMatrix::zeros(0, 0));
+    }
     let symmetric = |m: &DMatrix<f64>| (m - m.transpose()).norm() <= 1e-12 * m.norm();
     if !symmetric(q) || !symmetric(r) {
         return Err("the weights of states and inputs must be symmetric".to_owned());
