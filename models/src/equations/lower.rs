@@ -39,6 +39,9 @@ pub struct Switch {
     pub jumps: bool,
 }
 
+/// Definitions within definitions that one may lead to: each takes a part of the stack.
+const DEEPEST: usize = 200;
+
 #[derive(Debug, Clone, Copy)]
 enum Meaning {
     State(usize),
@@ -355,6 +358,12 @@ impl<'d> Lowering<'d> {
                     ));
                 }
                 None => {
+                    let open = self.lets.values().filter(|visit| matches!(visit, Visit::Open)).count();
+                    if open >= DEEPEST {
+                        let fact = format!("definitions are nested more than {DEEPEST} deep");
+                        let help = "make the sum a family of states, or take it in parts";
+                        return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
+                    }
                     self.lets.insert((i, kinks), Visit::Open);
                     let definition: &'d Definition = self.definition;
                     let text = &definition.lets[i].1;

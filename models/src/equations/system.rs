@@ -158,6 +158,13 @@ impl System {
             d.start.get(name).map(|text| l.fixed(text, &format!("the start value of `{name}`"))).transpose()
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
+        // Definitions that nothing uses are checked too; what they would switch is forgotten.
+        let (switches, modes) = (l.switches.len(), l.modes);
+        for (_, text) in &d.lets {
+            l.text(text)?;
+        }
+        l.switches.truncate(switches);
+        l.modes = modes;
         let Lowering { graph, switches, modes, .. } = l;
         Ok(Self { graph, switches, modes, derivatives, signals, contacts, happenings, starts, joints, matrices })
     }

@@ -476,7 +476,7 @@ fn every_mistake_names_its_place() {
     };
     let base = "states = { x = 'm', v = 'm/s' }\n";
     type Wrong = (&'static str, &'static str, Option<(usize, usize)>, &'static str);
-    let cases: [Wrong; 14] = [
+    let cases: [Wrong; 16] = [
         ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
         ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
         ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),
@@ -490,6 +490,8 @@ fn every_mistake_names_its_place() {
         ("der = { x = 'v', v = '0' }\nstart = { x = '2*v' }", "start.x", Some((2, 3)), "parameters and constants only"),
         ("der = { x = 'v', v = '0' }\nfriction.v2 = { coulomb = 1 }", "friction.v2", None, "friction needs a joint"),
         ("parameters = { x0 = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x0", None, "start value"),
+        ("der = { x = 'v', v = '0' }\nlet = { unused = 'qq' }", "let.unused", Some((0, 2)), "no quantity `qq`"),
+        ("der = { x = 'v', v = 'table(x, 1, 2, 0, 3)' }", "der.v", Some((15, 16)), "must rise, but 0 follows 1"),
         ("der = { x = 'v', v = '0' }\nmass = { v = '1' }", "mass.v", None, "a row and a column"),
     ];
     for (text, path, span, words) in cases {

@@ -86,11 +86,6 @@ impl FrequencyResponse {
     pub fn scalar(&self, omega: f64) -> Complex {
         self.at_frequency(omega)[(0, 0)]
     }
-
-    /// The responses at several angular frequencies, rad/s.
-    pub fn sweep(&self, omegas: &[f64]) -> Vec<DMatrix<Complex>> {
-        omegas.iter().map(|&omega| self.at_frequency(omega)).collect()
-    }
 }
 
 #[cfg(test)]
