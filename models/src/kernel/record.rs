@@ -29,16 +29,19 @@ pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure
     model.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
 }
 
-/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: eight directions, or four where that is enough, in
-/// one simulation.
+/// Directions that one simulation carries: a compromise between many tuners and few. Every width is compiled for every
+/// model, which takes long, so that there is one.
+const DIRECTIONS: usize = 6;
+
+/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: six directions in one simulation.
 ///
 /// # Errors
 /// The failure of the simulation.
 pub fn tangents(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
     let mut analysis = None;
     let mut tangents = Vec::with_capacity(seeds.len());
-    for seeds in seeds.chunks(8) {
-        let recording = if seeds.len() <= 4 { along::<4>(model, job, seeds)? } else { along::<8>(model, job, seeds)? };
+    for seeds in seeds.chunks(DIRECTIONS) {
+        let recording = along(model, job, seeds)?;
         analysis.get_or_insert(recording.response);
         tangents.extend(recording.tangents.into_iter().take(seeds.len()).map(Analysis::Time));
     }
@@ -49,12 +52,12 @@ pub fn tangents(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Res
     Ok((analysis, tangents))
 }
 
-fn along<const N: usize>(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<Recording, Failure> {
+fn along(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<Recording, Failure> {
     let parameter = |(i, &value): (usize, &f64)| {
         let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
-        Dual::<N> { value, tangent }
+        Dual { value, tangent }
     };
-    let parameters: Vec<Dual<N>> = job.parameters.iter().enumerate().map(parameter).collect();
+    let parameters: Vec<Dual<DIRECTIONS>> = job.parameters.iter().enumerate().map(parameter).collect();
     model.simulate(job, &parameters)
 }
 
