@@ -196,7 +196,7 @@ fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
     }
     let horizon = read_seconds(node, "horizon", options.horizon.as_ref())?;
     let inputs = options.inputs.0.into_iter().map(|(name, input)| (name, input.into(), None)).collect();
-    Ok(CaseDraft { name, parameters, inputs, horizon, measured: None })
+    Ok(CaseDraft { name, parameters, inputs, horizon, ..CaseDraft::default() })
 }
 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {

@@ -180,7 +180,16 @@ fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
         for line in about.lines() {
             *page += &format!("{indent}    {line}\n");
         }
-        options(page, option, depth + 2);
+        // A table with any names: what stands under each.
+        match keys_of(option) {
+            Some(Keys::Any(each)) if matches!(keys_of(each), Some(Keys::Known(_))) => {
+                *page += &format!("{indent}    NAME ({})\n", type_name(each));
+                options(page, each, depth + 4);
+            }
+            _ => {
+                options(page, option, depth + 2);
+            }
+        }
     }
     known.len()
 }

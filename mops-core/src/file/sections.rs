@@ -181,7 +181,8 @@ pub(super) struct ExperimentSection {
     /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
     #[serde(default)]
     pub channels: Entries<ChannelSection>,
-    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`.
+    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`. Between samples an
+    /// input stays (`hold = "zero"`, the default) or moves on straight lines (`hold = "first"`).
     #[serde(default)]
     pub inputs: Entries<InputColumn>,
     /// What it is used for: `calibration` (the default), `selection` or `validation`.
@@ -249,9 +250,9 @@ pub(super) struct InputTable {
     pub scale: Option<f64>,
     /// What is added after scaling, in the column's unit.
     pub offset: Option<Quantity>,
-    /// How it acts between samples: `zero` (the default: it stays) or `first` (straight lines).
-    #[serde(default)]
-    pub hold: Hold,
+    /// How it acts between samples: `zero` (the default: it stays until the next one, as a computer puts it out) or
+    /// `first` (straight lines from sample to sample, as for one that moves smoothly).
+    pub hold: Option<Hold>,
 }
 
 /// A state whose start value is estimated; what is absent is read off the data.
@@ -351,7 +352,7 @@ column_or_table!(InputColumn, InputTable, |column| InputTable {
     unit: None,
     scale: None,
     offset: None,
-    hold: Hold::Zero
+    hold: None
 });
 
 /// Free start values: a list of states, or a table.

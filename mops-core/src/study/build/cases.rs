@@ -10,6 +10,7 @@ use crate::study::draft::{CaseDraft, ChannelDraft, Measured, Mistake};
 use crate::unit::Unit;
 
 pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {
+    warnings.extend(draft.warnings.iter().cloned());
     let mut parameters = Vec::new();
     for (name, quantity) in &draft.parameters {
         // In a file, an experiment has a table of them.
