@@ -104,6 +104,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         start: StartReport {
             feasible: start.merit.is_feasible(),
             worst_scaled: outcome::worst_scaled(&study, &start),
+            objective: start.merit.objective,
             criteria: outcome::criterion_reports(&study, &start),
         },
         front: vec![outcome::front_point(&study, &best)],
@@ -115,13 +116,19 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     (outcome, best)
 }
 
+/// A number to six significant digits, so that no rounding error shows.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<String> {
     let at_bound = |&i: &usize| {
         let tuner = &study.tuners[i];
         let side = tuner.at_bound(best.tuners[i])?;
         Some(format!(
-            "`{}` sits at its {side} bound {} {}: the optimum depends on that bound",
-            tuner.name, best.tuners[i], tuner.unit
+            "`{}` sits at its {side} bound {}: the optimum depends on that bound",
+            tuner.name,
+            tuner.unit.amount(rounded(best.tuners[i]))
         ))
     };
     problem.active().iter().filter_map(at_bound).collect()

@@ -189,6 +189,8 @@ pub struct StartReport {
     pub feasible: bool,
     /// The largest weighted scaled value among those minimised.
     pub worst_scaled: f64,
+    /// What was minimised.
+    pub objective: f64,
     /// The criteria.
     pub criteria: Vec<CriterionReport>,
 }

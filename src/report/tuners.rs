@@ -65,6 +65,7 @@ fn remark<'a>(tuner: &Tuner, at_bound: Option<&str>, name: impl Fn(usize) -> &'a
             "kept"
         } @else if let Some(side) = at_bound {
             span class="missed" { "at its " (side) " bound" }
+            @if tuner.scale == Scale::Log { span class="quiet" { ", logarithmic" } }
         } @else if tuner.scale == Scale::Log {
             span class="quiet" { "logarithmic" }
         }

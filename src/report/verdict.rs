@@ -55,7 +55,8 @@ fn excitation(outcome: &Outcome) -> (Tone, String) {
     match (inputs.clone().next(), poor.first()) {
         (None, _) => (Tone::Mixed, "There is no input to look at.".to_owned()),
         (Some(first), None) if inputs.count() == 1 => (Tone::Good, first.words.clone()),
-        (_, None) => (Tone::Good, "Every input is rich enough for the tuners that act in its case.".to_owned()),
+        (_, None) => (Tone::Good, "Every input is rich enough for a linear model with as many parameters as tuners act in its case; whether it is for \
+             these tuners, the sensitivities tell.".to_owned()),
         (_, Some(worst)) => (Tone::Mixed, worst.words.clone()),
     }
 }

@@ -277,7 +277,7 @@ pub(super) struct CriterionCommon {
     pub cases: Option<Vec<String>>,
     /// `minimise` (the default), `inequality`, `equality` or `monitor`.
     pub usage: Option<Usage>,
-    /// The value to reach: the criterion is divided by it. Must be positive.
+    /// The value to reach: the criterion is divided by it. Must be positive; some kinds have one of their own.
     pub demand: Option<Quantity>,
     /// Value that scales to 0, where a demand does not fit; goes with `bad`.
     pub good: Option<Quantity>,
