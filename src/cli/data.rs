@@ -130,7 +130,8 @@ mod tests {
     #[test]
     fn noise_is_not_estimated_across_gaps() {
         let expected = (0.64f64 / 20.0).sqrt();
-        let near = |found: Option<f64>| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?} is not {expected}");
+        let near =
+            |found: Option<f64>| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?} is not {expected}");
         let (times, values) = ramp(100);
         near(noise(&values, None));
         let mut holed = values.clone();

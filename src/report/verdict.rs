@@ -150,8 +150,15 @@ fn missed(criterion: &CriterionReport) -> String {
 }
 
 /// Why the run stopped, in words.
-pub(super) fn stop(stop: Stop) -> &'static str {
-    match stop {
+pub(super) fn stop(outcome: &Outcome) -> &'static str {
+    match outcome.stop {
+        Stop::Converged if outcome.task == Task::Excitation => {
+            "nothing was solved or simulated: the inputs were looked at"
+        }
+        Stop::Converged if outcome.solver == "none" && outcome.task == Task::Sweep => {
+            "nothing was solved: the tuners that are not swept stand at their start values"
+        }
+        Stop::Converged if outcome.solver == "none" => "nothing was solved: the start values were looked at",
         Stop::Converged => "converged: the solver met its own test of an optimum",
         Stop::Budget => "the budget of evaluations was spent; more may find better",
         Stop::Stalled => "no more improvement was found, but no optimum was shown",

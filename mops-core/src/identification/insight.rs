@@ -355,7 +355,8 @@ pub fn excitation_report(
         Some(_) => words += ": it stays excited in no direction",
     }
     words += ". ";
-    let linear = |n: usize| format!("a linear model (impulse response, transfer function) with {}", counted(n, "parameter"));
+    let linear =
+        |n: usize| format!("a linear model (impulse response, transfer function) with {}", counted(n, "parameter"));
     words += &match (parameters, suffices) {
         (None, _) => format!("In the long run that suffices for {}.", linear(found.order)),
         (Some(0), _) => "No tuner depends on it.".to_owned(),

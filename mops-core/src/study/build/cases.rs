@@ -77,7 +77,8 @@ pub(super) fn assumed_units(draft: &CaseDraft, models: &Models) -> Vec<String> {
         Some(format!("`{name}` in `{}` has no unit in the file: taken as {unit}", draft.name))
     };
     let channels = draft.measured.iter().flat_map(|m| &m.channels).filter(|channel| channel.unit.is_none());
-    let recorded = draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && matches!(input, Input::Sampled { .. }));
+    let recorded =
+        draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && matches!(input, Input::Sampled { .. }));
     let channels = channels.filter_map(|channel| note(&channel.signal, &signals));
     channels.chain(recorded.filter_map(|(name, ..)| note(name, &inputs))).collect()
 }
