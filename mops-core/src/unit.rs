@@ -103,11 +103,9 @@ impl Unit {
             let (factor, after) = factor(rest).ok_or_else(|| {
                 let place = if rest == text.trim() { String::new() } else { format!(" in `{text}`") };
                 let end = rest.find(|c: char| !c.is_alphabetic()).unwrap_or(rest.len());
-                let lower = rest.to_lowercase();
                 // A slip seldom hits the first letter, and one letter alone is near to everything.
-                let alike = |s: &&str| {
-                    s.len() > 1 && lower.starts_with(&s.to_lowercase()[..s.chars().next().map_or(0, char::len_utf8)])
-                };
+                let first = |text: &str| text.chars().next().map(|c| c.to_lowercase().to_string());
+                let alike = |symbol: &&str| symbol.len() > 1 && first(symbol) == first(rest);
                 let near = nearest(&rest[..end], UNITS.iter().map(|(symbol, ..)| *symbol).filter(alike));
                 let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
                 format!("`{rest}` is not a known unit{place}{meant}")
