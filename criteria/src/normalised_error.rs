@@ -16,7 +16,7 @@ use crate::common::{compare, compared_slopes, positive, signal};
 /// least-squares solvers use.
 ///
 /// It is evaluated in the experiments that measure the signal. Range: from 0 up; well below 1 the noise is overrated or
-/// the model fits the noise, well above 1 the model lacks something.
+/// the model fits the noise, well above 1 the model lacks something. Without a demand, it is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
 /// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters).
@@ -53,6 +53,11 @@ struct Bound {
 impl Criterion for Bound {
     fn unit(&self) -> Unit {
         Unit::one()
+    }
+
+    /// Where nothing but the noise is left.
+    fn natural_demand(&self) -> Option<f64> {
+        Some(1.0)
     }
 
     fn signals(&self) -> Vec<String> {

@@ -60,10 +60,15 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let calibration =
         (study.task == Task::Calibration || study.cases.iter().any(|c| c.experiment.is_some())).then(|| {
             let local = identification::local(problem, &best.tuners, study.tasks.sensitivity.zero);
+            let experiments = experiments(problem, &best);
+            let mut sensitivity = local.as_ref().map(|local| identification::report_of(problem, &best.tuners, local));
+            if let Some(found) = sensitivity.as_mut().filter(|found| found.of == "residuals") {
+                found.words.extend(whiteness_words(&experiments));
+            }
             CalibrationReport {
                 parameters: standard_errors(problem, &best, local.as_ref()),
-                experiments: experiments(problem, &best),
-                sensitivity: local.map(|local| identification::report_of(problem, &best.tuners, &local)),
+                experiments,
+                sensitivity,
                 excitation: identification::excitations(&study, &study.tasks.excitation.question),
             }
         });
@@ -99,6 +104,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         start: StartReport {
             feasible: start.merit.is_feasible(),
             worst_scaled: outcome::worst_scaled(&study, &start),
+            objective: start.merit.objective,
             criteria: outcome::criterion_reports(&study, &start),
         },
         front: vec![outcome::front_point(&study, &best)],
@@ -110,13 +116,19 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     (outcome, best)
 }
 
+/// A number to six significant digits, so that no rounding error shows.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<String> {
     let at_bound = |&i: &usize| {
         let tuner = &study.tuners[i];
         let side = tuner.at_bound(best.tuners[i])?;
         Some(format!(
-            "`{}` sits at its {side} bound {} {}: the optimum depends on that bound",
-            tuner.name, best.tuners[i], tuner.unit
+            "`{}` sits at its {side} bound {}: the optimum depends on that bound",
+            tuner.name,
+            tuner.unit.amount(rounded(best.tuners[i]))
         ))
     };
     problem.active().iter().filter_map(at_bound).collect()
@@ -164,13 +176,21 @@ fn experiments(problem: &Problem, best: &Evaluation) -> Vec<ExperimentReport> {
     reports
 }
 
+/// Whether the residuals that the estimates rest on are white, a sentence for every channel.
+fn whiteness_words(experiments: &[ExperimentReport]) -> Vec<String> {
+    let fitted = experiments.iter().filter(|experiment| experiment.role == Role::Calibration);
+    let channels = fitted.flat_map(|experiment| experiment.channels.iter().map(move |channel| (experiment, channel)));
+    channels.filter_map(|(e, c)| Some(c.whiteness?.words(&c.name, &e.name))).collect()
+}
+
 fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) -> ChannelReport {
     let simulated = analysis.map(|a| a.trace(&channel.signal).sample(&channel.times));
     let n = channel.values.len();
     #[allow(clippy::cast_precision_loss)]
     let mean = channel.values.iter().sum::<f64>() / n as f64;
     let spread: f64 = channel.values.iter().map(|v| (v - mean).powi(2)).sum();
-    let squares = simulated.map_or(f64::NAN, |s| s.iter().zip(&channel.values).map(|(a, b)| (a - b).powi(2)).sum());
+    let residuals: Option<Vec<f64>> = simulated.map(|s| channel.values.iter().zip(&s).map(|(a, b)| a - b).collect());
+    let squares = residuals.as_ref().map_or(f64::NAN, |residuals| residuals.iter().map(|e| e * e).sum());
     #[allow(clippy::cast_precision_loss)]
     let rmse = (squares / n as f64).sqrt();
     ChannelReport {
@@ -179,5 +199,6 @@ fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) ->
         noise: channel.noise,
         fit_percent: 100.0 * (1.0 - (squares / spread).sqrt()),
         unit: unit.to_owned(),
+        whiteness: residuals.and_then(|residuals| identification::whiteness(&residuals)),
     }
 }

@@ -41,6 +41,11 @@ pub trait Criterion: Send + Sync {
     /// A response for which the criterion is not defined: one sentence.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
 
+    /// The demand where the study gives none; without one, a criterion that is more than watched needs its own.
+    fn natural_demand(&self) -> Option<f64> {
+        None
+    }
+
     /// The derivative of the value, residuals included, along a tangent of the analysis. Where a criterion says nothing
     /// else it is the central difference of two analyses moved by `tangent.reach` to both sides, without simulation.
     ///

@@ -92,6 +92,18 @@ impl Input {
         }
     }
 
+    /// Whether samples that are held look as if they had moved smoothly: most differ from the one before, by steps (their
+    /// median) of less than a tenth of the range. Fewer than 20 samples tell nothing.
+    pub fn looks_smooth(&self) -> bool {
+        let Self::Sampled { values, hold: Hold::Zero, .. } = self else { return false };
+        let range = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+            - values.iter().copied().fold(f64::INFINITY, f64::min);
+        let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let mut steps: Vec<f64> = steps.filter(|&step| step > 0.0).collect();
+        steps.sort_by(f64::total_cmp);
+        values.len() >= 20 && 2 * steps.len() > values.len() && steps[steps.len() / 2] < 0.1 * range
+    }
+
     /// The first time after `t` at which the value or its slope jumps; infinity if it never does again.
     pub fn next_break(&self, t: f64) -> f64 {
         match self {
@@ -175,5 +187,20 @@ mod tests {
         assert_eq!((sampled(Hold::Zero).at(0.5), sampled(Hold::First).at(0.5)), (0.0, 2.0));
         assert_eq!((sampled(Hold::Zero).at(1.0), sampled(Hold::First).at(5.0)), (4.0, 6.0));
         assert_eq!(sampled(Hold::Zero).next_break(0.0), 1.0);
+    }
+
+    #[test]
+    fn a_sampled_sine_looks_smooth_and_switching_does_not() {
+        let sampled = |hold, value: &dyn Fn(f64) -> f64| Input::Sampled {
+            times: (0..200).map(f64::from).collect(),
+            values: (0..200).map(|i| value(f64::from(i))).collect(),
+            hold,
+        };
+        assert!(sampled(Hold::Zero, &|t| (0.1 * t).sin()).looks_smooth());
+        assert!(!sampled(Hold::First, &|t| (0.1 * t).sin()).looks_smooth());
+        // Switching, a staircase, and a new value at every sample.
+        assert!(!sampled(Hold::Zero, &|t| (0.1 * t).sin().signum()).looks_smooth());
+        assert!(!sampled(Hold::Zero, &|t| (0.1 * (t / 5.0).floor()).sin()).looks_smooth());
+        assert!(!sampled(Hold::Zero, &|t| (t * t).sin()).looks_smooth());
     }
 }

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::criterion::{Demand, Usage};
 use crate::experiment::Role;
-use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport};
+use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
 use crate::problem::{Evaluation, FEASIBLE};
 use crate::solver::Stop;
 use crate::study::{Study, Task};
@@ -189,6 +189,8 @@ pub struct StartReport {
     pub feasible: bool,
     /// The largest weighted scaled value among those minimised.
     pub worst_scaled: f64,
+    /// What was minimised.
+    pub objective: f64,
     /// The criteria.
     pub criteria: Vec<CriterionReport>,
 }
@@ -246,6 +248,9 @@ pub struct ChannelReport {
     pub fit_percent: f64,
     /// Unit of error and noise.
     pub unit: String,
+    /// Whether its residuals are white; absent for too few of them, or where nothing was simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub whiteness: Option<Whiteness>,
 }
 
 /// Simulations that failed.

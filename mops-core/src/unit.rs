@@ -6,12 +6,14 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 
+use crate::diagnostic::nearest;
+
 /// Exponents of the base units m, kg, s, A, K, mol, and of the decibel (a unit apart, as it is not a ratio).
 type Dimension = [i32; 7];
 
 /// A unit of measure: a product of powers of SI units, prefixes allowed (`kg m2`, `N m s/rad`, `mm/s^2`).
 ///
-/// Factors stand side by side or are joined by `*`; `/` divides by the one factor, or the parenthesis, after it; an
+/// Factors stand side by side or are joined by `*` or a dot; `/` divides by the one factor, or the parenthesis, after it; an
 /// exponent follows its unit, with or without `^`. The radian counts as 1, as in the SI; a revolution is 2 pi of it, so that
 /// 1 Hz is 6.28 rad/s. `degC` is a difference of temperatures: no offset is applied.
 #[derive(Debug, Clone)]
@@ -56,6 +58,12 @@ const UNITS: &[(&str, Dimension, f64)] = &[
     ("Wb",   [2, 1, -2, -1, 0, 0, 0], 1.0),
     ("T",    [0, 1, -2, -1, 0, 0, 0], 1.0),
     ("L",    [3, 0, 0, 0, 0, 0, 0],   1e-3),
+    ("l",    [3, 0, 0, 0, 0, 0, 0],   1e-3),
+    ("day",  [0, 0, 1, 0, 0, 0, 0],   86400.0),
+    ("ohm",  [2, 1, -3, -2, 0, 0, 0], 1.0),
+    ("\u{3a9}", [2, 1, -3, -2, 0, 0, 0], 1.0),
+    ("\u{2126}", [2, 1, -3, -2, 0, 0, 0], 1.0),
+    ("Nm",   [2, 1, -2, 0, 0, 0, 0],  1.0),
 ];
 
 const PREFIXES: &[(&str, f64)] = &[
@@ -89,12 +97,18 @@ impl Unit {
             if let Some(after) = rest.strip_prefix('/') {
                 divide = true;
                 rest = after.trim_start();
-            } else if let Some(after) = rest.strip_prefix('*').or_else(|| rest.strip_prefix('\u{b7}')) {
+            } else if let Some(after) = rest.strip_prefix(['*', '.', '\u{b7}']) {
                 rest = after.trim_start();
             }
             let (factor, after) = factor(rest).ok_or_else(|| {
                 let place = if rest == text.trim() { String::new() } else { format!(" in `{text}`") };
-                format!("`{rest}` is not a known unit{place}")
+                let end = rest.find(|c: char| !c.is_alphabetic()).unwrap_or(rest.len());
+                // A slip seldom hits the first letter, and one letter alone is near to everything.
+                let first = |text: &str| text.chars().next().map(|c| c.to_lowercase().to_string());
+                let alike = |symbol: &&str| symbol.len() > 1 && first(symbol) == first(rest);
+                let near = nearest(&rest[..end], UNITS.iter().map(|(symbol, ..)| *symbol).filter(alike));
+                let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                format!("`{rest}` is not a known unit{place}{meant}")
             })?;
             let sign = if divide { -1 } else { 1 };
             for (sum, exponent) in unit.dimension.iter_mut().zip(factor.dimension) {
@@ -304,6 +318,18 @@ mod tests {
         for text in ["N m s/rad", "N*m*s", "kg m2/s", "kg*m^2*s^-1", "J s", "kg m2 / s", "(kg m2)/s"] {
             assert_eq!(Unit::known(text), Unit::known("N m s"), "{text}");
         }
+    }
+
+    #[test]
+    fn common_spellings_are_known_and_slips_lead_to_the_unit() {
+        for (text, known) in
+            [("ohm", "Ohm"), ("k\u{3a9}", "kOhm"), ("Nm/rad", "N m"), ("N.m", "N m"), ("ml", "cm3"), ("day", "h")]
+        {
+            assert!(Unit::known(text).is_compatible(&Unit::known(known)), "{text}");
+        }
+        assert_eq!(Unit::known("day").factor_to(&Unit::known("h")), Some(24.0));
+        assert_eq!(Unit::known("mNm"), Unit::known("N mm"));
+        assert_eq!(Unit::parse("Ohms").unwrap_err(), "`Ohms` is not a known unit; did you mean `Ohm`?");
     }
 
     #[test]

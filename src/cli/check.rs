@@ -58,6 +58,9 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     for warning in &study.warnings {
         text += &format!("\nwarning: {warning}\n");
     }
+    for note in &study.notes {
+        text += &format!("\nnote: {note}\n");
+    }
     print(&text);
     Ok(ExitCode::SUCCESS)
 }

@@ -28,6 +28,8 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         print(&excitation(&file, column, &arguments.file.display().to_string())?);
         return Ok(ExitCode::SUCCESS);
     }
+    let time = names.iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
+    let times = time.map(|name| file.column(name)).transpose()?.map(|column| column.values);
     let mut rows = Vec::new();
     let mut sampling = String::new();
     for name in &names {
@@ -47,7 +49,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
             number(high),
             finite.first().copied().map_or_else(String::new, number),
             finite.last().copied().map_or_else(String::new, number),
-            noise(&finite).map_or_else(String::new, number),
+            noise(column.values, times).map_or_else(String::new, number),
         ]);
     }
     let header = ["column", "unit", "rows", "gaps", "min", "max", "first", "last", "noise (est.)"];
@@ -100,12 +102,45 @@ fn sample_time(name: &str, times: &[f64]) -> String {
 }
 
 /// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
-fn noise(values: &[f64]) -> Option<f64> {
-    if values.len() < 20 {
-        return None;
-    }
-    let squares = values.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2));
+/// Gaps, whether empty cells or rows that are missing, are not differenced across. `None` where fewer than 20 differences
+/// are left.
+fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+    let times = times.filter(|times| times.len() == values.len());
+    let mut steps: Vec<f64> = times.into_iter().flat_map(|t| t.windows(2)).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let longest = steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 1.5 * median);
+    let follows = |i: usize| times.is_none_or(|t| t[i..i + 4].windows(2).all(|pair| pair[1] - pair[0] <= longest));
+    let windows = values.windows(4).enumerate().filter(|(i, w)| w.iter().all(|v| v.is_finite()) && follows(*i));
+    let squares: Vec<f64> = windows.map(|(_, w)| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2)).collect();
     #[allow(clippy::cast_precision_loss)]
-    let mean = squares.sum::<f64>() / (values.len() - 3) as f64;
-    Some((mean / 20.0).sqrt())
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (squares.len() >= 20).then(|| (mean / 20.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::noise;
+
+    /// A steep ramp with an alternating error of 0.1, whose third differences are 0.8.
+    fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {
+        let values = (0..n).map(|i| 5.0 * f64::from(i) + if i % 2 == 0 { 0.1 } else { -0.1 });
+        ((0..n).map(f64::from).collect(), values.collect())
+    }
+
+    #[test]
+    fn noise_is_not_estimated_across_gaps() {
+        let expected = (0.64f64 / 20.0).sqrt();
+        let near =
+            |found: Option<f64>| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?} is not {expected}");
+        let (times, values) = ramp(100);
+        near(noise(&values, None));
+        let mut holed = values.clone();
+        holed[40..51].fill(f64::NAN);
+        near(noise(&holed, Some(&times)));
+        // The rows themselves are missing.
+        let without = |all: &[f64]| [&all[..40], &all[51..]].concat();
+        near(noise(&without(&values), Some(&without(&times))));
+        assert!(noise(&without(&values), None).unwrap() > 2.0 * expected);
+        assert_eq!(noise(&values[..22], None), None);
+    }
 }

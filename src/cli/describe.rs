@@ -10,8 +10,8 @@ use super::{Trouble, print};
 /// What is described.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, a shipped study, or a table of study files: study, models, tuners, cases,
-    /// experiments, criteria, solver.
+    /// A kind of model, criterion or solver, a shipped study, a table of study files (study, models, tuners, cases,
+    /// experiments, criteria, solver), or a key of one, such as `step` or `hold`.
     name: String,
 }
 
@@ -32,6 +32,16 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
         let file = |path| study.file(path).map(String::from_utf8_lossy).unwrap_or_default();
         print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")));
+        return Ok(ExitCode::SUCCESS);
+    }
+    // A key of a table, such as `step` or `hold`: the page of the table tells of it.
+    let tables = mops_core::file::tables_with(name);
+    if !tables.is_empty() {
+        let pages = mops_core::file::tables().into_iter().filter(|(table, _)| tables.contains(table));
+        let pages =
+            pages.map(|(table, schema)| mops_core::file::describe(&format!("[{table}] of a study file"), &schema));
+        let named: Vec<String> = tables.iter().map(|table| format!("[{table}]")).collect();
+        print(&format!("`{name}` is a key of {}\n\n{}", named.join(", "), pages.collect::<Vec<_>>().join("\n")));
         return Ok(ExitCode::SUCCESS);
     }
     let known: Vec<&str> = kinds

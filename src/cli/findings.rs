@@ -57,7 +57,10 @@ fn sensitivity(found: &SensitivityReport) -> String {
             significant(t.effect, 4),
             known(t.std_error),
             known(t.std_error_alone),
-            share(t.relative_error),
+            match (share(t.relative_error), t.relative_to) {
+                (text, "range") if !text.is_empty() => format!("{text} of range"),
+                (text, _) => text,
+            },
             known(t.inflation),
             if t.trust == "undetermined" || t.std_error.is_finite() { t.trust.to_owned() } else { String::new() },
         ]
@@ -82,7 +85,7 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
             input.case.clone(),
             input.input.clone(),
             format!("{least}{}", input.order),
-            input.parameters.to_string(),
+            input.parameters.map_or_else(String::new, |n| n.to_string()),
             if input.suffices { "yes".to_owned() } else { "in the long run, no".to_owned() },
             share(input.eigenvalue),
             input.next_eigenvalue.map_or_else(String::new, share),
@@ -95,8 +98,8 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
         "case",
         "input",
         "order",
-        "tuners",
-        "suffices",
+        "parameters",
+        "suffices, if linear",
         "weakest direction",
         "next order",
         "with transients",
@@ -104,7 +107,16 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
         "every",
     ];
     let words: Vec<String> = inputs.iter().map(|input| input.words.clone()).collect();
-    format!("\n{}\n{}", table(&header, &[2, 3, 5, 6, 7, 8, 9], rows.collect()), sentences(&words))
+    let rows: Vec<Vec<String>> = rows.collect();
+    // Of a file alone nobody knows how many parameters it is for.
+    let text = if inputs.iter().all(|input| input.parameters.is_none()) {
+        let without = |row: Vec<String>| [&row[..3], &row[5..]].concat();
+        let header = [&header[..3], &header[5..]].concat();
+        table(&header, &[2, 3, 4, 5, 6, 7], rows.into_iter().map(without).collect())
+    } else {
+        table(&header, &[2, 3, 5, 6, 7, 8, 9], rows)
+    };
+    format!("\n{text}\n{}", sentences(&words))
 }
 
 fn regression(found: &RegressionReport) -> String {

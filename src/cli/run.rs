@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Study, Task, suggestion};
+use mops_core::{Catalogue, Diagnostic, Place, Study, Task, suggestion};
 
 use super::progress::Progress;
 use super::study::{StudyArguments, open};
@@ -107,8 +107,18 @@ fn introduction(study: &Study, options: &Options) -> String {
         active,
         study.rows.len(),
         study.cases.len(),
-        options.solver.kind
+        if solves(study) { options.solver.kind } else { "none (nothing is solved)" }
     )
+}
+
+/// Whether the task of a study needs a solver.
+fn solves(study: &Study) -> bool {
+    match study.task {
+        Task::Design | Task::Calibration => true,
+        Task::Excitation => false,
+        Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
+        Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
+    }
 }
 
 /// Everything a run leaves behind; result.json comes first, so that it is there whatever happens to the rest.

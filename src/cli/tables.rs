@@ -26,6 +26,16 @@ pub(super) fn table(header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>) 
 
 /// The criteria at the start and at another point, side by side.
 pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best_name: &str) -> String {
+    criteria_without(&[], start, best, best_name)
+}
+
+/// The same without some columns.
+fn criteria_without(
+    left_out: &[usize],
+    start: &[CriterionReport],
+    best: &[CriterionReport],
+    best_name: &str,
+) -> String {
     let usage = |usage| match usage {
         Usage::Minimise => "minimise",
         Usage::Inequality => "inequality",
@@ -63,12 +73,43 @@ pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best
     });
     let header =
         ["case", "criterion", "usage", "demand", "start", best_name, "unit", "scaled start", "scaled", "met", ""];
-    table(&header, &[3, 4, 5, 7, 8], rows.collect())
+    match left_out {
+        [] => table(&header, &[3, 4, 5, 7, 8], rows.collect()),
+        left_out => without(left_out, &header, rows.collect()),
+    }
+}
+
+/// A table without some of its columns; those of numbers are the ones that hold nothing else.
+fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> String {
+    let kept: Vec<usize> = (0..header.len()).filter(|column| !left_out.contains(column)).collect();
+    let header: Vec<&str> = kept.iter().map(|&column| header[column]).collect();
+    for row in &mut rows {
+        *row = kept.iter().map(|&column| std::mem::take(&mut row[column])).collect();
+    }
+    let is_number = |text: &String| text.is_empty() || text.parse::<f64>().is_ok();
+    let numeric: Vec<usize> =
+        (0..header.len()).filter(|&column| rows.iter().all(|row| is_number(&row[column]))).collect();
+    table(&header, &numeric, rows)
 }
 
 /// Everything worth a line after a run.
 pub(super) fn outcome(outcome: &Outcome) -> String {
-    let mut text = format!("\n{}", criteria(&outcome.start.criteria, &outcome.criteria, "optimum"));
+    let solved = outcome.solver != "none";
+    let best_name = if solved { "optimum" } else { "start" };
+    let summed = outcome.task == Task::Calibration;
+    let mut text = String::new();
+    if summed {
+        let [now, start] = [outcome.objective, outcome.start.objective].map(number);
+        text += &format!("\nobjective, the sum of the scaled values: {now} (start {start})\n");
+    }
+    // Where nothing was solved there is but one point; a sum has no demand to meet.
+    let left_out: &[usize] = match (solved, summed) {
+        (false, _) => &[4, 7],
+        (true, true) => &[9],
+        (true, false) => &[],
+    };
+    let table_of_criteria = criteria_without(left_out, &outcome.start.criteria, &outcome.criteria, best_name);
+    text += &format!("\n{table_of_criteria}");
     let tuners = outcome.tuners.iter().map(|t| {
         let bound = t.at_bound.map_or_else(String::new, |side| format!("at its {side} bound"));
         let [low, high] = t.bounds.map(number);
@@ -87,8 +128,13 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         ]
     });
     let error = if outcome.calibration.is_some() { "std. error" } else { "" };
-    let header = ["tuner", "start", "optimum", error, "unit", "min", "max", ""];
-    text += &format!("\n{}", table(&header, &[1, 2, 3, 5, 6], tuners.collect()));
+    let header = ["tuner", "start", best_name, error, "unit", "min", "max", ""];
+    text += "\n";
+    text += &if solved {
+        table(&header, &[1, 2, 3, 5, 6], tuners.collect())
+    } else {
+        without(&[1], &header, tuners.collect())
+    };
     if let Some(calibration) = &outcome.calibration {
         let channels = calibration.experiments.iter().flat_map(|e| e.channels.iter().map(move |c| (e, c)));
         let rows = channels.map(|(e, c)| {
@@ -130,17 +176,26 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     };
     let demands = match (outcome.task, counts(&[Usage::Minimise], true)) {
         (Task::Calibration, _) => String::new(),
+        _ if counts(&[Usage::Minimise], false) == 0 => "nothing to minimise; ".to_owned(),
         (_, 0) => "every demand is met; ".to_owned(),
         (_, 1) => "1 demand is not met; ".to_owned(),
         (_, n) => format!("{n} demands are not met; "),
     };
+    let reached = match outcome.task {
+        _ if counts(&[Usage::Minimise], false) == 0 => String::new(),
+        Task::Calibration => {
+            format!("objective {} (start {}); ", number(outcome.objective), number(outcome.start.objective))
+        }
+        _ if !solved => format!("worst scaled value {}; ", number(outcome.worst_scaled)),
+        _ => {
+            let [now, start] = [outcome.worst_scaled, outcome.start.worst_scaled].map(number);
+            format!("worst scaled value {now} (start {start}); ")
+        }
+    };
+    let stop = if solved { stop } else { "nothing was solved: looked at the start values".to_owned() };
     text += &format!(
-        "\n{constraints}{demands}worst scaled value {} (start {}); {stop} after {} evaluations, {} simulations, {:.2} s\n",
-        number(outcome.worst_scaled),
-        number(outcome.start.worst_scaled),
-        outcome.evaluations,
-        outcome.simulations,
-        outcome.seconds
+        "\n{constraints}{demands}{reached}{stop} after {} evaluations, {} simulations, {:.2} s\n",
+        outcome.evaluations, outcome.simulations, outcome.seconds
     );
     text
 }

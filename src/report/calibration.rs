@@ -6,6 +6,7 @@ use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport
 use super::figures::role_name;
 use super::numbers::{number, percent, significant};
 use super::page::scrolling;
+use super::sensitivity;
 
 /// Parameters, then experiments.
 pub(super) fn section(calibration: &CalibrationReport) -> Markup {
@@ -16,7 +17,7 @@ pub(super) fn section(calibration: &CalibrationReport) -> Markup {
                 "Standard errors are to first order and for white residuals; where residuals are correlated, or the model is "
                 "wrong, they are too small."
             }
-            (scrolling("Parameters", parameters(&calibration.parameters)))
+            (scrolling("Parameters", parameters(calibration)))
         }
         @if !calibration.experiments.is_empty() {
             h3 { "Experiments" }
@@ -29,7 +30,12 @@ pub(super) fn section(calibration: &CalibrationReport) -> Markup {
     }
 }
 
-fn parameters(parameters: &[ParameterReport]) -> Markup {
+fn parameters(calibration: &CalibrationReport) -> Markup {
+    let told = calibration.sensitivity.iter().flat_map(|found| &found.tuners);
+    let relative = |parameter: &ParameterReport| match told.clone().find(|tuner| tuner.name == parameter.name) {
+        Some(tuner) => sensitivity::relative(tuner),
+        None => html! { (percent((parameter.std_error / parameter.value).abs())) },
+    };
     html! {
         table {
             thead {
@@ -44,14 +50,14 @@ fn parameters(parameters: &[ParameterReport]) -> Markup {
                 }
             }
             tbody {
-                @for parameter in parameters {
+                @for parameter in &calibration.parameters {
                     @let known = parameter.std_error.is_finite();
                     tr {
                         th scope="row" { (parameter.name) }
                         td class="number" { strong { (number(parameter.value)) } }
                         @if known {
                             td class="number" { (significant(parameter.std_error, 3)) }
-                            td class="number" { (percent((parameter.std_error / parameter.value).abs())) }
+                            td class="number" { (relative(parameter)) }
                             td class="number" { (number(parameter.interval95[0])) }
                             td class="number" { (number(parameter.interval95[1])) }
                         } @else {

@@ -23,6 +23,9 @@ pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let (outcome, best) = (report.outcome, report.best_name());
     let models = report.problem.study().models.len() > 1;
+    let cases = report.problem.study().cases.len() > 1;
+    // Where nothing was solved there is but one point; a sum has no demand to meet.
+    let (two, demands) = (outcome.solver != "none", outcome.task != Task::Calibration);
     let shape = report.problem.shape();
     let rows = outcome.criteria.iter().zip(&outcome.start.criteria).zip(&shape.rows);
     let rows_and_head = html! {
@@ -30,16 +33,16 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
             thead {
                 tr {
                     th scope="col" { "criterion" }
-                    th scope="col" { "case" }
+                    @if cases { th scope="col" { "case" } }
                     @if models { th scope="col" { "model" } }
                     th scope="col" { "usage" }
                     th scope="col" class="number" { "demand" }
-                    th scope="col" class="number" { "at start" }
+                    @if two { th scope="col" class="number" { "at start" } }
                     th scope="col" class="number" { "at " (best) }
                     th scope="col" { "unit" }
-                    th scope="col" class="number" { "scaled at start" }
+                    @if two { th scope="col" class="number" { "scaled at start" } }
                     th scope="col" { "scaled at " (best) }
-                    th scope="col" { "met" }
+                    @if demands { th scope="col" { "met" } }
                 }
             }
             tbody {
@@ -47,16 +50,16 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                     @let asked = demand(now);
                     tr {
                         th scope="row" { (now.name) @if let Some(note) = now.note { small { (note) } } }
-                        td { (now.case) }
+                        @if cases { td { (now.case) } }
                         @if models { td { (now.model) } }
                         td { (usage_name(now.usage, *usage)) @if *weight != 1.0 { small { "weight " (number(*weight)) } } }
                         td class="number" { @if asked.is_some() { (limit(now)) } @else { "none" } }
-                        td class="number" { (number(start.value)) }
+                        @if two { td class="number" { (number(start.value)) } }
                         td class="number" { strong { (number(now.value)) } }
                         td { (now.unit) }
-                        td class="number" { @if asked.is_some() { (scaled_number(start.scaled)) } }
+                        @if two { td class="number" { @if asked.is_some() { (scaled_number(start.scaled)) } } }
                         td { @if asked.is_some() { (scaled(now)) } }
-                        td { @if asked.is_some() { (met(now)) } }
+                        @if demands { td { @if asked.is_some() { (met(now)) } } }
                     }
                 }
             }
@@ -64,7 +67,12 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
     };
     html! {
         p {
-            "A scaled value is the value by its demand: 0 is ideal, up to 1 the demand is met. "
+            @if outcome.task == Task::Calibration {
+                "The objective is the sum of the scaled values of the calibration data, each the value by its demand: "
+                strong { (number(outcome.objective)) } @if two { ", at the start " (number(outcome.start.objective)) } ". "
+            } @else {
+                "A scaled value is the value by its demand: 0 is ideal, up to 1 the demand is met. "
+            }
             @if outcome.task == Task::Design { "The design lowers the largest scaled value of the criteria that are minimised." }
         }
         (scrolling("Criteria", rows_and_head))

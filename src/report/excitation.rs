@@ -27,8 +27,10 @@ pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
     html! {
         (sentences(inputs.iter().map(|input| &input.words)))
         p {
-            "Order n says that n parameters of an impulse response can be estimated consistently: the covariances of n "
-            "neighbouring samples are positive definite in the long run. A finite record leaves traces of what happened only "
+            "Order n says that n parameters of a linear model (impulse response, transfer function) can be estimated "
+            "consistently: the covariances of n neighbouring samples are positive definite in the long run. It is a theorem "
+            "on linear models; whether the tuners of this one are determined is told by the sensitivities. Start values are "
+            "not counted among the parameters: no input excites them. A finite record leaves traces of what happened only "
             "once; they are not counted. Yet a transient may well do for a short experiment: what it is worth is told by "
             "the standard errors."
         }
@@ -39,8 +41,8 @@ pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
                         th scope="col" { "case" }
                         th scope="col" { "input" }
                         th scope="col" class="number" { "order" }
-                        th scope="col" class="number" { "tuners" }
-                        th scope="col" { "suffices" }
+                        th scope="col" class="number" { "parameters" }
+                        th scope="col" { "suffices, if linear" }
                         th scope="col" class="number" { "weakest direction" }
                         th scope="col" class="number" { "next order" }
                         th scope="col" class="number" { "with transients" }
@@ -54,7 +56,7 @@ pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
                             th scope="row" { (input.case) }
                             td { (input.input) }
                             td class="number" { @if input.at_least { "at least " } strong { (input.order) } }
-                            td class="number" { (input.parameters) }
+                            td class="number" { @if let Some(parameters) = input.parameters { (parameters) } }
                             td { @if input.suffices { span class="met" { "yes" } } @else { span class="above" { "in the long run, no" } } }
                             td class="number" { (percent(input.eigenvalue)) }
                             td class="number" { @if let Some(next) = input.next_eigenvalue { (percent(next)) } }

@@ -124,7 +124,7 @@ fn header(report: &Report<'_>) -> Markup {
                 (fact("Seed", &outcome.seed.to_string()))
             }
             dl class="long" {
-                (fact("Stopped", verdict::stop(outcome.stop)))
+                (fact("Stopped", verdict::stop(outcome)))
                 @if outcome.task == Task::Design { (fact("Pareto", verdict::pareto(outcome.pareto))) }
             }
         }

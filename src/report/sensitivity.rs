@@ -29,7 +29,8 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
             "The effect is the change of the " (if measured { "weighted residuals" } else { "scaled criteria" })
             ", root of their sum of squares, for a change of the tuner by its own value. "
             @if measured {
-                "Alone is the standard error if all other tuners were known; the factor is what not knowing them costs."
+                "Alone is the standard error if all other tuners were known; the factor is what not knowing them costs. Relative "
+                "errors are shares of the value; of start values, which may well be near zero, shares of the range."
             } @else {
                 "The factor is how much of that effect the other tuners can undo: 1 is none."
             }
@@ -40,7 +41,8 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
             (scrolling("Correlation of the estimates", correlations(found)))
             h3 { "Directions" }
             p {
-                "Eigenvectors of the sensitivity matrix, strongest first, in shares of the tuners' values. Along a direction with "
+                "Eigenvectors of the sensitivity matrix, strongest first, in shares of the tuners' values (of the "
+                "range, where a value is 0). Along a direction with "
                 "a small eigenvalue the tuners may move together and hardly change anything. Slopes are "
                 (if found.slopes == "tangents" { "exact (tangents of the simulation)" } else { "central differences" })
                 "; singular values below " (number(found.zero)) " of the largest count as zero."
@@ -78,7 +80,7 @@ fn trust(found: &SensitivityReport, measured: bool) -> Markup {
                         @if measured {
                             td class="number" { (known(tuner.std_error, |v| significant(v, 3))) }
                             td class="number" { (known(tuner.std_error_alone, |v| significant(v, 3))) }
-                            td class="number" { (known(tuner.relative_error, percent)) }
+                            td class="number" { (relative(tuner)) }
                         }
                         td class="number" { (known(tuner.inflation, |v| significant(v, 3))) }
                         td { (verdict(tuner, measured)) }
@@ -86,6 +88,14 @@ fn trust(found: &SensitivityReport, measured: bool) -> Markup {
                 }
             }
         }
+    }
+}
+
+/// The standard error as a share, with what it is a share of where that is not the value.
+pub(super) fn relative(tuner: &TunerSensitivity) -> Markup {
+    html! {
+        (known(tuner.relative_error, percent))
+        @if tuner.relative_to == "range" && tuner.relative_error.is_finite() { small { "of its range" } }
     }
 }
 

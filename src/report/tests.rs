@@ -119,7 +119,12 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
             active: true,
         }],
         criteria: criteria(&best),
-        start: StartReport { feasible: true, worst_scaled: first.merit.objective, criteria: criteria(&first) },
+        start: StartReport {
+            feasible: true,
+            worst_scaled: first.merit.objective,
+            objective: first.merit.objective,
+            criteria: criteria(&first),
+        },
         front: Vec::new(),
         calibration: Some(CalibrationReport {
             parameters: Vec::new(),

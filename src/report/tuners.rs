@@ -10,13 +10,14 @@ use super::page::scrolling;
 /// All tuners, and where they stand within their bounds.
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let study = report.problem.study();
+    let two = report.outcome.solver != "none";
     let log = study.tuners.iter().any(|t| t.scale == Scale::Log);
     let rows_and_head = html! {
         table {
             thead {
                 tr {
                     th scope="col" { "tuner" }
-                    th scope="col" class="number" { "at start" }
+                    @if two { th scope="col" class="number" { "at start" } }
                     th scope="col" class="number" { "at " (report.best_name()) }
                     th scope="col" { "unit" }
                     th scope="col" class="number" { "from" }
@@ -29,7 +30,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                 @for (now, tuner) in report.outcome.tuners.iter().zip(&study.tuners) {
                     tr {
                         th scope="row" { (now.name) }
-                        td class="number" { (number(now.start)) }
+                        @if two { td class="number" { (number(now.start)) } }
                         td class="number" { strong { (number(now.value)) } }
                         td { (now.unit) }
                         td class="number" { @if now.bounds[0].is_finite() { (number(now.bounds[0])) } }
@@ -42,7 +43,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
         }
     };
     html! {
-        p { "The filled mark is the value, the hollow one the start" @if log { "; logarithmic ranges are drawn as such" } "." }
+        p { "The filled mark is the value" @if two { ", the hollow one the start" } @if log { "; logarithmic ranges are drawn as such" } "." }
         (scrolling("Tuners", rows_and_head))
     }
 }
@@ -65,6 +66,7 @@ fn remark<'a>(tuner: &Tuner, at_bound: Option<&str>, name: impl Fn(usize) -> &'a
             "kept"
         } @else if let Some(side) = at_bound {
             span class="missed" { "at its " (side) " bound" }
+            @if tuner.scale == Scale::Log { span class="quiet" { ", logarithmic" } }
         } @else if tuner.scale == Scale::Log {
             span class="quiet" { "logarithmic" }
         }

@@ -55,7 +55,8 @@ fn excitation(outcome: &Outcome) -> (Tone, String) {
     match (inputs.clone().next(), poor.first()) {
         (None, _) => (Tone::Mixed, "There is no input to look at.".to_owned()),
         (Some(first), None) if inputs.count() == 1 => (Tone::Good, first.words.clone()),
-        (_, None) => (Tone::Good, "Every input is rich enough for the tuners that act in its case.".to_owned()),
+        (_, None) => (Tone::Good, "Every input is rich enough for a linear model with as many parameters as tuners act in its case; whether it is for \
+             these tuners, the sensitivities tell.".to_owned()),
         (_, Some(worst)) => (Tone::Mixed, worst.words.clone()),
     }
 }
@@ -149,8 +150,15 @@ fn missed(criterion: &CriterionReport) -> String {
 }
 
 /// Why the run stopped, in words.
-pub(super) fn stop(stop: Stop) -> &'static str {
-    match stop {
+pub(super) fn stop(outcome: &Outcome) -> &'static str {
+    match outcome.stop {
+        Stop::Converged if outcome.task == Task::Excitation => {
+            "nothing was solved or simulated: the inputs were looked at"
+        }
+        Stop::Converged if outcome.solver == "none" && outcome.task == Task::Sweep => {
+            "nothing was solved: the tuners that are not swept stand at their start values"
+        }
+        Stop::Converged if outcome.solver == "none" => "nothing was solved: the start values were looked at",
         Stop::Converged => "converged: the solver met its own test of an optimum",
         Stop::Budget => "the budget of evaluations was spent; more may find better",
         Stop::Stalled => "no more improvement was found, but no optimum was shown",

@@ -27,10 +27,16 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         let place = entry(node, "channels", signal);
         channels.push(table.channel(&place, signal, &channel.0)?);
     }
-    let mut inputs = Vec::new();
+    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
     for (input, column) in &section.inputs.0 {
         let place = entry(node, "inputs", input);
         let (values, unit) = table.input(&place, &column.0)?;
+        if column.0.hold.is_none() && values.looks_smooth() {
+            warnings.push(format!(
+                "input `{input}` of `{name}` looks smooth, and is held between its samples: if it was not, \
+                 hold = \"first\" is right (hold = \"zero\" says that it was, and ends this warning)"
+            ));
+        }
         inputs.push((input.clone(), values, unit));
     }
     let free = section.free.0.into_iter().map(|(state, given)| Free {
@@ -45,6 +51,7 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         inputs,
         horizon: None,
         measured: Some(Measured { channels, responses: Vec::new(), role: section.role, free: free.collect() }),
+        warnings,
     })
 }
 
@@ -148,7 +155,7 @@ impl<'f> Table<'f> {
                 .unwrap_or_else(|| place.diagnostic(fact))
                 .with_help("an input must be known throughout: fill the gap, or cut it off with `from` and `to`"));
         }
-        Ok((Input::Sampled { times: self.times.clone(), values, hold: table.hold }, unit))
+        Ok((Input::Sampled { times: self.times.clone(), values, hold: table.hold.unwrap_or_default() }, unit))
     }
 
     fn values(

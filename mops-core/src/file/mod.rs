@@ -15,11 +15,12 @@ use std::io;
 use std::sync::Arc;
 
 pub use entries::{Entries, Short};
-pub use schema::{describe, schema_of, study_schema, tables};
+pub use schema::{describe, schema_of, study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::criterion::Usage;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
+use crate::experiment::Input;
 use crate::expression::Expression;
 use crate::linearised::Linearised;
 use crate::model::{AnalysisKind, Interface};
@@ -87,7 +88,8 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
         draft.tuners.push((name, read_tuner(&node)?));
     }
     for (name, node) in root.table("cases")? {
-        draft.cases.push(read_case(name, &node)?);
+        let case = read_case(name, &node, &draft.models)?;
+        draft.cases.push(case);
     }
     for (name, node) in root.table("experiments")? {
         if draft.cases.iter().any(|case| case.name == name) {
@@ -185,7 +187,7 @@ fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
     node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
 
-fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
+fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelDraft)]) -> Result<CaseDraft, Diagnostic> {
     let entries = node.entries()?;
     let options: CaseOptions = node.only(CaseOptions::KEYS).read()?;
     let mut parameters = Vec::new();
@@ -195,8 +197,17 @@ fn read_case(name: String, node: &Node<'_>) -> Result<CaseDraft, Diagnostic> {
         }
     }
     let horizon = read_seconds(node, "horizon", options.horizon.as_ref())?;
-    let inputs = options.inputs.0.into_iter().map(|(name, input)| (name, input.into(), None)).collect();
-    Ok(CaseDraft { name, parameters, inputs, horizon, measured: None })
+    let mut inputs = Vec::new();
+    for (name, section) in &options.inputs.0 {
+        let known = models.iter().flat_map(|(_, draft)| &draft.model.interface().inputs);
+        let input = match known.into_iter().find(|v| v.name == *name) {
+            Some(v) => section.input(&v.unit).map_err(|mistake| node.locate(&mistake.within(name).within("inputs")))?,
+            // Refused when the study is built.
+            None => Input::Constant(0.0),
+        };
+        inputs.push((name.clone(), input, None));
+    }
+    Ok(CaseDraft { name, parameters, inputs, horizon, ..CaseDraft::default() })
 }
 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {

@@ -137,6 +137,20 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
     ]
 }
 
+/// The tables of a study file in which a key stands, at any depth.
+pub fn tables_with(key: &str) -> Vec<&'static str> {
+    let with = tables().into_iter().filter(|(_, schema)| has_key(schema.as_value(), key));
+    with.map(|(table, _)| table).collect()
+}
+
+fn has_key(schema: &Value, key: &str) -> bool {
+    match keys_of(schema) {
+        Some(Keys::Known(known)) => known.iter().any(|(name, below)| *name == key || has_key(below, key)),
+        Some(Keys::Any(each)) => has_key(each, key),
+        None => false,
+    }
+}
+
 /// A kind's page in the manual, from its schema: what it is, then its options.
 pub fn describe(name: &str, schema: &Schema) -> String {
     let schema = schema.as_value();
@@ -180,7 +194,16 @@ fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
         for line in about.lines() {
             *page += &format!("{indent}    {line}\n");
         }
-        options(page, option, depth + 2);
+        // A table with any names: what stands under each.
+        match keys_of(option) {
+            Some(Keys::Any(each)) if matches!(keys_of(each), Some(Keys::Known(_))) => {
+                *page += &format!("{indent}    NAME ({})\n", type_name(each));
+                options(page, each, depth + 4);
+            }
+            _ => {
+                options(page, option, depth + 2);
+            }
+        }
     }
     known.len()
 }

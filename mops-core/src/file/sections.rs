@@ -9,9 +9,9 @@ use super::entries::Entries;
 use crate::criterion::Usage;
 use crate::experiment::{Hold, Input, Role};
 use crate::linearised::Linearise;
-use crate::study::{Objective, Task};
+use crate::study::{Mistake, Objective, Task};
 use crate::tuner::Scale;
-use crate::unit::Quantity;
+use crate::unit::{Quantity, Unit};
 
 /// What the study is.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
@@ -104,7 +104,9 @@ pub(super) struct TunerSection {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct CaseOptions {
-    /// What drives the model's inputs; an input that is not named is 0.
+    /// What drives the model's inputs; an input that is not named is 0. Each moves as `constant`, `step` or `sine`:
+    /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. Numbers without a unit count in that of the input.
+    /// What was recorded is an input of [experiments].
     #[serde(default)]
     pub inputs: Entries<InputSection>,
     /// End of the simulation.
@@ -120,42 +122,70 @@ impl CaseOptions {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum InputSection {
     /// The same value throughout.
-    Constant(f64),
+    Constant(Quantity),
     /// A step.
-    Step {
-        /// When, s.
-        #[serde(default)]
-        time: f64,
-        /// Value before.
-        #[serde(default)]
-        before: f64,
-        /// Value from then on.
-        after: f64,
-    },
-    /// `offset + amplitude sin(2 pi frequency t + phase)`.
-    Sine {
-        /// Amplitude.
-        amplitude: f64,
-        /// Frequency, Hz.
-        frequency: f64,
-        /// Phase, rad.
-        #[serde(default)]
-        phase: f64,
-        /// Mean value.
-        #[serde(default)]
-        offset: f64,
-    },
+    Step(StepSection),
+    /// A sine.
+    Sine(SineSection),
 }
 
-impl From<InputSection> for Input {
-    fn from(section: InputSection) -> Self {
-        match section {
-            InputSection::Constant(value) => Self::Constant(value),
-            InputSection::Step { time, before, after } => Self::Step { time, before, after },
-            InputSection::Sine { amplitude, frequency, phase, offset } => {
-                Self::Sine { amplitude, frequency, phase, offset }
+/// One value up to a time, another from then on.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct StepSection {
+    /// When it steps; a number without a unit counts in s. 0 where absent.
+    pub time: Option<Quantity>,
+    /// Value before; 0 where absent.
+    pub before: Option<Quantity>,
+    /// Value from then on.
+    pub after: Quantity,
+}
+
+/// `offset + amplitude sin(2 pi frequency t + phase)`.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct SineSection {
+    /// Amplitude.
+    pub amplitude: Quantity,
+    /// Frequency; a number without a unit counts in Hz.
+    pub frequency: Quantity,
+    /// Phase; a number without a unit counts in rad. 0 where absent.
+    pub phase: Option<Quantity>,
+    /// Mean value; 0 where absent.
+    pub offset: Option<Quantity>,
+}
+
+impl InputSection {
+    /// The input, with values in `unit`. Mistakes carry the key of the value.
+    pub fn input(&self, unit: &Unit) -> Result<Input, Mistake> {
+        let number = |key: &'static str, quantity: &Quantity, unit: &Unit| {
+            let unitless = |m: Mistake| m.with_help(format!("a number without a unit counts in `{unit}`"));
+            quantity.to(unit).map_err(|why| unitless(Mistake::new(key, why)))
+        };
+        let or_zero = |key: &'static str, quantity: &Option<Quantity>, unit: &Unit| {
+            quantity.as_ref().map_or(Ok(0.0), |quantity| number(key, quantity, unit))
+        };
+        let known = Unit::known;
+        Ok(match self {
+            Self::Constant(value) => Input::Constant(number("constant", value, unit)?),
+            Self::Step(step) => {
+                let within = |m: Mistake| m.within("step");
+                Input::Step {
+                    time: or_zero("time", &step.time, &known("s")).map_err(within)?,
+                    before: or_zero("before", &step.before, unit).map_err(within)?,
+                    after: number("after", &step.after, unit).map_err(within)?,
+                }
             }
-        }
+            Self::Sine(sine) => {
+                let within = |m: Mistake| m.within("sine");
+                Input::Sine {
+                    amplitude: number("amplitude", &sine.amplitude, unit).map_err(within)?,
+                    frequency: number("frequency", &sine.frequency, &known("Hz")).map_err(within)?,
+                    phase: or_zero("phase", &sine.phase, &known("rad")).map_err(within)?,
+                    offset: or_zero("offset", &sine.offset, unit).map_err(within)?,
+                }
+            }
+        })
     }
 }
 
@@ -181,7 +211,8 @@ pub(super) struct ExperimentSection {
     /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
     #[serde(default)]
     pub channels: Entries<ChannelSection>,
-    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`.
+    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`. Between samples an
+    /// input stays (`hold = "zero"`, the default) or moves on straight lines (`hold = "first"`).
     #[serde(default)]
     pub inputs: Entries<InputColumn>,
     /// What it is used for: `calibration` (the default), `selection` or `validation`.
@@ -249,9 +280,9 @@ pub(super) struct InputTable {
     pub scale: Option<f64>,
     /// What is added after scaling, in the column's unit.
     pub offset: Option<Quantity>,
-    /// How it acts between samples: `zero` (the default: it stays) or `first` (straight lines).
-    #[serde(default)]
-    pub hold: Hold,
+    /// How it acts between samples: `zero` (the default: it stays until the next one, as a computer puts it out) or
+    /// `first` (straight lines from sample to sample, as for one that moves smoothly).
+    pub hold: Option<Hold>,
 }
 
 /// A state whose start value is estimated; what is absent is read off the data.
@@ -276,7 +307,7 @@ pub(super) struct CriterionCommon {
     pub cases: Option<Vec<String>>,
     /// `minimise` (the default), `inequality`, `equality` or `monitor`.
     pub usage: Option<Usage>,
-    /// The value to reach: the criterion is divided by it. Must be positive.
+    /// The value to reach: the criterion is divided by it. Must be positive; some kinds have one of their own.
     pub demand: Option<Quantity>,
     /// Value that scales to 0, where a demand does not fit; goes with `bad`.
     pub good: Option<Quantity>,
@@ -351,7 +382,7 @@ column_or_table!(InputColumn, InputTable, |column| InputTable {
     unit: None,
     scale: None,
     offset: None,
-    hold: Hold::Zero
+    hold: None
 });
 
 /// Free start values: a list of states, or a table.

@@ -4,8 +4,8 @@ use nalgebra::DVector;
 
 use super::insight::spacing;
 use super::report::RegressionReport;
-use super::words::{counted, percent};
-use super::{Recursive, Regression, RegressionTooShort, excitation, least_squares};
+use super::words::{coefficient, counted, percent};
+use super::{Recursive, Regression, RegressionTooShort, excitation, least_squares, whiteness};
 use crate::study::{RegressionTask, Study};
 
 /// Initial covariance of the recursion by the mean squares of output and regressors: as good as nothing known.
@@ -72,12 +72,32 @@ fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
         )
     } else {
         format!(
-            "`{}`: all {} are determined; one step ahead they predict {} of `{}`.",
+            "`{}`: the experiment tells all {} apart; one step ahead they predict {} of `{}`.{}",
             task.name,
             counted(n, "parameter"),
             percent(0.01 * report.fit_percent),
-            task.output
+            task.output,
+            if task.a > 0 { bias(error.as_slice(), report.residual, spread) } else { String::new() }
         )
     };
     report
+}
+
+/// What is to be known of the estimates of an ARX model: least squares is consistent only where the equation errors are
+/// white, and noise on the output is not. Source: L. Ljung, System Identification, 2nd edition (1999), section 7.3.
+fn bias(errors: &[f64], deviation: f64, spread: f64) -> String {
+    const WHY: &str = " Least squares is consistent only where the equation errors are white; noise on the measured output \
+                       makes them coloured and biases ARX (Ljung, System Identification, 2nd ed. 1999, section 7.3).";
+    // An exact fit leaves rounding errors, which tell nothing.
+    let found = if deviation > 1e-9 * spread { whiteness(errors) } else { None };
+    let verdict = match found {
+        Some(found) if found.is_white() => " Here they look white".to_owned(),
+        Some(found) => format!(" Here they are not white (lag-1 autocorrelation {})", coefficient(found.lag1)),
+        None => return WHY.to_owned(),
+    };
+    let rest = match found {
+        Some(found) if found.is_white() => ".",
+        _ => ": do not take the numbers and their standard errors as right.",
+    };
+    format!("{WHY}{verdict}{rest}")
 }

@@ -139,7 +139,8 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     let [alone, together] = [found.alone[k], found.together[k]];
     let std_error = local.deviation * together;
     // A start value near zero is as good as known where it is so by its range.
-    let scale = if local.starts[k] { coordinate.range } else { coordinate.scale() };
+    let by_range = local.starts[k] || coordinate.value == 0.0;
+    let scale = if by_range { coordinate.range } else { coordinate.scale() };
     let relative_error = std_error / scale;
     TunerSensitivity {
         name: coordinate.name.clone(),
@@ -149,6 +150,7 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
         std_error,
         std_error_alone: local.deviation * alone,
         relative_error,
+        relative_to: if by_range { "range" } else { "value" },
         inflation: together / alone,
         trust: match relative_error {
             _ if together.is_nan() => "undetermined",
@@ -224,12 +226,13 @@ fn words(local: &Local, tuners: &[TunerSensitivity], directions: &[DirectionRepo
     let known = || asked().filter(|t| t.relative_error.is_finite());
     let by_error = |a: &&TunerSensitivity, b: &&TunerSensitivity| a.relative_error.total_cmp(&b.relative_error);
     if let (Some(best), Some(worst), true) = (known().min_by(by_error), known().max_by(by_error), n > 1) {
+        let aside = if local.starts.contains(&true) { "; start values aside" } else { "" };
         words.push(format!(
-            "Best known is `{}`, to {}; least `{}`, to {} (one standard error).",
+            "Best known is `{}`, to {}; least `{}`, to {} (one standard error{aside}).",
             best.name,
-            percent(best.relative_error),
+            relative(best),
             worst.name,
-            percent(worst.relative_error)
+            relative(worst)
         ));
     }
     let weak: Vec<String> = asked().filter(|t| t.trust == "weak").map(|t| format!("`{}`", t.name)).collect();
@@ -282,6 +285,12 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
     pairs.iter().take(5).map(sentence).collect()
 }
 
+/// A relative error in words.
+fn relative(tuner: &TunerSensitivity) -> String {
+    let of = if tuner.relative_to == "range" { " of its range" } else { "" };
+    format!("{}{of}", percent(tuner.relative_error))
+}
+
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
@@ -331,9 +340,7 @@ pub fn excitation_report(
     parameters: Option<usize>,
 ) -> ExcitationReport {
     let found = excitation(values, noise);
-    let asked = parameters.is_some();
-    let parameters = parameters.unwrap_or(0);
-    let suffices = found.suffices(parameters) || found.is_at_least();
+    let suffices = found.suffices(parameters.unwrap_or(0)) || found.is_at_least();
     let order = if found.is_at_least() { format!("at least {}", found.order) } else { found.order.to_string() };
     let mut words = format!("`{input}` in `{case}` is persistently exciting of order {order}");
     match found.next {
@@ -348,18 +355,25 @@ pub fn excitation_report(
         Some(_) => words += ": it stays excited in no direction",
     }
     words += ". ";
+    let linear =
+        |n: usize| format!("a linear model (impulse response, transfer function) with {}", counted(n, "parameter"));
     words += &match (parameters, suffices) {
-        (0, _) if asked => "No tuner depends on it.".to_owned(),
-        (0, _) => format!("That suffices for {order} parameters."),
-        (_, true) => format!("That suffices for the {}.", counted(parameters, "tuner")),
-        (_, false) => {
-            let transient = match found.transient {
-                Some(share) if share > found.zero => {
-                    " What happens only once (an edge) excites more: whether that is enough, the sensitivities tell."
-                }
+        (None, _) => format!("In the long run that suffices for {}.", linear(found.order)),
+        (Some(0), _) => "No tuner depends on it.".to_owned(),
+        (Some(n), true) => format!(
+            "In the long run that suffices for {}, as many as tuners act here; what it tells of these, the sensitivities say.",
+            linear(n)
+        ),
+        (Some(n), false) => {
+            let once = match found.transient {
+                Some(share) if share > found.zero => " What happens only once (an edge) excites more.",
                 _ => "",
             };
-            format!("In the long run that does not suffice for {}.{transient}", counted(parameters, "tuner"))
+            format!(
+                "In the long run that does not suffice for {}, as many as tuners act here.{once} A model that is nonlinear, or \
+                 whose parameters are tied by physics, may need less: what the data tell of the tuners, the sensitivities say.",
+                linear(n)
+            )
         }
     };
     ExcitationReport {

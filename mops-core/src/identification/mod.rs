@@ -10,6 +10,7 @@ mod recursive;
 mod regression;
 mod report;
 mod sensitivity;
+mod whiteness;
 mod words;
 
 pub use blind::BlindDirection;
@@ -24,3 +25,4 @@ pub use report::{
     DirectionReport, ExcitationReport, RegressionReport, RelativeReport, SensitivityReport, TunerSensitivity,
 };
 pub use sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
+pub use whiteness::{Whiteness, whiteness};

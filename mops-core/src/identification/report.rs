@@ -59,8 +59,10 @@ pub struct TunerSensitivity {
     pub std_error: f64,
     /// The same, were all other tuners known.
     pub std_error_alone: f64,
-    /// Standard error as a share of the value; of a start value, as a share of its range.
+    /// Standard error as a share of what `relative_to` says.
     pub relative_error: f64,
+    /// `value`, or `range`: of a start value, which may well be near zero, and of a tuner that is 0.
+    pub relative_to: &'static str,
     /// How much wider the error is because the others are not known: at least 1.
     pub inflation: f64,
     /// `determined`, `weak` (uncertain by more than a tenth), or `undetermined`.
@@ -107,9 +109,9 @@ pub struct ExcitationReport {
     pub transient: Option<f64>,
     /// Share of the power that counts as zero.
     pub zero: f64,
-    /// Number of parameters that are to be estimated.
-    pub parameters: usize,
-    /// Whether the order suffices for them.
+    /// Number of parameters that are to be estimated, start values not counted; null where none are known.
+    pub parameters: Option<usize>,
+    /// Whether the order suffices for a linear model with as many parameters.
     pub suffices: bool,
     /// Order and smallest eigenvalue as a share of the power.
     pub spectrum: Vec<(usize, f64)>,

@@ -163,6 +163,8 @@ pub struct CaseDraft {
     pub horizon: Option<f64>,
     /// What was measured; this makes it an experiment.
     pub measured: Option<Measured>,
+    /// What deserves a word before a run.
+    pub warnings: Vec<String>,
 }
 
 /// What an experiment brings.

@@ -75,6 +75,8 @@ pub struct Study {
     pub tasks: Tasks,
     /// What deserves a word before a run, such as a first sample that looks wrong.
     pub warnings: Vec<String>,
+    /// What was assumed where nothing was said, such as the unit of a column.
+    pub notes: Vec<String>,
 }
 
 /// A criterion in one case.

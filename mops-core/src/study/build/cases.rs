@@ -10,6 +10,7 @@ use crate::study::draft::{CaseDraft, ChannelDraft, Measured, Mistake};
 use crate::unit::Unit;
 
 pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {
+    warnings.extend(draft.warnings.iter().cloned());
     let mut parameters = Vec::new();
     for (name, quantity) in &draft.parameters {
         // In a file, an experiment has a table of them.
@@ -64,6 +65,22 @@ fn build_input(
         }
     }
     Ok((name.clone(), input))
+}
+
+/// Recordings without a unit where the model has one.
+pub(super) fn assumed_units(draft: &CaseDraft, models: &Models) -> Vec<String> {
+    let interfaces = || models.iter().map(|(_, model)| model.interface());
+    let signals: Vec<&Variable> = interfaces().flat_map(|interface| &interface.signals).collect();
+    let inputs: Vec<&Variable> = interfaces().flat_map(|interface| &interface.inputs).collect();
+    let note = |name: &str, known: &[&Variable]| {
+        let unit = known.iter().find(|v| v.name == name).map(|v| v.unit.to_string()).filter(|unit| unit != "1")?;
+        Some(format!("`{name}` in `{}` has no unit in the file: taken as {unit}", draft.name))
+    };
+    let channels = draft.measured.iter().flat_map(|m| &m.channels).filter(|channel| channel.unit.is_none());
+    let recorded =
+        draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && matches!(input, Input::Sampled { .. }));
+    let channels = channels.filter_map(|channel| note(&channel.signal, &signals));
+    channels.chain(recorded.filter_map(|(name, ..)| note(name, &inputs))).collect()
 }
 
 fn build_experiment(

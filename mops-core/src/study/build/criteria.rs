@@ -31,7 +31,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
     let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(interface)?);
     let signals = interface.signals.clone();
     let unit = criterion.unit();
-    let demand = demand(&draft, &unit)?;
+    let demand = demand(&draft, &unit, criterion.natural_demand())?;
     if !(draft.weight.is_finite() && draft.weight > 0.0) {
         return Err(Mistake::new("weight", format!("a weight must be positive, not {}", draft.weight))
             .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
@@ -127,7 +127,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
     Ok(chosen)
 }
 
-fn demand(draft: &CriterionDraft, unit: &Unit) -> Result<Demand, Mistake> {
+fn demand(draft: &CriterionDraft, unit: &Unit, natural: Option<f64>) -> Result<Demand, Mistake> {
     let value =
         |key: &str, q: &Option<Quantity>| q.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose();
     let (demand, good, bad) = (value("demand", &draft.demand)?, value("good", &draft.good)?, value("bad", &draft.bad)?);
@@ -141,6 +141,7 @@ fn demand(draft: &CriterionDraft, unit: &Unit) -> Result<Demand, Mistake> {
         (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")
             .with_help("remove one or the other")),
         (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
+        (None, None, None) if natural.is_some() => Ok(natural.map_or(Demand::None, Demand::Value)),
         (None, None, None) => Err(Mistake::here("the criterion has no demand").with_help("add `demand = ...`, or the pair `good` and `bad`")),
         (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")
             .with_help("add `bad = ...`, the value that scales to 1")),

@@ -9,10 +9,11 @@ mod values;
 use std::sync::Arc;
 
 use crate::case::Case;
+use crate::criterion::Usage;
 use crate::model::{Interface, Model};
 use crate::study::draft::{CaseDraft, Draft, Mistake};
 use crate::study::{JobPlan, Objective, Study, Task, Tasks, tasks};
-use cases::build_case;
+use cases::{assumed_units, build_case};
 use criteria::add_rows;
 use jobs::complete;
 use tuners::{build_tuner, check_use, free_start, tie_tuners};
@@ -68,6 +69,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
                 if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
             }
         });
+    let notes = drafts.iter().flat_map(|case| assumed_units(case, &models)).collect();
     let mut study = Study {
         name: draft.name,
         task: draft.task,
@@ -79,6 +81,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         rows: Vec::new(),
         jobs: Vec::new(),
         tasks: Tasks::default(),
+        notes,
         warnings,
     };
     // How rich an input is can be told without a criterion.
@@ -94,6 +97,11 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         let JobPlan { model, case, .. } = study.jobs[index];
         complete(&mut study, index, &fixed[model])
             .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
+    }
+    let solved = matches!(study.task, Task::Design | Task::Calibration);
+    if solved && study.rows.iter().all(|row| row.usage == Usage::Monitor) {
+        let fact = "nothing to minimise: every criterion is a monitor, so that the tuners stay at their start values";
+        study.warnings.push(fact.to_owned());
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     study.tasks = tasks::build(draft.tasks, &study)?;

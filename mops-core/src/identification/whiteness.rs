@@ -1,0 +1,128 @@
+//! Whether residuals are white: what standard errors assume of them.
+
+use serde::Serialize;
+
+use super::words::{coefficient, percent};
+
+/// Probability below which residuals do not count as white.
+const UNLIKELY: f64 = 0.01;
+
+/// How residuals are correlated with those before them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// Autocorrelation of neighbours, between -1 and 1; 0 for white residuals.
+    pub lag1: f64,
+    /// `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the lags 1 to [`Whiteness::lags`].
+    pub ljung_box: f64,
+    /// Number of lags, in samples.
+    pub lags: usize,
+    /// Probability of a larger `Q`, were the residuals white.
+    pub probability: f64,
+}
+
+/// Tests residuals about their mean; `None` for fewer than 20, or where they do not vary. Gaps are passed over.
+///
+/// Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series models, Biometrika 65 (1978), 297-303.
+/// `Q` is compared with chi-squared of as many degrees of freedom as lags: ten, or fewer for fewer than 50 residuals.
+#[allow(clippy::cast_precision_loss)]
+pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
+    let n = residuals.len();
+    if n < 20 {
+        return None;
+    }
+    let mean = residuals.iter().sum::<f64>() / n as f64;
+    let about: Vec<f64> = residuals.iter().map(|e| e - mean).collect();
+    let power: f64 = about.iter().map(|e| e * e).sum();
+    if !(power.is_finite() && power > 0.0) {
+        return None;
+    }
+    // An even number: then the tail of chi-squared is a finite sum.
+    let lags = (n / 10 * 2).min(10);
+    let correlation = |k: usize| about.iter().zip(&about[k..]).map(|(a, b)| a * b).sum::<f64>() / power;
+    let sum: f64 = (1..=lags).map(|k| correlation(k).powi(2) / (n - k) as f64).sum();
+    let ljung_box = n as f64 * (n as f64 + 2.0) * sum;
+    Some(Whiteness { lag1: correlation(1), ljung_box, lags, probability: tail(ljung_box, lags) })
+}
+
+/// Probability that chi-squared with an even number of degrees of freedom exceeds `q`:
+/// `exp(-q/2) sum_{k < freedom/2} (q/2)^k / k!`.
+fn tail(q: f64, freedom: usize) -> f64 {
+    let (mut term, mut sum) = (1.0, 0.0);
+    for k in 1..=freedom / 2 {
+        sum += term;
+        #[allow(clippy::cast_precision_loss)]
+        let next = 0.5 * q / k as f64;
+        term *= next;
+    }
+    sum * (-0.5 * q).exp()
+}
+
+impl Whiteness {
+    /// Whether nothing speaks against it.
+    pub fn is_white(&self) -> bool {
+        self.probability >= UNLIKELY
+    }
+
+    /// The finding on a channel of an experiment in a sentence.
+    pub fn words(&self, channel: &str, experiment: &str) -> String {
+        let chance = match self.probability {
+            p if p < 1e-4 => "less than 0.01 %".to_owned(),
+            p => percent(p),
+        };
+        let numbers = format!(
+            "lag-1 autocorrelation {}, Ljung-Box {} over {} lags: white ones exceed that with probability {chance}",
+            coefficient(self.lag1),
+            coefficient(self.ljung_box),
+            self.lags
+        );
+        let place = format!("The residuals of `{channel}` in `{experiment}`");
+        if self.is_white() {
+            format!("{place} look white ({numbers}), as the standard errors assume.")
+        } else {
+            format!(
+                "{place} are not white ({numbers}); the standard errors assume that they are, and may be far too small: \
+                 look for an effect that the model lacks, a delay, or an input that is held wrongly."
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n` values without a pattern.
+    fn chirp(n: i32) -> Vec<f64> {
+        (0..n).map(|i| f64::from(i * i).sin()).collect()
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() <= 1e-6 * b.abs().max(1e-3), "{a} is not {b}");
+    }
+
+    #[test]
+    fn the_tail_of_chi_squared_has_its_tabulated_value() {
+        // The 95 % point for 10 degrees of freedom is 18.307.
+        assert!((tail(18.307, 10) - 0.05).abs() < 1e-5);
+    }
+
+    // Reference: the formulas, computed apart; the tail by integrating the density numerically.
+    #[test]
+    fn white_and_coloured_residuals_are_told_apart() {
+        let white = whiteness(&chirp(60)).unwrap();
+        close(white.lag1, -0.163_995_667_7);
+        close(white.ljung_box, 8.027_409_057);
+        close(white.probability, 0.626_159_546);
+        assert!(white.is_white());
+        let slow: Vec<f64> = (0..60).map(|i| (0.2 * f64::from(i)).sin()).collect();
+        let slow = whiteness(&slow).unwrap();
+        assert!(slow.lag1 > 0.9 && !slow.is_white());
+        assert!(slow.words("y", "swing").contains("not white"));
+    }
+
+    #[test]
+    fn too_few_or_constant_residuals_tell_nothing() {
+        assert_eq!(whiteness(&chirp(19)), None);
+        assert_eq!(whiteness(&[1.0; 100]), None);
+    }
+}
