@@ -68,6 +68,9 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     let states = study.models[model].1.equation_states();
     if !states.is_empty() {
         print(&format!("\n{}", operating_point(&states, &interface.inputs, &found)));
+        for joint in &found.frictionless {
+            print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"));
+        }
     }
     print(&matrices(&system, &|name| unit_of(name, &states, &interface.inputs, &interface.signals)));
     print(&poles_table("pole", &system.poles().map_err(Trouble::Failure)?));
@@ -173,7 +176,14 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
         let request = Job { case, parameters, signals: &[], horizon: plan.horizon };
         return match model.analyse(&request).map_err(undefined)? {
             Analysis::Linear(system) => {
-                Ok(Resting { system, states: Vec::new(), inputs: Vec::new(), rates: Vec::new() })
+                let none = Resting {
+                    states: Vec::new(),
+                    inputs: Vec::new(),
+                    rates: Vec::new(),
+                    frictionless: Vec::new(),
+                    system,
+                };
+                Ok(none)
             }
             Analysis::Time(_) => unreachable!("a linear model gives linear systems"),
         };
