@@ -113,7 +113,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
 }
 
 /// Half the height of the picture that shows poles and zeros at these distances from 0: where a few lie ten times as far out
-/// as at least two others, those others alone.
+/// as at least two others, those others and what lies around them.
 fn shown(mut distances: Vec<f64>) -> f64 {
     distances.retain(|size| *size > 0.0);
     distances.sort_by(f64::total_cmp);
@@ -122,7 +122,7 @@ fn shown(mut distances: Vec<f64>) -> f64 {
         .windows(2)
         .enumerate()
         .find(|(i, pair)| *i > 0 && pair[1] > 10.0 * pair[0] && pair[0] > 1e-6 * largest);
-    near.map_or(largest, |(_, pair)| pair[0])
+    near.map_or(largest, |(_, pair)| (pair[0] * largest).sqrt().min(5.0 * pair[0]))
 }
 
 /// The roots in the order of the branches they continue: nearest first.
