@@ -167,3 +167,35 @@ response = { frequency-fit = { signal = 'y' }, demand = 1 }
         assert!((found - exact).abs() < 1e-6, "{tuner}");
     }
 }
+
+#[test]
+fn a_joint_with_dry_friction_is_held_by_the_input_alone_and_rounding_is_not_printed() {
+    let text = "
+[study]
+name = 'joint'
+[models.p.equations]
+states = { ph = 'rad', w = 'rad/s' }
+inputs = { u = 'N m' }
+der = { ph = 'w', w = \"0.01*w' = u - 0.6*sin(ph)\" }
+friction.ph = { coulomb = 0.05, viscous = 0.002 }
+horizon = '1 s'
+[cases]
+a = { inputs.u.constant = 0.3 }
+[criteria]
+p = { peak = { signal = 'ph' }, usage = 'monitor' }
+";
+    let folder = tempfile::tempdir().unwrap();
+    let file = study(folder.path(), text);
+    let arguments = ["linearise", &file, "--at", "ph=0.3", "--equilibrium"];
+    let found = mops(&[&arguments[..], &["--free", "u", "--lqr", "1,1,1"]].concat()).output().unwrap();
+    let text = String::from_utf8(found.stdout).unwrap();
+    for part in
+        ["0.177312", "note: dry friction of `ph` is left out", "\n  (100 s)/(s^2 ", "zeros (1/s): 0\n", "u [N m]"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(!text.contains("u/u"), "{text}");
+    let held = mops(&arguments).output().unwrap();
+    let error = String::from_utf8(held.stderr).unwrap();
+    assert!(error.contains("`ph` still changes by") && error.contains("the input `u` is held, --free"), "{error}");
+}

@@ -9,7 +9,9 @@ use serde::Deserialize;
 
 use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
-use crate::kernel::{self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
+use crate::kernel::{
+    self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, rests, wanted,
+};
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
 ///
@@ -24,8 +26,8 @@ use crate::kernel::{self, Dynamics, Equations, Recording, Simulate, Tolerance, r
 ///
 /// Parameters: `a` pendulum inertia about its joint, `b` inertia of arm and load, `c` coupling (all kg m2), `d` gravity
 /// torque (N m), `ba`, `bp` viscous friction (N m s/rad), `ca`, `cp` Coulomb friction (N m), and the start values `phi0`,
-/// `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`. Linearised, the Coulomb friction
-/// is left out.
+/// `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`. Linearised, a
+/// joint at rest has no Coulomb friction, and one that moves slides.
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`.
 ///
@@ -129,12 +131,25 @@ impl Model for Furuta {
 }
 
 impl Equations for Furuta {
-    /// Without Coulomb friction, which has no slope at rest.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let x: [S; 4] = x.try_into().expect("the pendulum has four states");
-        let mut dynamics = Self::dynamics(parameters, Drive::held(u[0]))?;
-        dynamics.coulomb = [S::from(0.0); 2];
+    /// Joints at rest without Coulomb friction, which has no slope there.
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let x: [S; 4] = at.states.try_into().expect("the pendulum has four states");
+        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]))?;
+        for (joint, speed) in SPEED.into_iter().enumerate() {
+            if rests(at, x[speed]) {
+                dynamics.coulomb[joint] = S::from(0.0);
+            }
+            dynamics.contact[joint] = Contact::of(x[speed].value());
+        }
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
+
+    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
+        let left_out = |&&(_, speed, coulomb): &&(&str, usize, usize)| {
+            rests(at, at.states[speed]) && at.parameters[coulomb] != 0.0
+        };
+        let joints = [("phi", SPEED[1], 6), ("theta", SPEED[0], 7)];
+        joints.iter().filter(left_out).map(|(name, ..)| (*name).to_owned()).collect()
     }
 }
 

@@ -22,8 +22,8 @@ use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_s
 ///
 /// The bearings have dry friction: arm `t1 = sign(phi') (tau11 + (tau12 - tau11) |phi'|)` while it turns, at rest whatever
 /// holds it up to `peak1 tau11`; the pendulum likewise with `tau21`, `tau22` (N m, at 0 and at 1 rad/s) and `peak2`. A
-/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so. Linearised, the
-/// friction is left out.
+/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so. Linearised, a joint
+/// at rest has no dry friction, and one that moves slides.
 ///
 /// Parameters: `J` inertia of the pendulum about its centre of mass, `Ja` of the arm about its axis (kg m2), `m` mass of
 /// pendulum and weight (kg), `l` its centre of mass from the arm (m), `r` length of the arm (m, default 0.245), `g`
@@ -92,27 +92,25 @@ impl Model for Furuta2Joint {
 }
 
 impl Equations for Furuta2Joint {
-    /// Without friction, which has no slope at rest.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let frictionless = std::array::from_fn(|_| BearingFriction::none());
-        let dynamics = Self::dynamics(parameters, Drive::held(u[0]), frictionless);
-        let x = x.try_into().expect("two joints have four states");
+    /// Joints at rest without friction, which has no slope there.
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), Self::friction(at.parameters)?);
+        dynamics.look(at);
+        let x = at.states.try_into().expect("two joints have four states");
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
+
+    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
+        let Ok(friction) = Self::friction(at.parameters) else { return Vec::new() };
+        let joints = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), friction).look(at);
+        joints.into_iter().map(|joint| self.interface.signals[2 * joint].name.clone()).collect()
     }
 }
 
 impl Simulate for Furuta2Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let [_, _, _, _, _, _, tau11, tau12, peak1, tau21, tau22, peak2, start @ ..] = parameters else {
-            panic!("the study gives every parameter")
-        };
-        let line = |at_rest: S, at_one: S| [[S::from(0.0), at_rest], [S::from(1.0), at_one]];
-        let friction = [
-            BearingFriction::new(&line(*tau11, *tau12), *peak1)?,
-            BearingFriction::new(&line(*tau21, *tau22), *peak2)?,
-        ];
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), friction);
-        let start = start.try_into().expect("four start values come last");
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
+        let start = *parameters.last_chunk().expect("four start values come last");
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -120,6 +118,14 @@ impl Simulate for Furuta2Joint {
 type TwoJoints<'a, S> = Mechanism<S, TwoBodies<'a, S>, 2, 4>;
 
 impl Furuta2Joint {
+    /// The bearings of arm and pendulum.
+    fn friction<S: Scalar>(parameters: &[S]) -> Result<[BearingFriction<S>; 2], Failure> {
+        let [tau11, tau12, peak1, tau21, tau22, peak2] =
+            *parameters[6..].first_chunk().expect("the study gives every parameter");
+        let line = |at_rest: S, at_one: S| [[S::from(0.0), at_rest], [S::from(1.0), at_one]];
+        Ok([BearingFriction::new(&line(tau11, tau12), peak1)?, BearingFriction::new(&line(tau21, tau22), peak2)?])
+    }
+
     fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 2]) -> TwoJoints<'a, S> {
         let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
         Mechanism::new(TwoBodies { lumped, drive }, friction, &[ARM, PENDULUM])

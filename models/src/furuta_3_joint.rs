@@ -28,7 +28,7 @@ use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_s
 /// The bearing of the arm has a table of friction torque over speed: `tau11` at rest, `tau01` at `point0`, `tau05` at
 /// `point1`, `tau12` at `point2`, straight between and beyond, break-away at `peak1 tau11`. The pendulum's has two entries
 /// as in `furuta-2-joint`. A friction that is negative at a speed drives the joint: an event says so.
-/// Linearised, the friction is left out.
+/// Linearised, a joint at rest has no dry friction, and one that moves slides.
 ///
 /// Parameters: those of `furuta-2-joint`; `tau01`, `tau05` (N m), `point0`, `point1`, `point2` (rad/s, increasing); `c`
 /// (N m/rad), `d` (N m s/rad); start values `psi0`, `dpsi0` besides the others (0).
@@ -110,30 +110,25 @@ impl Model for Furuta3Joint {
 }
 
 impl Equations for Furuta3Joint {
-    /// Without friction, which has no slope at rest.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let frictionless = std::array::from_fn(|_| BearingFriction::none());
-        let dynamics = Self::dynamics(parameters, Drive::held(u[0]), frictionless);
-        let x = x.try_into().expect("three joints have six states");
+    /// Joints at rest without friction, which has no slope there.
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), Self::friction(at.parameters)?);
+        dynamics.look(at);
+        let x = at.states.try_into().expect("three joints have six states");
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
+    }
+
+    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
+        let Ok(friction) = Self::friction(at.parameters) else { return Vec::new() };
+        let joints = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), friction).look(at);
+        joints.into_iter().map(|joint| self.interface.signals[2 * joint].name.clone()).collect()
     }
 }
 
 impl Simulate for Furuta3Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let [_, _, _, _, _, _, friction @ .., _, _, phi, dphi, theta, dtheta, psi, dpsi] = parameters else {
-            panic!("the study gives every parameter")
-        };
-        let [tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2] =
-            *friction.first_chunk().expect("the study gives every parameter");
-        let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
-        let friction = [
-            BearingFriction::new(&[[at_rest, tau11], [point0, tau01], [point1, tau05], [point2, tau12]], peak1)?,
-            BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
-            BearingFriction::none(),
-        ];
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), friction);
-        let start = [*phi, *dphi, *theta, *dtheta, *psi, *dpsi];
+        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
+        let start = *parameters.last_chunk().expect("six start values come last");
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -141,6 +136,18 @@ impl Simulate for Furuta3Joint {
 type ThreeJoints<'a, S> = Mechanism<S, ThreeBodies<'a, S>, 3, 6>;
 
 impl Furuta3Joint {
+    /// The bearings of arm, pendulum and tilt.
+    fn friction<S: Scalar>(parameters: &[S]) -> Result<[BearingFriction<S>; 3], Failure> {
+        let [tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2] =
+            *parameters[6..].first_chunk().expect("the study gives every parameter");
+        let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
+        Ok([
+            BearingFriction::new(&[[at_rest, tau11], [point0, tau01], [point1, tau05], [point2, tau12]], peak1)?,
+            BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
+            BearingFriction::none(),
+        ])
+    }
+
     fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 3]) -> ThreeJoints<'a, S> {
         let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
         // Spring and damper stand before the six start values.

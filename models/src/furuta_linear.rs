@@ -78,9 +78,9 @@ impl Model for FurutaLinear {
 }
 
 impl Equations for FurutaLinear {
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(u[0]))?;
-        let x = x.try_into().expect("the pendulum has four states");
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]))?;
+        let x = at.states.try_into().expect("the pendulum has four states");
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
     }
 }

@@ -110,9 +110,9 @@ impl Model for FurutaStateFeedback {
 
 impl Equations for FurutaStateFeedback {
     /// Within the limit of the torque.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], _: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let dynamics = self.dynamics(parameters)?;
-        let x = x.try_into().expect("the loop has five states");
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let dynamics = self.dynamics(at.parameters)?;
+        let x = at.states.try_into().expect("the loop has five states");
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
     }
 }

@@ -57,11 +57,55 @@ fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
 }
 
 #[test]
+fn bearings_rest_without_dry_friction_and_slide_where_they_move() {
+    let furuta = model::<crate::furuta_2_joint::Furuta2JointOptions>("");
+    let value = |p: &mops_core::Parameter| match p.variable.name.as_str() {
+        "tau11" => 0.01,
+        "tau12" => 0.03,
+        "tau22" => 0.004,
+        "theta0" => 3.1,
+        _ => p.default.unwrap_or(0.02),
+    };
+    let parameters: Vec<f64> = furuta.interface().parameters.iter().map(value).collect();
+    let look = |dphi: f64, at_rest: bool| {
+        let states = [0.0, dphi, std::f64::consts::PI, 0.0];
+        let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0], at_rest };
+        furuta.local(&at).unwrap().unwrap()
+    };
+    let (resting, forward, backward) = (look(0.0, false), look(2.0, false), look(-2.0, false));
+    // The pendulum's friction, without a jump at rest, stays; that of the arm at 2 rad/s is 0.05 N m.
+    assert_eq!((resting.rates[1].abs() < 1e-12, resting.slopes[(1, 1)]), (true, 0.0));
+    assert!(resting.slopes[(3, 3)] < 0.0 && resting.frictionless == ["phi"]);
+    assert!((forward.rates[1] + 0.05 * resting.slopes[(1, 4)]).abs() < 1e-9, "{:?}", forward.rates);
+    assert!((backward.rates[1] + forward.rates[1]).abs() < 1e-9 && forward.frictionless.is_empty());
+    assert!((forward.slopes[(1, 1)] + 0.02 * resting.slopes[(1, 4)]).abs() < 1e-9);
+    assert!(look(2.0, true).rates[1].abs() < 1e-12);
+    let search = Linearise { equilibrium: true, ..Linearise::default() };
+    let found = Linearised::new(Arc::from(furuta), &search).unwrap().at(&Case::default(), &parameters).unwrap();
+    assert!((found.states[2] - std::f64::consts::PI).abs() < 1e-9, "{:?}", found.states);
+}
+
+#[test]
+fn coulomb_friction_of_the_furuta_pendulum_has_its_sign_where_a_joint_moves() {
+    let furuta = Furuta::new(None, Tolerance::default());
+    let look = |dphi: f64, at_rest: bool| {
+        let states = [0.0, dphi, 0.0, 0.0];
+        let at = OperatingPoint { parameters: &FURUTA, states: &states, inputs: &[0.0], at_rest };
+        furuta.local(&at).unwrap().unwrap()
+    };
+    let (resting, sliding) = (look(0.0, false), look(1.0, false));
+    assert_eq!((resting.rates.as_slice(), resting.frictionless.join(" ").as_str()), (&[0.0; 4][..], "phi theta"));
+    // Coulomb 1e-3 N m and viscous 1e-4 N m against the arm, as if the input gave them.
+    assert!((sliding.rates[1] + 1.1e-3 * resting.slopes[(1, 4)]).abs() < 1e-9 && sliding.frictionless == ["theta"]);
+    assert!((look(1.0, true).rates[1] + 1e-4 * resting.slopes[(1, 4)]).abs() < 1e-9);
+}
+
+#[test]
 fn slopes_at_any_state_agree_with_central_differences() {
     let furuta = Furuta::new(None, Tolerance::default());
     let (states, inputs) = ([0.3, -1.2, 2.1, 4.0], [0.01]);
     let local = |states: &[f64], inputs: &[f64]| {
-        furuta.local(&OperatingPoint { parameters: &FURUTA, states, inputs }).unwrap().unwrap()
+        furuta.local(&OperatingPoint { parameters: &FURUTA, states, inputs, at_rest: false }).unwrap().unwrap()
     };
     let here = local(&states, &inputs);
     let h = 1e-5;

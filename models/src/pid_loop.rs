@@ -258,14 +258,14 @@ impl PidLoop {
 
 impl Equations for PidLoop {
     /// Within the limits of the actuator.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], inputs: &[S]) -> Result<[Vec<S>; 2], Failure> {
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
         if self.sampling.is_some() {
             return Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into()));
         }
-        let (controller, named) = parameters.split_at(CONTROLLER.len());
+        let (controller, named) = at.parameters.split_at(CONTROLLER.len());
         let (numerator, denominator) = self.plant.polynomials(named)?;
-        let drives = [Drive::held(inputs[0]), Drive::held(inputs[1])];
-        let x = x.to_vec();
+        let drives = [Drive::held(at.inputs[0]), Drive::held(at.inputs[1])];
+        let x = at.states.to_vec();
         let dynamics = self.dynamics((&numerator, &denominator), Controller::new(controller), &x, drives);
         Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Loop::signal))
     }

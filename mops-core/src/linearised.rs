@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::linear::{Balance, StateSpace, equilibrium};
+use crate::linear::{Balance, NoEquilibrium, StateSpace, equilibrium};
 use crate::model::{Analysis, AnalysisKind, Failure, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::study::Mistake;
 use crate::unit::Quantity;
@@ -53,6 +53,8 @@ pub struct Resting {
     pub inputs: Vec<f64>,
     /// Rates of change of the states there; zero in an equilibrium.
     pub rates: Vec<f64>,
+    /// The joints whose dry friction is left out, by the names of their positions.
+    pub frictionless: Vec<String>,
 }
 
 impl Linearised {
@@ -139,7 +141,7 @@ impl Linearised {
             self.given.iter().enumerate().map(|(i, given)| given.unwrap_or_else(|| start(i))).collect();
         let local = |point: &[f64]| {
             let (states, inputs) = point.split_at(n);
-            let at = OperatingPoint { parameters, states, inputs };
+            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
             self.model.local(&at).expect("a model with equations gives them")
         };
         if let Some(free) = &self.free {
@@ -147,11 +149,35 @@ impl Linearised {
                 let Local { rates, slopes, .. } = local(point).map_err(|failure| failure.to_string())?;
                 Ok(Balance { rates, slopes: slopes.rows(0, n).into_owned() })
             };
-            point = equilibrium(balance, &point, free).map_err(Failure::Undefined)?;
+            point = equilibrium(balance, &point, free).map_err(|why| Failure::Undefined(self.restless(&why)))?;
         }
-        let Local { rates, slopes, .. } = local(&point)?;
+        let Local { rates, slopes, frictionless, .. } = local(&point)?;
         let inputs = point.split_off(n);
-        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates })
+        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless })
+    }
+
+    /// Why there is no equilibrium, and what may help.
+    fn restless(&self, why: &NoEquilibrium) -> String {
+        let NoEquilibrium::Restless { state, rate } = why else { return why.to_string() };
+        let Variable { name, unit, .. } = &self.states[*state];
+        let unit = unit.power(1, -1);
+        let mut text = format!(
+            "no equilibrium was found: where the search ends `{name}` still changes by {rate:.3e} {unit}, most of all states"
+        );
+        let free = self.free.as_deref().unwrap_or_default();
+        let held = |from: usize, names: &[Variable]| -> Vec<String> {
+            names.iter().enumerate().filter(|(i, _)| !free[from + i]).map(|(_, v)| format!("`{}`", v.name)).collect()
+        };
+        let inputs = held(self.states.len(), &self.model.interface().inputs);
+        let states = held(0, &self.states);
+        match (inputs.as_slice(), states.as_slice()) {
+            ([], []) => {}
+            ([], states) => text += &format!("; the state {} is held", states.join(", ")),
+            (inputs, _) => {
+                text += &format!("; the input {} is held, --free lets the search move it", inputs.join(", "))
+            }
+        }
+        text
     }
 
     fn system(&self, slopes: &DMatrix<f64>) -> StateSpace {
@@ -223,6 +249,7 @@ mod tests {
                 rates: vec![speed, g * angle.sin() - u],
                 signals: vec![angle.sin(), speed],
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
+                frictionless: Vec::new(),
             }))
         }
     }
@@ -271,6 +298,9 @@ mod tests {
         let held = Linearise { at, equilibrium: true, ..Linearise::default() };
         let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
         assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");
+        // Newton's method ends where the speed is 0 and only the torque of gravity is left.
+        assert!(failure.to_string().contains("`speed` still changes by 3.505e0"), "{failure}");
+        assert!(failure.to_string().ends_with("the input `u` is held, --free lets the search move it"), "{failure}");
     }
 
     #[test]

@@ -158,13 +158,16 @@ pub trait Model: Send + Sync {
 
 /// Where the equations of a model are looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct OperatingPoint<'a> {
+pub struct OperatingPoint<'a, S = f64> {
     /// Values of the parameters, in the order of [`Interface::parameters`].
-    pub parameters: &'a [f64],
+    pub parameters: &'a [S],
     /// Values of the states, in the order of [`Model::equation_states`].
-    pub states: &'a [f64],
+    pub states: &'a [S],
     /// Values of the inputs, in the order of [`Interface::inputs`].
-    pub inputs: &'a [f64],
+    pub inputs: &'a [S],
+    /// Whether the model rests there, or a search for such a point passes: no joint then has dry friction, whatever its
+    /// speed. Else joints have none whose speed is as good as 0, and the others slide the way they move.
+    pub at_rest: bool,
 }
 
 /// The equations of a model at an operating point, with their exact slopes: what a linear system is made of.
@@ -176,6 +179,8 @@ pub struct Local {
     pub signals: Vec<f64>,
     /// Derivative of the rates, then of the signals (rows), by the states, then by the inputs (columns).
     pub slopes: DMatrix<f64>,
+    /// The joints whose dry friction is left out, by the names of their positions: at rest it has no slope.
+    pub frictionless: Vec<String>,
 }
 
 /// An analysis, and its derivatives: one analysis of the same form per direction.

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale};
 
+use super::families::folded;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, print};
@@ -35,7 +36,7 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         };
         vec![t.name.clone(), number(start), low, high, t.unit.to_string(), kind]
     });
-    text += &table(&["tuner", "start", "min", "max", "unit", ""], &[1, 2, 3], tuners.collect());
+    text += &table(&["tuner", "start", "min", "max", "unit", ""], &[1, 2, 3], folded(tuners.collect(), 0));
     let rows = study.rows.iter().map(|row| {
         let plan = &study.jobs[row.job];
         let usage = format!("{:?}", row.usage).to_lowercase();
@@ -54,7 +55,7 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
             ParameterSource::Tuner { .. } => None,
         })
     });
-    text += &format!("\n{}", table(&["case", "fixed parameter", "value", "unit"], &[2], fixed.collect()));
+    text += &format!("\n{}", table(&["case", "fixed parameter", "value", "unit"], &[2], folded(fixed.collect(), 1)));
     for warning in &study.warnings {
         text += &format!("\nwarning: {warning}\n");
     }

@@ -23,7 +23,7 @@ pub(super) fn plots(system: &StateSpace, name: &str) -> Result<Vec<(&'static str
 
 fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
     // What is far away hides what happens around -1; a gain at frequency 0 is shown where it is moderate.
-    let limit = response.scalar(0.0).norm().clamp(2.0, 20.0) * 1.1;
+    let limit = response.scalar(0.0).norm().clamp(1.5, 8.0) * 1.1;
     let limit = if limit.is_finite() { limit } else { 3.0 };
     let shown = |sign: f64| -> Vec<(f64, f64)> {
         let inside = |z: &Complex| z.norm() <= limit;
@@ -39,8 +39,9 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
             curve("unit circle", circle.map(|(sin, cos)| (cos, sin)).collect(), CurveStyle::Line, Ink::Grid),
             curve("negative frequencies", shown(-1.0), CurveStyle::Dashed, Ink::Start),
             curve("positive frequencies", shown(1.0), CurveStyle::Line, Ink::Result),
-            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Dots, Ink::Demand),
+            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Crosses, Ink::Demand),
         ],
+        equal: true,
         ..Plot::default()
     }
 }
@@ -49,8 +50,7 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
 /// negative. A delay is left out.
 fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let (poles, zeros) = (system.poles()?, zeros(system)?);
-    let size = poles.iter().chain(&zeros).map(|z| z.norm()).fold(0.0, f64::max);
-    let size = if size > 0.0 { size } else { 1.0 };
+    let size = shown(poles.iter().chain(&zeros).map(|z| z.norm()).collect());
     let direct = system.d[(0, 0)];
     let closed = |k: f64| eigenvalues(&(&system.a - &system.b * &system.c * (k / (1.0 + k * direct))));
     let mut branches: Vec<Vec<Complex>> = poles.iter().map(|&pole| vec![pole]).collect();
@@ -79,10 +79,14 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let limit = 2.0 * size;
     let point =
         |z: &Complex| if z.re.abs() <= limit && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
-    let dots = |name: &str, of: &[Complex], ink| Curve {
-        name: if of.is_empty() { String::new() } else { name.into() },
+    let marks = |name: &str, of: &[Complex], style, ink| Curve {
+        name: match of.iter().filter(|z| !point(z).0.is_finite()).count() {
+            _ if of.is_empty() => String::new(),
+            0 => name.into(),
+            far => format!("{name} ({far} farther away)"),
+        },
         points: of.iter().map(point).collect(),
-        style: CurveStyle::Dots,
+        style,
         ink,
         may_leave: false,
     };
@@ -91,18 +95,34 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         points: branch.iter().map(point).collect(),
         ..Curve::default()
     });
-    let axis = Curve { points: vec![(0.0, -1.05 * size), (0.0, 1.05 * size)], ink: Ink::Faint, ..Curve::default() };
     Ok(Plot {
         title: format!("root locus of {name}, for a growing gain in negative feedback"),
         x_label: "real part (1/s)".into(),
         y_label: "imaginary part (1/s)".into(),
-        curves: [axis]
-            .into_iter()
-            .chain(lines)
-            .chain([dots("poles", &poles, Ink::Demand), dots("zeros", &zeros, Ink::Measured)])
+        curves: lines
+            .chain([
+                marks("poles", &poles, CurveStyle::Crosses, Ink::Demand),
+                marks("zeros", &zeros, CurveStyle::Dots, Ink::Measured),
+            ])
             .collect(),
+        equal: true,
+        x_range: Some([0.0, 0.0]),
+        vertical: Some(0.0),
         ..Plot::default()
     })
+}
+
+/// Half the height of the picture that shows poles and zeros at these distances from 0: where a few lie ten times as far out
+/// as at least two others, those others and what lies around them.
+fn shown(mut distances: Vec<f64>) -> f64 {
+    distances.retain(|size| *size > 0.0);
+    distances.sort_by(f64::total_cmp);
+    let largest = distances.last().copied().unwrap_or(1.0);
+    let near = distances
+        .windows(2)
+        .enumerate()
+        .find(|(i, pair)| *i > 0 && pair[1] > 10.0 * pair[0] && pair[0] > 1e-6 * largest);
+    near.map_or(largest, |(_, pair)| (pair[0] * largest).sqrt().min(5.0 * pair[0]))
 }
 
 /// The roots in the order of the branches they continue: nearest first.

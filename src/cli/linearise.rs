@@ -12,6 +12,7 @@ use mops_core::{
 };
 use serde_json::{Value, json};
 
+use super::families::folded;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, linear_plots, print};
@@ -68,21 +69,39 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     let states = study.models[model].1.equation_states();
     if !states.is_empty() {
         print(&format!("\n{}", operating_point(&states, &interface.inputs, &found)));
-    }
-    print(&matrices(&system, &|name| unit_of(name, &states, &interface.inputs, &interface.signals)));
-    print(&poles_table("pole", &system.poles().map_err(Trouble::Failure)?));
-    let mut channels = Vec::new();
-    for i in 0..system.inputs.len() {
-        for o in 0..system.outputs.len() {
-            let (text, value) = channel(&system.channel(i, o)).map_err(Trouble::Failure)?;
-            print(&text);
-            channels.push(value);
+        for joint in &found.frictionless {
+            print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"));
         }
+    }
+    let unit = |name: &str| unit_of(name, &states, &interface.inputs, &interface.signals);
+    print(&matrices(&system, &unit));
+    let poles = system.poles().map_err(Trouble::Failure)?;
+    print(&poles_table("pole", &poles));
+    let mut channels = Vec::new();
+    let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
+    for (count, (i, o)) in pairs.enumerate() {
+        if count >= MANY && arguments.out.is_none() {
+            break;
+        }
+        let (text, value) = channel(&system.channel(i, o), &poles).map_err(Trouble::Failure)?;
+        if count < MANY {
+            print(&text);
+        }
+        channels.push(value);
+    }
+    let unseen = (system.inputs.len() * system.outputs.len()).saturating_sub(MANY);
+    if unseen > 0 {
+        print(&format!("\nand {unseen} more; --input and --output pick one, {WHERE} has all\n"));
     }
     let feedback = match design(&system, arguments)? {
         Some((heading, k)) => {
             let closed = eigenvalues(&(&system.a - &system.b * &k)).map_err(Trouble::Failure)?;
-            print(&format!("\n{heading}, u = -K x\n\n{}", named("K", &k, &system.inputs, &system.states)));
+            let labels = |names: &[String]| labels(names, &unit);
+            let shown = rounded_matrix(&k);
+            print(&format!(
+                "\n{heading}, u = -K x\n\n{}",
+                named("K", &shown, &labels(&system.inputs), &labels(&system.states))
+            ));
             print(&poles_table("closed-loop pole", &closed));
             json!({ "k": rows(&k), "poles": complex(&closed) })
         }
@@ -100,6 +119,12 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     }
     Ok(ExitCode::SUCCESS)
 }
+
+/// From how many states and channels on the terminal does not show all.
+const MANY: usize = 12;
+
+/// Where what is not shown can be found.
+const WHERE: &str = "linearised.json (--out DIR)";
 
 /// The job of the model and the case that are asked for.
 fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagnostic> {
@@ -173,7 +198,14 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
         let request = Job { case, parameters, signals: &[], horizon: plan.horizon };
         return match model.analyse(&request).map_err(undefined)? {
             Analysis::Linear(system) => {
-                Ok(Resting { system, states: Vec::new(), inputs: Vec::new(), rates: Vec::new() })
+                let none = Resting {
+                    states: Vec::new(),
+                    inputs: Vec::new(),
+                    rates: Vec::new(),
+                    frictionless: Vec::new(),
+                    system,
+                };
+                Ok(none)
             }
             Analysis::Time(_) => unreachable!("a linear model gives linear systems"),
         };
@@ -187,7 +219,12 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
 /// The system with the inputs and outputs that are asked for.
 fn narrowed(system: &StateSpace, arguments: &Arguments) -> Result<StateSpace, Diagnostic> {
     let pick = |what: &str, wanted: &Option<String>, names: &[String]| -> Result<Vec<usize>, Diagnostic> {
-        let Some(wanted) = wanted else { return Ok((0..names.len()).collect()) };
+        let Some(wanted) = wanted else {
+            // Inputs are signals too; as outputs they say nothing, unless they are asked for.
+            let told: Vec<usize> =
+                (0..names.len()).filter(|&i| what == "input" || !system.inputs.contains(&names[i])).collect();
+            return Ok(if told.is_empty() { (0..names.len()).collect() } else { told });
+        };
         let place = names.iter().position(|name| name == wanted).ok_or_else(|| {
             Diagnostic::new(format!("the model has no {what} `{wanted}`"))
                 .with_help(suggestion(wanted, names.iter().map(String::as_str)))
@@ -213,7 +250,7 @@ fn operating_point(states: &[Variable], inputs: &[Variable], found: &Resting) ->
     let of_inputs = inputs.iter().zip(&found.inputs);
     let of_inputs = of_inputs.map(|(v, value)| vec![v.name.clone(), number(*value), v.unit.to_string(), String::new()]);
     let header = ["operating point", "value", "unit", "rate per s"];
-    let mut text = table(&header, &[1, 3], of_states.chain(of_inputs).collect());
+    let mut text = table(&header, &[1, 3], folded(of_states.chain(of_inputs).collect(), 0));
     if found.rates.iter().any(|rate| rate.abs() > 1e-9) {
         text += "note: the model does not rest there; --equilibrium searches where it does\n";
     }
@@ -225,24 +262,35 @@ fn unit_of(name: &str, states: &[Variable], inputs: &[Variable], signals: &[Vari
     variable.map(|v| v.unit.to_string()).filter(|unit| unit != "1").unwrap_or_default()
 }
 
-fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> String {
-    let with_unit = |names: &[String], is_rate: bool| -> Vec<String> {
-        let label = |name: &String| match (unit(name), is_rate) {
-            (unit, false) if unit.is_empty() => name.clone(),
-            (unit, false) => format!("{name} [{unit}]"),
-            (unit, true) => format!("{name}' [{}]", Unit::known(&unit).power(1, -1)),
-        };
-        names.iter().map(label).collect()
+/// Names with their units.
+fn labels(names: &[String], unit: &dyn Fn(&str) -> String) -> Vec<String> {
+    let label = |name: &String| match unit(name) {
+        unit if unit.is_empty() => name.clone(),
+        unit => format!("{name} [{unit}]"),
     };
-    let (states, rates) = (with_unit(&system.states, false), with_unit(&system.states, true));
-    let (inputs, outputs) = (with_unit(&system.inputs, false), with_unit(&system.outputs, false));
+    names.iter().map(label).collect()
+}
+
+fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> String {
+    let rate = |name: &String| match unit(name) {
+        unit if unit.is_empty() => format!("{name}' [1/s]"),
+        unit => format!("{name}' [{}]", Unit::known(&unit).power(1, -1)),
+    };
+    let (states, rates) = (labels(&system.states, unit), system.states.iter().map(rate).collect());
+    let (inputs, outputs) = (labels(&system.inputs, unit), labels(&system.outputs, unit));
     let mut text = String::new();
+    if system.order() > MANY {
+        text += &format!("\nA, B, C and D, with {} states, are in {WHERE}\n", system.order());
+    }
     for (name, matrix, rows, columns) in [
         ("A", &system.a, &rates, &states),
         ("B", &system.b, &rates, &inputs),
         ("C", &system.c, &outputs, &states),
         ("D", &system.d, &outputs, &inputs),
     ] {
+        if system.order() > MANY {
+            break;
+        }
         text += &format!("\n{}", named(name, matrix, rows, columns));
     }
     if system.delay != 0.0 {
@@ -260,6 +308,36 @@ fn named(name: &str, matrix: &nalgebra::DMatrix<f64>, rows: &[String], columns: 
     table(&header, &numeric, rows.iter().enumerate().map(line).collect())
 }
 
+/// Numbers of which nothing is left that is rounding beside the largest of `all`.
+fn rounded(numbers: &[Complex], all: &[Complex]) -> Vec<Complex> {
+    let largest = all.iter().chain(numbers).map(|z| z.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
+    // Poles of one system may well lie nine decades apart.
+    let part = |part: f64, size: f64| if part.abs() < 1e-12 * largest || part.abs() < 1e-9 * size { 0.0 } else { part };
+    numbers.iter().map(|z| Complex::new(part(z.re, z.norm()), part(z.im, z.norm()))).collect()
+}
+
+/// A matrix without what is rounding beside its largest entry.
+fn rounded_matrix(matrix: &nalgebra::DMatrix<f64>) -> nalgebra::DMatrix<f64> {
+    let largest = matrix.amax();
+    matrix.map(|x| if x.abs() < 1e-9 * largest { 0.0 } else { x })
+}
+
+/// A polynomial, its highest power first, without the terms that are rounding beside the others at every frequency of the
+/// poles.
+fn rounded_polynomial(coefficients: &[f64], poles: &[Complex]) -> Vec<f64> {
+    let degree = coefficients.len().saturating_sub(1);
+    let poles = rounded(poles, poles);
+    let frequencies: Vec<f64> = poles.iter().map(|pole| pole.norm()).filter(|size| *size > 0.0).collect();
+    let term = |i: usize, omega: f64| coefficients[i].abs() * omega.powi((degree - i) as i32);
+    let counts = |i: usize, omega: f64| {
+        let largest = (0..=degree).map(|j| term(j, omega)).fold(0.0, f64::max);
+        term(i, omega) >= 1e-9 * largest
+    };
+    let frequencies = if frequencies.is_empty() { vec![1.0] } else { frequencies };
+    let kept = |(i, &c): (usize, &f64)| if frequencies.iter().any(|&omega| counts(i, omega)) { c } else { 0.0 };
+    coefficients.iter().enumerate().map(kept).collect()
+}
+
 fn spelled(z: Complex) -> String {
     match z.im {
         0.0 => number(z.re),
@@ -268,7 +346,7 @@ fn spelled(z: Complex) -> String {
 }
 
 fn poles_table(what: &str, poles: &[Complex]) -> String {
-    let mut sorted: Vec<Complex> = poles.to_vec();
+    let mut sorted = rounded(poles, poles);
     sorted.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
     let row = |p: &Complex| {
         let damping = if p.norm() == 0.0 { String::new() } else { number(-p.re / p.norm()) };
@@ -280,17 +358,21 @@ fn poles_table(what: &str, poles: &[Complex]) -> String {
 }
 
 /// Zeros and transfer function of one channel, as text and as JSON.
-fn channel(system: &StateSpace) -> Result<(String, Value), String> {
+fn channel(system: &StateSpace, poles: &[Complex]) -> Result<(String, Value), String> {
     let zeros = zeros(system)?;
     let function = TransferFunction::of(system)?;
-    let spelled_zeros: Vec<String> = zeros.iter().map(|z| spelled(*z)).collect();
+    let spelled_zeros: Vec<String> = rounded(&zeros, poles).iter().map(|z| spelled(*z)).collect();
+    let spelled_zeros = match spelled_zeros.len() {
+        count if count > MANY => vec![format!("{count} of them, in {WHERE}")],
+        _ => spelled_zeros,
+    };
     let (input, output) = (&system.inputs[0], &system.outputs[0]);
     let is_zero = function.numerator.iter().all(|c| *c == 0.0);
     let text = match (is_zero, spelled_zeros.is_empty()) {
         (true, _) => "  0\n".to_owned(),
         (false, empty) => format!(
-            "  {}\n  zeros (1/s): {}\n",
-            quotient(&function),
+            "{}  zeros (1/s): {}\n",
+            if system.order() > MANY { String::new() } else { format!("  {}\n", quotient(&function, poles)) },
             if empty { "none".to_owned() } else { spelled_zeros.join(", ") }
         ),
     };
@@ -301,7 +383,7 @@ fn channel(system: &StateSpace) -> Result<(String, Value), String> {
     Ok((format!("\n{output}/{input}\n{text}"), value))
 }
 
-fn quotient(function: &TransferFunction) -> String {
+fn quotient(function: &TransferFunction, poles: &[Complex]) -> String {
     let polynomial = |coefficients: &[f64]| {
         let degree = coefficients.len() - 1;
         let mut text = String::new();
@@ -324,7 +406,9 @@ fn quotient(function: &TransferFunction) -> String {
         text
     };
     let delay = if function.delay == 0.0 { String::new() } else { format!(" exp(-{} s)", number(function.delay)) };
-    format!("({})/({}){delay}", polynomial(&function.numerator), polynomial(&function.denominator))
+    let [numerator, denominator] =
+        [&function.numerator, &function.denominator].map(|p| polynomial(&rounded_polynomial(p, poles)));
+    format!("({numerator})/({denominator}){delay}")
 }
 
 /// The state feedback that is asked for.

@@ -3,6 +3,7 @@
 mod check;
 mod data;
 mod describe;
+mod families;
 mod findings;
 mod linear_plots;
 mod linearise;

@@ -7,10 +7,11 @@ use std::sync::Arc;
 use clap::Args;
 use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, suggestion};
 
+use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
 use super::{Trouble, cannot_write, print};
-use crate::report::{Curve, Plot, file_name, points};
+use crate::report::{Curve, Ink, Plot, file_name, points};
 
 /// What is simulated.
 #[derive(Args)]
@@ -143,7 +144,7 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
         ]
     });
     let header = ["signal", "unit", "start", "min", "at s", "max", "at s", "end"];
-    let mut text = table(&header, &[2, 3, 4, 5, 6, 7], rows.collect());
+    let mut text = table(&header, &[2, 3, 4, 5, 6, 7], folded(rows.collect(), 0));
     let work = response.work;
     text += &format!("\n{} steps, {} rejected, {} derivatives\n", work.steps, work.rejected, work.derivatives);
     for event in response.events.iter().take(20) {
@@ -180,17 +181,35 @@ fn write(
         Ok(())
     };
     csv().map_err(|error| cannot_write(&path)(std::io::Error::other(error)))?;
-    for ((signal, trace), variable) in response.traces.iter().zip(units) {
+    let names: Vec<&str> = response.traces.iter().map(|(signal, _)| signal.as_str()).collect();
+    for family in runs(&names) {
+        let (first, last) = (family.start, family.end - 1);
+        let (signal, variable) = (spelled(names[first], names[last]), &units[first]);
+        let curve = |(i, place): (usize, usize)| Curve {
+            name: names[place].to_owned(),
+            points: points(&response.traces[place].1),
+            ink: if first == last { Ink::Result } else { Ink::Series(i) },
+            ..Curve::default()
+        };
         let plot = Plot {
-            title: format!("{signal}: {}", variable.about),
+            title: if variable.about.is_empty() { signal.clone() } else { format!("{signal}: {}", variable.about) },
             x_label: "time (s)".into(),
             y_label: format!("{signal} ({})", variable.unit),
-            curves: vec![Curve { name: signal.clone(), points: points(trace), ..Curve::default() }],
+            curves: spread(first, last).into_iter().enumerate().map(curve).collect(),
             ..Plot::default()
         };
-        let path = folder.join(file_name(&format!("{name}-{signal}")));
+        let file = if first == last { signal } else { names[first].split('[').next().unwrap_or_default().to_owned() };
+        let path = folder.join(file_name(&format!("{name}-{file}")));
         std::fs::write(path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
         plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
     }
     Ok(())
+}
+
+/// At most six places from `first` to `last`, evenly spread, both ends among them.
+fn spread(first: usize, last: usize) -> Vec<usize> {
+    let steps = (last - first).clamp(1, 5);
+    let mut places: Vec<usize> = (0..=steps).map(|i| first + i * (last - first) / steps).collect();
+    places.dedup();
+    places
 }

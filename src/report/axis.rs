@@ -20,8 +20,21 @@ impl Axis {
         if log {
             return Self { range, log, ticks: decades(range), factor: None };
         }
+        Self::linear(range, round_step((range[1] - range[0]) / count), count)
+    }
+
+    /// An axis of angles in degrees: ticks at multiples of 45, where that gives enough of them.
+    pub(super) fn degrees(range: [f64; 2], count: f64) -> Self {
+        let room = range[1] - range[0];
+        let multiples = [45.0, 90.0, 180.0, 360.0, 720.0, 1440.0, 3600.0];
+        match multiples.into_iter().find(|step| room <= step * count) {
+            Some(step) if room >= 90.0 => Self::linear(range, step, count),
+            _ => Self::new(range, false, count),
+        }
+    }
+
+    fn linear(range: [f64; 2], step: f64, count: f64) -> Self {
         let [low, high] = range;
-        let step = round_step((high - low) / count);
         let power = low.abs().max(high.abs()).log10().floor();
         // Powers that engineers have a prefix for, and only where the plain number is hard to read.
         let power = if (-3.0..5.0).contains(&power) { 0.0 } else { (power / 3.0).floor() * 3.0 };
@@ -34,7 +47,7 @@ impl Axis {
             .map(|value| ((value - low) / (high - low), format!("{:.decimals$}", value / factor + 0.0)))
             .collect();
         let factor = (power != 0.0).then(|| format!("\u{d7}\u{2009}10{}", superscript(power as i32)));
-        Self { range, log, ticks, factor }
+        Self { range, log: false, ticks, factor }
     }
 
     /// Where a value stands: 0 at the start of the axis, 1 at its end; `None` where it cannot be drawn.
@@ -118,6 +131,13 @@ mod tests {
             (vec!["-2", "-1", "0", "1", "2"], Some("\u{d7}\u{2009}10\u{207b}\u{2076}"))
         );
         assert_eq!(labels(&Axis::new([-1.0, 2.0], true, 5.0)), ["0.1", "1", "10", "100"]);
+    }
+
+    #[test]
+    fn ticks_of_angles_are_parts_of_a_turn() {
+        assert_eq!(labels(&Axis::degrees([-189.0, 9.0], 7.0)), ["-180", "-135", "-90", "-45", "0"]);
+        assert_eq!(labels(&Axis::degrees([-400.0, 100.0], 7.0)), ["-360", "-270", "-180", "-90", "0", "90"]);
+        assert_eq!(labels(&Axis::degrees([-4.5, 0.5], 7.0)).len(), 6);
     }
 
     #[test]

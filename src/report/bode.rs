@@ -59,6 +59,7 @@ pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2
             })
             .collect(),
         log_x: true,
+        degrees: title == "phase",
         ..Plot::default()
     };
     let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * g.norm().log10()).collect();

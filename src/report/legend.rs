@@ -16,6 +16,14 @@ impl Scene {
         self.marks.push(Mark::Dots { centres, ink, radius });
     }
 
+    /// A cross.
+    pub(super) fn cross(&mut self, at: Point, ink: Ink) {
+        for turn in [-1.0, 1.0] {
+            let points = vec![[at[0] - 4.0, at[1] - 4.0 * turn], [at[0] + 4.0, at[1] + 4.0 * turn]];
+            self.marks.push(Mark::Line { points, ink, width: 1.8, dashed: false });
+        }
+    }
+
     /// The legend, in rows; returns where it ends.
     pub(super) fn legend(&mut self, plot: &Plot, mut row: f64) -> f64 {
         let bands = plot.bands.iter().map(|band| (band.name.as_str(), Ink::Band, CurveStyle::Line));
@@ -31,6 +39,12 @@ impl Scene {
                 (Ink::Band, _) => Mark::Box { frame: Frame { from: [at, row - 5.0], to: [at + 24.0, row + 5.0] }, ink },
                 (_, CurveStyle::Dots) => {
                     Mark::Dots { centres: [4.0, 12.0, 20.0].map(|d| [at + d, row]).to_vec(), ink, radius: 2.0 }
+                }
+                (_, CurveStyle::Crosses) => {
+                    [5.0, 19.0].into_iter().for_each(|d| self.cross([at + d, row], ink));
+                    self.text(name, [at + 30.0, row], Anchor::Start, Ink::Faint);
+                    at += width;
+                    continue;
                 }
                 (_, style) => Mark::Line { points: vec![a, b], ink, width: 1.8, dashed: style == CurveStyle::Dashed },
             });

@@ -40,6 +40,8 @@ pub enum CurveStyle {
     Dashed,
     /// A dot for every point.
     Dots,
+    /// A cross for every point.
+    Crosses,
 }
 
 /// Points with a name. Points that are not finite are left out; a line has a gap there.
@@ -113,6 +115,12 @@ pub struct Plot {
     pub log_x: bool,
     /// Whether y is logarithmic; values that are not positive are then left out.
     pub log_y: bool,
+    /// Where a faint line runs from top to bottom.
+    pub vertical: Option<f64>,
+    /// Whether a unit is as long along x as along y, so that a circle is round.
+    pub equal: bool,
+    /// Whether y is an angle in degrees: ticks stand at multiples of 45.
+    pub degrees: bool,
     /// A surface behind the curves; its grid is then what is shown of x and y.
     pub surface: Option<Surface>,
 }

@@ -42,10 +42,23 @@ pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     Some([range[0] - margin, range[1] + margin])
 }
 
+/// Ranges of x and y in which a unit is equally long on paper of this width over height, with a margin.
+pub(super) fn equal(x: [f64; 2], y: [f64; 2], shape: f64) -> [[f64; 2]; 2] {
+    let about = |[low, high]: [f64; 2], room: f64| [0.5 * (low + high - room), 0.5 * (low + high + room)];
+    let height = (1.05 * (y[1] - y[0])).max(1.05 * (x[1] - x[0]) / shape);
+    [about(x, height * shape), about(y, height)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::plot::{Curve, Level};
     use super::*;
+
+    #[test]
+    fn equal_axes_hold_both_ranges() {
+        let [x, y] = equal([-1.0, 3.0], [0.0, 1.0], 2.0);
+        assert!((x[1] - x[0] - 2.0 * (y[1] - y[0])).abs() < 1e-12 && x[0] < -1.0 && y[0] < 0.0 && y[1] > 1.0);
+    }
 
     #[test]
     fn a_curve_that_may_leave_and_a_far_level_do_not_crush_the_others() {

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
 use super::plot::{CurveStyle, Ink, Plot, Surface};
-use super::range::{drawable, range_of, y_range};
+use super::range::{drawable, equal, range_of, y_range};
 use super::surface::SCALE_WIDTH;
 
 /// Size of every plot; one unit is a pixel of a page at its natural size.
@@ -69,12 +69,17 @@ impl Scene {
             Some(surface) => Surface::range(&surface.x, plot.log_x),
             None => range_of(xs.filter_map(|x| drawable(x, plot.log_x))),
         };
-        let x = x_axis(x_range.unwrap_or([0.0, 1.0]), plot.log_x);
         let y_range = match &plot.surface {
             Some(surface) => Surface::range(&surface.y, plot.log_y),
             None => y_range(plot),
         };
-        let y = Axis::new(y_range.unwrap_or([0.0, 1.0]), plot.log_y, 7.0);
+        let shown = [x_range.unwrap_or([0.0, 1.0]), y_range.unwrap_or([0.0, 1.0])];
+        let top = scene.legend(plot, 38.0) + 12.0;
+        // Wide enough for numbers of five letters.
+        let room = [SIZE[0] - 54.0 - 5.0 * ADVANCE, SIZE[1] - 46.0 - top];
+        let [x_shown, y_shown] = if plot.equal { equal(shown[0], shown[1], room[0] / room[1]) } else { shown };
+        let x = x_axis(x_shown, plot.log_x);
+        let y = if plot.degrees { Axis::degrees(y_shown, 7.0) } else { Axis::new(y_shown, plot.log_y, 7.0) };
         let levels: Vec<(f64, &str)> = plot
             .levels
             .iter()
@@ -83,8 +88,8 @@ impl Scene {
             .collect();
 
         scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Ink::Text);
-        let top = scene.legend(plot, 38.0) + 12.0;
-        let left = 38.0 + ADVANCE * longest(y.ticks.iter().map(|(_, label)| label.as_str()));
+        let labels = longest(y.ticks.iter().map(|(_, label)| label.as_str()));
+        let left = 38.0 + ADVANCE * if plot.equal { labels.max(5.0) } else { labels };
         let beside = if plot.surface.is_some() { SCALE_WIDTH } else { 0.0 };
         let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(levels.iter().map(|(_, name)| *name));
         let frame = Frame { from: [left, top], to: [right.max(left + 100.0), SIZE[1] - 46.0] };
@@ -101,14 +106,27 @@ impl Scene {
             }
         }
         scene.axes(plot, &x, &y, frame);
+        if let Some(at) = plot.vertical.and_then(|value| x.position(value)).filter(|at| (0.0..=1.0).contains(at)) {
+            let px = left + at * (frame.to[0] - left);
+            let points = vec![[px, top], [px, frame.to[1]]];
+            scene.marks.push(Mark::Line { points, ink: Ink::Start, width: 0.8, dashed: false });
+        }
         if let Some(surface) = &plot.surface {
             scene.surface(surface, &x, &y, frame);
         }
         for curve in &plot.curves {
             let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
-            if curve.style == CurveStyle::Dots {
-                scene.dots(points.into_iter().flatten().filter(|p| frame.contains(*p)), curve.ink);
-                continue;
+            let inside = points.iter().copied().flatten().filter(|p| frame.contains(*p));
+            match curve.style {
+                CurveStyle::Dots => {
+                    scene.dots(inside, curve.ink);
+                    continue;
+                }
+                CurveStyle::Crosses => {
+                    inside.for_each(|p| scene.cross(p, curve.ink));
+                    continue;
+                }
+                CurveStyle::Line | CurveStyle::Dashed => {}
             }
             let dashed = curve.style == CurveStyle::Dashed;
             let width = if curve.ink == Ink::Start { 1.3 } else { 1.8 };

@@ -134,6 +134,12 @@ impl Equations {
         self.starts.iter().enumerate().map(start).collect()
     }
 
+    /// The dynamics with constant inputs.
+    fn held<'a, S: Scalar>(&'a self, at: &OperatingPoint<'a, S>) -> Running<'a, S, Vec<S>, Many<S>> {
+        let drives = at.inputs.iter().map(|&u| Drive::held(u)).collect();
+        Running::new(&self.compiled, drives, at.parameters, self.tolerance)
+    }
+
     fn run<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
         &self,
         job: &Job<'_>,
@@ -182,15 +188,18 @@ impl Model for Equations {
 
 impl kernel::Equations for Equations {
     /// At time 0; joints at rest without dry friction.
-    fn equations<S: Scalar>(&self, parameters: &[S], x: &[S], u: &[S]) -> Result<[Vec<S>; 2], Failure> {
-        let drives = u.iter().map(|&u| Drive::held(u)).collect();
-        let mut dynamics: Running<'_, S, Vec<S>, Many<S>> =
-            Running::new(&self.compiled, drives, parameters, self.tolerance);
-        dynamics.look(x);
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
+        let mut dynamics = self.held(at);
+        dynamics.look(at);
         let output = |dynamics: &Running<'_, S, Vec<S>, Many<S>>, signal: usize, t: f64, x: &Vec<S>| {
             dynamics.signal(signal, t, x)
         };
-        Ok(rates_and_signals(&dynamics, &x.to_vec(), self.interface.signals.len(), &output))
+        Ok(rates_and_signals(&dynamics, &at.states.to_vec(), self.interface.signals.len(), &output))
+    }
+
+    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
+        let positions = self.held(at).look(at);
+        positions.into_iter().map(|position| self.interface.signals[position].name.clone()).collect()
     }
 }
 

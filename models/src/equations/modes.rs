@@ -1,10 +1,10 @@
 //! The modes of a model from text: which branch holds, which joint is stuck.
 
-use mops_core::{Failure, Scalar};
+use mops_core::{Failure, OperatingPoint, Scalar};
 
 use super::bank::Bank;
 use super::running::Running;
-use crate::kernel::Dynamics;
+use crate::kernel::{Dynamics, rests};
 
 impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X, B> {
     pub(super) fn set_mode(&mut self, mode: usize, value: f64) {
@@ -18,6 +18,11 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// Puts every condition and contact into the mode that fits this moment.
     pub(super) fn settle(&mut self, t: f64, x: &[S]) {
+        self.settle_switches(t, x);
+        self.find_contacts(t, x);
+    }
+
+    fn settle_switches(&mut self, t: f64, x: &[S]) {
         for k in 0..self.model.switches.len() {
             let switch = &self.model.switches[k];
             let [difference, right] = self.results(&switch.sides, t, x).map(Scalar::value);
@@ -25,7 +30,6 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
             self.set_mode(switch.mode, f64::from(u8::from(holds)));
             self.set_slack(k, 0.0, right);
         }
-        self.find_contacts(t, x);
     }
 
     /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly, or
@@ -90,16 +94,24 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
         self.set_mode(contact.stuck, f64::from(u8::from(direction == 0.0)));
     }
 
-    /// Takes the modes of this moment, for a look at the equations alone: joints at rest have no dry friction, which has no
-    /// slope there.
-    pub fn look(&mut self, x: &[S]) {
-        self.settle(0.0, x);
-        for j in 0..self.model.joints.len() {
-            let contact = self.model.joints[j].contact;
-            let speed = x[contact.velocity].value();
-            self.set_mode(contact.direction, if speed == 0.0 { 0.0 } else { speed.signum() });
+    /// Takes the modes of an operating point, for a look at the equations alone: joints slide the way they move, those at
+    /// rest have no dry friction. Gives the positions of joints whose friction is left out, as states.
+    pub fn look(&mut self, at: &OperatingPoint<'_, S>) -> Vec<usize> {
+        let x = at.states;
+        self.settle_switches(0.0, x);
+        let mut left_out = Vec::new();
+        for joint in &self.model.joints {
+            let contact = joint.contact;
+            let speed = x[contact.velocity];
+            let rests = rests(at, speed);
+            self.set_mode(contact.direction, if rests { 0.0 } else { speed.value().signum() });
             self.set_mode(contact.stuck, 0.0);
+            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, 0.0, x).map(Scalar::value);
+            if rests && (limit != 0.0 || coulomb != 0.0) {
+                left_out.push(contact.position);
+            }
         }
+        left_out
     }
 
     /// Whether equations that are solved together have a solution here.

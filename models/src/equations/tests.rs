@@ -394,11 +394,41 @@ fn the_slopes_at_an_operating_point_are_those_of_the_equations() {
     use mops_core::OperatingPoint;
     let model = model(&format!("{}friction.q = {{ coulomb = 0.3 }}", text!("servo")));
     let (j, b) = (2.0, 0.5);
-    let point = OperatingPoint { parameters: &[j, b, 0.0, 0.0], states: &[0.1, 0.0], inputs: &[3.0] };
+    let point = OperatingPoint { parameters: &[j, b, 0.0, 0.0], states: &[0.1, 0.0], inputs: &[3.0], at_rest: false };
     let local = model.local(&point).unwrap().unwrap();
     assert_eq!(local.rates, [0.0, 0.052 * 3.0 / j]);
     assert!((local.slopes[(1, 1)] + b / j).abs() < 1e-15 && (local.slopes[(1, 2)] - 0.052 / j).abs() < 1e-15);
     assert_eq!(local.slopes[(0, 1)], 1.0);
+}
+
+#[test]
+fn dry_friction_is_left_out_of_an_equilibrium_and_its_slopes() {
+    use mops_core::{Case, Linearise, Linearised, OperatingPoint, Quantity};
+    let text = "
+        states = { ph = 'rad', w = 'rad/s' }
+        inputs = { u = 'N m' }
+        der = { ph = 'w', w = \"0.01*w' = u - 0.6*sin(ph)\" }
+        friction.ph = { coulomb = 0.05, viscous = 0.002, peak = 1.3 }
+        ";
+    let at = vec![("ph".to_owned(), Quantity::parse("0.3").unwrap())];
+    let options = Linearise { at, equilibrium: true, free: vec!["u".to_owned()], ..Linearise::default() };
+    let trim = Linearised::new(std::sync::Arc::new(model(text)), &options).unwrap();
+    // From rest, and from a search that passes speeds of either sign.
+    for w0 in [0.0, 1e-6, -3.0] {
+        let found = trim.at(&Case::default(), &[0.0, w0]).unwrap();
+        assert!((found.inputs[0] - 0.6 * 0.3f64.sin()).abs() < 1e-12, "{}", found.inputs[0]);
+        assert!((found.system.a[(1, 0)] + 60.0 * 0.3f64.cos()).abs() < 1e-9, "{}", found.system.a);
+        assert!((found.system.a[(1, 1)] + 0.2).abs() < 1e-12 && found.frictionless == ["ph"]);
+    }
+    let rate = |w: f64, at_rest: bool| {
+        let point = OperatingPoint { parameters: &[0.0, 0.0], states: &[0.0, w], inputs: &[0.0], at_rest };
+        let local = model(text).local(&point).unwrap().unwrap();
+        (local.rates[1], local.frictionless.len())
+    };
+    // What moves slides; speeds of rounding are none.
+    assert!((rate(2.0, false).0 + 5.4).abs() < 1e-12 && (rate(-2.0, false).0 - 5.4).abs() < 1e-12);
+    assert!(rate(1e-12, false).0.abs() < 1e-9 && rate(2.0, false).1 == 0 && rate(1e-12, false).1 == 1);
+    assert!((rate(2.0, true).0 + 0.4).abs() < 1e-12);
 }
 
 #[test]

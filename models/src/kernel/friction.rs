@@ -27,7 +27,7 @@ impl Contact {
         }
     }
 
-    pub(super) fn of(direction: f64) -> Self {
+    pub(crate) fn of(direction: f64) -> Self {
         if direction >= 0.0 { Self::Forward } else { Self::Backward }
     }
 }

@@ -7,12 +7,26 @@ use super::Dynamics;
 
 /// What a model written over [`Dynamics`] gives to be linearised.
 pub trait Equations {
-    /// The rates of the states and the values of the signals, for parameters, states and constant inputs in the orders of
-    /// [`OperatingPoint`]; [`rates_and_signals`] reads them from a `Dynamics` whose drives are held.
+    /// The rates of the states and the values of the signals; [`rates_and_signals`] reads them from a `Dynamics` whose
+    /// drives are held.
     ///
     /// # Errors
     /// Parameters for which the model is not defined.
-    fn equations<S: Scalar>(&self, parameters: &[S], states: &[S], inputs: &[S]) -> Result<[Vec<S>; 2], Failure>;
+    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure>;
+
+    /// The joints whose dry friction is left out there, by the names of their positions.
+    fn frictionless(&self, _at: &OperatingPoint<'_>) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Speed up to which a joint is as good as at rest, rad/s or m/s: that of a model at rest after rounding.
+const STILL: f64 = 1e-9;
+
+/// Whether a joint with this speed has no dry friction at an operating point: on both sides of speed 0 it would have other
+/// signs, and in between no slope.
+pub fn rests<S: Scalar>(at: &OperatingPoint<'_, S>, speed: S) -> bool {
+    at.at_rest || speed.value().abs() <= STILL
 }
 
 /// The rates of the states, and the first `count` signals by their `output`, at time 0.
@@ -35,8 +49,8 @@ const CHUNK: usize = 8;
 /// # Errors
 /// Parameters for which the model is not defined.
 pub fn local(model: &impl Equations, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
-    let OperatingPoint { parameters, states, inputs } = *at;
-    let [rates, signals] = model.equations(parameters, states, inputs)?;
+    let OperatingPoint { parameters, states, inputs, at_rest } = *at;
+    let [rates, signals] = model.equations(at)?;
     let constants: Vec<Dual<CHUNK>> = parameters.iter().map(|&p| p.into()).collect();
     let columns = states.len() + inputs.len();
     let mut slopes = DMatrix::zeros(rates.len() + signals.len(), columns);
@@ -46,8 +60,9 @@ pub fn local(model: &impl Equations, at: &OperatingPoint<'_>) -> Result<Local, F
             if direction < CHUNK { Dual::variable(value, direction) } else { Dual::from(value) }
         };
         let all: Vec<Dual<CHUNK>> = states.iter().chain(inputs).enumerate().map(variable).collect();
-        let (x, u) = all.split_at(states.len());
-        let [rates, signals] = model.equations(&constants, x, u)?;
+        let (states, inputs) = all.split_at(states.len());
+        let at = OperatingPoint { parameters: &constants, states, inputs, at_rest };
+        let [rates, signals] = model.equations(&at)?;
         for (i, row) in rates.iter().chain(&signals).enumerate() {
             for j in first..columns.min(first + CHUNK) {
                 slopes[(i, j)] = row.tangent[j - first];
@@ -55,7 +70,7 @@ pub fn local(model: &impl Equations, at: &OperatingPoint<'_>) -> Result<Local, F
         }
     }
     if slopes.iter().chain(&rates).all(|x| x.is_finite()) {
-        Ok(Local { rates, signals, slopes })
+        Ok(Local { rates, signals, slopes, frictionless: model.frictionless(at) })
     } else {
         Err(Failure::Undefined("the equations have no finite slope at the operating point".into()))
     }

@@ -1,10 +1,10 @@
 //! Mechanisms: joints coupled by a mass matrix, with the friction of their bearings.
 
-use mops_core::{Interface, Parameter, Scalar, State, Variable};
+use mops_core::{Interface, OperatingPoint, Parameter, Scalar, State, Variable};
 
-use super::Dynamics;
 use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};
+use super::{Dynamics, rests};
 
 /// The rigid bodies of a mechanism with `N` joints: `M(q) q'' = f(t, q, q') - friction`.
 pub trait Bodies<S: Scalar, const N: usize> {
@@ -105,6 +105,22 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
     /// How the joints move.
     pub fn contact(&self) -> &[Contact; N] {
         &self.contact
+    }
+
+    /// Takes the modes of an operating point, for a look at the equations alone: joints slide the way they move, those at
+    /// rest have no dry friction. Gives the indices of joints whose friction is left out.
+    pub fn look(&mut self, at: &OperatingPoint<'_, S>) -> Vec<usize> {
+        let mut left_out = Vec::new();
+        for i in 0..N {
+            let speed = at.states[2 * i + 1];
+            if rests(at, speed) && !self.friction[i].is_viscous() {
+                left_out.push(i);
+                self.friction[i] = BearingFriction::none();
+            }
+            self.contact[i] = Contact::of(speed.value());
+            self.line[i] = self.friction[i].table().line_at(speed.abs());
+        }
+        left_out
     }
 
     /// Angles and speeds.

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use integrate::{Step, integrate};
-pub use local::{Equations, local, rates_and_signals};
+pub use local::{Equations, local, rates_and_signals, rests};
 pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.

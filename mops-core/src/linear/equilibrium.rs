@@ -1,5 +1,7 @@
 //! Where a system can rest.
 
+use std::fmt;
+
 use nalgebra::{DMatrix, DVector};
 
 /// What must vanish, with its slopes.
@@ -11,23 +13,48 @@ pub struct Balance {
     pub slopes: DMatrix<f64>,
 }
 
+/// Why a search ended without an equilibrium.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoEquilibrium {
+    /// The rates are not defined at the start.
+    Undefined(String),
+    /// The search ends where this state changes fastest, at this rate per s.
+    Restless {
+        /// Index of the state.
+        state: usize,
+        /// Its rate of change, positive.
+        rate: f64,
+    },
+}
+
+impl fmt::Display for NoEquilibrium {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Undefined(why) => f.write_str(why),
+            Self::Restless { state, rate } => {
+                write!(f, "no equilibrium was found: the search ends where state {state} changes by {rate:.3e} per s")
+            }
+        }
+    }
+}
+
 /// A point near `start` at which all rates vanish, where only the `free` ones of states and inputs move.
 ///
 /// Newton's method, with the shortest step where several points are possible, and shorter steps where a whole one does not
 /// bring the rates down. Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition (2006), sections 10.3, 11.2.
 ///
 /// # Errors
-/// What the rates refuse; no point found: one sentence.
+/// What the rates refuse at the start; no point found.
 pub fn equilibrium(
     mut rates: impl FnMut(&[f64]) -> Result<Balance, String>,
     start: &[f64],
     free: &[bool],
-) -> Result<Vec<f64>, String> {
+) -> Result<Vec<f64>, NoEquilibrium> {
     /// Sum of weighted rates that is rounding.
     const SMALL: f64 = 1e-12;
     let moving: Vec<usize> = (0..start.len()).filter(|&i| free[i]).collect();
     let mut x = start.to_vec();
-    let mut here = rates(&x)?;
+    let mut here = rates(&x).map_err(NoEquilibrium::Undefined)?;
     // Rates of different units are weighed by what moves them.
     let weigh = |at: &Balance| -> DVector<f64> {
         let row = |i: usize| moving.iter().map(|&j| at.slopes[(i, j)].abs()).fold(0.0, f64::max);
@@ -75,9 +102,10 @@ pub fn equilibrium(
     Err(no_equilibrium(&here))
 }
 
-fn no_equilibrium(here: &Balance) -> String {
-    let largest = here.rates.iter().fold(0.0f64, |largest, rate| largest.max(rate.abs()));
-    format!("no equilibrium was found: the search ends where the largest rate is {largest:.3e}")
+fn no_equilibrium(here: &Balance) -> NoEquilibrium {
+    let sizes = here.rates.iter().map(|rate| rate.abs()).enumerate();
+    let (state, rate) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
+    NoEquilibrium::Restless { state, rate }
 }
 
 #[cfg(test)]
@@ -112,6 +140,6 @@ mod tests {
     #[test]
     fn without_an_equilibrium_the_search_says_so() {
         let error = equilibrium(pendulum, &[0.5, 0.0, 20.0], &[true, true, false]).unwrap_err();
-        assert!(error.starts_with("no equilibrium was found"), "{error}");
+        assert!(matches!(error, NoEquilibrium::Restless { state: 1, rate } if rate > 10.0), "{error}");
     }
 }

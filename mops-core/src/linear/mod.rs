@@ -22,7 +22,7 @@ use nalgebra::DMatrix;
 
 pub use controllability::check_controllable;
 pub use eigen::eigenvalues;
-pub use equilibrium::{Balance, equilibrium};
+pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
 pub use lyapunov::{h2_norm, lyapunov};
 pub use margins::{Crossing, Loop, bandwidth};
 pub use norms::{Peak, hinf_norm, peak_gain};
