@@ -51,7 +51,9 @@ pub(super) fn directions(
             let most = members.iter().map(|&k| shares[k].abs()).fold(0.0, f64::max);
             let changes: Vec<(usize, f64)> = members.iter().map(|&k| (k, first * shares[k] / most)).collect();
             let words = words(&changes, coordinates);
-            let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| words.contains(sign));
+            // What the sentence says of the names, which stand between backticks.
+            let said: String = words.split('`').step_by(2).collect();
+            let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| said.contains(sign));
             BlindDirection { straight: !multiplied, words, changes }
         })
         .collect();

@@ -67,7 +67,7 @@ pub struct Excitation {
 impl Excitation {
     /// Whether the order is only known to be at least this.
     pub fn is_at_least(&self) -> bool {
-        self.order == self.tested
+        self.order > 0 && self.order == self.tested
     }
 
     /// Whether that many parameters can be estimated consistently: a finite impulse response of length `n` needs order `n`.

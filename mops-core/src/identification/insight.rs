@@ -340,7 +340,7 @@ pub fn excitation_report(
     parameters: Option<usize>,
 ) -> ExcitationReport {
     let found = excitation(values, noise);
-    let suffices = found.suffices(parameters.unwrap_or(0)) || found.is_at_least();
+    let suffices = found.suffices(parameters.unwrap_or(0));
     let order = if found.is_at_least() { format!("at least {}", found.order) } else { found.order.to_string() };
     let mut words = format!("`{input}` in `{case}` is persistently exciting of order {order}");
     match found.next {
@@ -364,6 +364,9 @@ pub fn excitation_report(
             "In the long run that suffices for {}, as many as tuners act here; what it tells of these, the sensitivities say.",
             linear(n)
         ),
+        (Some(n), false) if found.is_at_least() => {
+            format!("Whether it suffices for {} cannot be told from {} samples.", linear(n), values.len())
+        }
         (Some(n), false) => {
             let once = match found.transient {
                 Some(share) if share > found.zero => " What happens only once (an edge) excites more.",
