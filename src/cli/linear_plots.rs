@@ -77,8 +77,10 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         }
     }
     let limit = 2.0 * size;
+    // The picture is wider than high: what lies beside the others is not left out if there is room for it.
+    let beside = if poles.iter().chain(&zeros).any(|z| z.norm() > size) { 3.0 * limit } else { limit };
     let point =
-        |z: &Complex| if z.re.abs() <= limit && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
+        |z: &Complex| if z.re.abs() <= beside && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
     let marks = |name: &str, of: &[Complex], style, ink| Curve {
         name: match of.iter().filter(|z| !point(z).0.is_finite()).count() {
             _ if of.is_empty() => String::new(),

@@ -137,7 +137,7 @@ mod tests {
     fn ticks_of_angles_are_parts_of_a_turn() {
         assert_eq!(labels(&Axis::degrees([-189.0, 9.0], 7.0)), ["-180", "-135", "-90", "-45", "0"]);
         assert_eq!(labels(&Axis::degrees([-400.0, 100.0], 7.0)), ["-360", "-270", "-180", "-90", "0", "90"]);
-        assert_eq!(labels(&Axis::degrees([-4.5, 0.5], 7.0)).len(), 6);
+        assert_eq!(labels(&Axis::degrees([-4.5, 0.5], 7.0)), ["-4", "-3", "-2", "-1", "0"]);
     }
 
     #[test]
