@@ -1,0 +1,244 @@
+//! What a diagnosis gives: the block `diagnosis` of `result.json`, and what its report shows.
+
+use mops_core::Role;
+use serde::Serialize;
+
+/// Whether the model lacks something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// It lacks effects of the catalogue, and they were found.
+    Effect,
+    /// Nothing that the data could show is missing.
+    None,
+    /// Something is missing that no effect of the catalogue explains.
+    Unexplained,
+}
+
+/// A strength of an effect with what the data say of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StrengthValue {
+    /// Name, such as `torque`.
+    pub name: String,
+    /// Its value, in `unit`.
+    pub value: f64,
+    /// Unit; empty where the model's equations do not tell.
+    pub unit: String,
+    /// Standard error of the value, selection of the effect not included; `None` where it cannot be told.
+    pub std_error: Option<f64>,
+    /// An interval that holds the value with probability 0.95, the selection of the effect included.
+    pub interval95: Option<[f64; 2]>,
+}
+
+/// Another effect that explains the data about as well.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// The effect.
+    pub effect: String,
+    /// The place, as `kind:name`.
+    pub place: String,
+    /// Its probability.
+    pub probability: f64,
+    /// How far its BIC lies above that of the effect found; under 2 the data cannot tell them apart.
+    pub bic_behind: f64,
+    /// Cosine between the traces of the two in the outputs, what the parameters absorb taken out; 1: the same.
+    pub likeness: f64,
+}
+
+/// An effect that the model lacked and that was added.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Found {
+    /// The effect.
+    pub effect: String,
+    /// The place, as `kind:name`.
+    pub place: String,
+    /// Its class, such as `dissipative`.
+    pub class: String,
+    /// Its formula, for people.
+    pub formula: String,
+    /// Its strengths.
+    pub strengths: Vec<StrengthValue>,
+    /// Probability that it is this effect, rather than another.
+    pub probability: f64,
+    /// How much the BIC falls by adding it.
+    pub bic_gain: f64,
+    /// Effects within 6 of its BIC.
+    pub indistinguishable: Vec<Rival>,
+}
+
+/// A declared term that was found to be the wrong one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Removed {
+    /// The parameter that is its strength.
+    pub term: String,
+    /// The place, as `kind:name`, where it is known.
+    pub place: String,
+}
+
+/// An effect that was tried as the only one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ranked {
+    /// The effect.
+    pub effect: String,
+    /// The place, as `kind:name`.
+    pub place: String,
+    /// Its class.
+    pub class: String,
+    /// Its probability.
+    pub probability: f64,
+    /// How much the BIC falls by adding it.
+    pub bic_gain: f64,
+    /// Its strengths.
+    pub strengths: Vec<StrengthValue>,
+    /// Share of its trace in the outputs that the parameters and start values absorb.
+    pub absorbed: f64,
+    /// Normalised error with it, on calibration and selection data.
+    pub normalised: [Option<f64>; 2],
+    /// Whether it was fitted, rather than only screened.
+    pub fitted: bool,
+}
+
+/// What no effect explains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Where it acts best, as `kind:name`.
+    pub place: String,
+    /// Share of the residual above the noise that a free signal there explains.
+    pub share: f64,
+    /// What it depends on: `position`, `speed`, `input` or `time`.
+    pub over: String,
+    /// The stopgap: a table, linear between its points.
+    pub table: Vec<[f64; 2]>,
+}
+
+/// Error of a model on an experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExperimentError {
+    /// The experiment.
+    #[serde(skip)]
+    pub name: String,
+    /// Its role.
+    pub role: Role,
+    /// Root mean square error per channel, in its unit.
+    pub channels: Vec<(String, f64)>,
+    /// Over all channels and samples, in units of the noise: 1 is the noise itself.
+    pub normalised: f64,
+}
+
+/// How a parameter moved: what it had absorbed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterMove {
+    /// The tuner.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value in the model as declared.
+    pub before: f64,
+    /// Its value in the repaired model.
+    pub after: f64,
+    /// Its standard error in the repaired model.
+    pub std_error: Option<f64>,
+}
+
+/// The smallest strength of an effect that would have been noticed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noticeable {
+    /// The effect.
+    pub effect: String,
+    /// The place, as `kind:name`.
+    pub place: String,
+    /// The strength.
+    pub strength: StrengthValue,
+}
+
+/// A measured output beside what the models predict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// The experiment.
+    pub experiment: String,
+    /// Its role.
+    pub role: Role,
+    /// The signal, and its unit.
+    pub signal: String,
+    /// Unit of the signal.
+    pub unit: String,
+    /// Standard deviation of the noise.
+    pub noise: f64,
+    /// Times of the samples, s.
+    pub times: Vec<f64>,
+    /// The samples.
+    pub measured: Vec<f64>,
+    /// The model as declared.
+    pub before: Vec<f64>,
+    /// The repaired model; as `before` where nothing was found.
+    pub after: Vec<f64>,
+}
+
+/// A curve or a cloud of points.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Curve {
+    /// Abscissae.
+    pub x: Vec<f64>,
+    /// Ordinates.
+    pub y: Vec<f64>,
+}
+
+/// The unknown signal at a place that would explain the residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// The place, as `kind:name`.
+    pub place: String,
+    /// Unit of the signal; empty where the model's equations do not tell.
+    pub unit: String,
+    /// Logarithm of the marginal likelihood over that of the model without it.
+    pub evidence: f64,
+    /// Share of the residual above the noise that it explains.
+    pub share: f64,
+    /// Effective degrees of freedom it takes.
+    pub freedom: f64,
+    /// The signal over time: samples one after the other, per experiment.
+    pub over_time: Vec<(String, Curve)>,
+    /// The signal over what it may depend on (`position`, `speed`, `input`), with the unit of that.
+    pub over: Vec<(String, String, Curve)>,
+    /// The curve of the effect found, over the same.
+    pub found: Vec<(String, Curve)>,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// Whether something is missing.
+    pub verdict: Verdict,
+    /// Probability of the verdict.
+    pub probability: f64,
+    /// Probability of a residual as structured as this one if nothing were missing, the search over the catalogue included.
+    pub p_value: f64,
+    /// The effects added.
+    pub found: Vec<Found>,
+    /// Declared terms found to be wrong.
+    pub removed: Vec<Removed>,
+    /// Effects that were tried, best first.
+    pub ranked: Vec<Ranked>,
+    /// What no effect explains.
+    pub unexplained: Option<Unexplained>,
+    /// The experiment that would separate what the data cannot tell apart.
+    pub next_experiment: Option<String>,
+    /// Errors of the model as declared.
+    pub before: Vec<ExperimentError>,
+    /// Errors of the repaired model.
+    pub after: Vec<ExperimentError>,
+    /// How the parameters moved.
+    pub parameters: Vec<ParameterMove>,
+    /// What would have been noticed, where nothing is missing.
+    pub noticeable: Vec<Noticeable>,
+    /// Where the residual comes from, best place first.
+    pub evidence: Vec<Evidence>,
+    /// Measured outputs beside what the models predict.
+    pub predictions: Vec<Prediction>,
+    /// Facts about data and fit that a reader should know.
+    pub notes: Vec<String>,
+    /// Start values of every experiment in the repaired model: experiment, parameter, value.
+    pub starts: Vec<(String, String, f64)>,
+    /// Simulations that it took.
+    pub simulations: usize,
+}
