@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::de::ValueDeserializer;
 
 use crate::criterion::CriterionSpec;
+use crate::effect::Effect;
 use crate::file::schema_of;
 use crate::model::Model;
 use crate::solver::Solver;
@@ -149,6 +150,8 @@ pub struct Catalogue {
     pub criteria: Vec<CriterionKind>,
     /// Solvers; the first is taken where a study names none.
     pub solvers: Vec<SolverKind>,
+    /// Effects that models may lack.
+    pub effects: Vec<Arc<dyn Effect>>,
     /// Shipped studies.
     pub studies: Vec<Shipped>,
 }
@@ -165,6 +168,13 @@ impl Catalogue {
     #[must_use]
     pub fn with_criterion(mut self, kind: CriterionKind) -> Self {
         self.criteria.push(kind);
+        self
+    }
+
+    /// Adds an effect.
+    #[must_use]
+    pub fn with_effect(mut self, effect: impl Effect + 'static) -> Self {
+        self.effects.push(Arc::new(effect));
         self
     }
 

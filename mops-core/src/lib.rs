@@ -9,6 +9,7 @@ mod criterion;
 pub mod data;
 mod diagnostic;
 mod differences;
+mod effect;
 mod experiment;
 pub mod expression;
 pub mod file;
@@ -17,6 +18,7 @@ pub mod linear;
 mod linearised;
 mod model;
 mod outcome;
+mod plant;
 mod port;
 mod problem;
 mod random;
@@ -24,6 +26,7 @@ mod run;
 mod scalar;
 mod solver;
 mod study;
+mod tolerance;
 mod trace;
 mod tuner;
 mod unit;
@@ -36,6 +39,7 @@ pub use catalogue::{
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
+pub use effect::{Acting, At, Dimension, DryFriction, Effect, EffectClass, PortKind, Scope, Strength, Trials};
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
@@ -48,17 +52,19 @@ pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
+pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
-pub use scalar::{Dual, Scalar};
+pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
     Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, Draft, ExcitationDraft, ExcitationTask, Free, JobPlan,
     Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask, Row,
     SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
 };
+pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
 pub use tuner::{Grid, Scale, Tuner};
 pub use unit::{Quantity, Unit};

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::case::Case;
 use crate::linear::StateSpace;
+use crate::plant::Open;
 use crate::port::Port;
 use crate::trace::Trace;
 use crate::unit::Unit;
@@ -147,6 +148,11 @@ pub trait Model: Send + Sync {
 
     /// Values of [`Model::equation_states`] at the start, where they are not just those of parameters.
     fn start_values(&self, _parameters: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// The model opened at its ports, where it has some.
+    fn ported(&self) -> Option<&dyn Open> {
         None
     }
 

@@ -112,6 +112,13 @@ impl Scalar for f64 {
     }
 }
 
+/// Directions that one simulation carries: a compromise between many tuners and few. Every width is compiled for every
+/// model, which takes long, so that there is one.
+pub const DIRECTIONS: usize = 6;
+
+/// A number with the tangents that one simulation carries.
+pub type Along = Dual<DIRECTIONS>;
+
 /// A value with its derivatives with respect to `N` quantities (forward differentiation).
 ///
 /// Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd edition (SIAM 2008), chapter 3.

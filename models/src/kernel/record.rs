@@ -1,6 +1,6 @@
 //! From steps to traces: the signals of a model along its dense output, with their tangents.
 
-use mops_core::{Analysis, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents};
+use mops_core::{Along, Analysis, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents};
 
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
@@ -29,10 +29,6 @@ pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure
     model.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
 }
 
-/// Directions that one simulation carries: a compromise between many tuners and few. Every width is compiled for every
-/// model, which takes long, so that there is one.
-const DIRECTIONS: usize = 6;
-
 /// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: six directions in one simulation.
 ///
 /// # Errors
@@ -57,7 +53,7 @@ fn along(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<Rec
         let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
         Dual { value, tangent }
     };
-    let parameters: Vec<Dual<DIRECTIONS>> = job.parameters.iter().enumerate().map(parameter).collect();
+    let parameters: Vec<Along> = job.parameters.iter().enumerate().map(parameter).collect();
     model.simulate(job, &parameters)
 }
 

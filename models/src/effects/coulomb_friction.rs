@@ -1,0 +1,40 @@
+//! Dry friction.
+
+use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `coulomb-friction`.
+pub struct CoulombFriction;
+
+/// At given strengths.
+pub struct Coulomb<S> {
+    torque: S,
+}
+
+impl Definition for CoulombFriction {
+    const NAME: &'static str = "coulomb-friction";
+    const ABOUT: &'static str =
+        "A force of constant size against the motion, that holds a joint at rest up to the same size.";
+    const FORMULA: &'static str = "-c sgn(v); at rest whatever holds it, up to c";
+    const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
+                                  compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[Strength::positive("c", "friction force", Dimension::OUTPUT)];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(Coulomb { torque: strengths[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for Coulomb<S> {
+    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+        S::from(0.0)
+    }
+
+    fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+        Some(DryFriction { sliding: [self.torque; 2], limit: [self.torque; 2] })
+    }
+}

@@ -1,0 +1,36 @@
+//! Friction in proportion to the speed.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `viscous-friction`.
+pub struct ViscousFriction;
+
+/// At given strengths.
+pub struct Viscous<S> {
+    factor: S,
+}
+
+impl Definition for ViscousFriction {
+    const NAME: &'static str = "viscous-friction";
+    const ABOUT: &'static str = "A force against the motion in proportion to the speed.";
+    const FORMULA: &'static str = "-d v";
+    const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
+                                  compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(Viscous { factor: strengths[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for Viscous<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.factor * at.v
+    }
+}
