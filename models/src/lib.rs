@@ -14,8 +14,10 @@ pub mod pid_open_loop;
 mod plant;
 pub mod state_space;
 pub mod transfer_function;
+mod with_effects;
 
 use mops_core::ModelKind;
+pub use with_effects::WithEffects;
 
 /// Every kind of model. A new one is a file, and a line here.
 pub fn kinds() -> Vec<ModelKind> {

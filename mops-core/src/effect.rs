@@ -1,5 +1,7 @@
 //! Effects: what a model may lack at one of its ports, each with strengths that can be neutral.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use crate::port::Port;
@@ -263,7 +265,7 @@ pub struct At<'a, S> {
     pub value: S,
     /// Position of the joint; at a process the state; else `value`.
     pub q: S,
-    /// Speed of the joint; at a process the rate of the state without effects; else 0.
+    /// Speed of the joint; else 0.
     pub v: S,
     /// Acceleration of the joint without the effect, for those that ask ([`Effect::is_inertial`]); else 0.
     pub a: S,
@@ -306,6 +308,16 @@ pub trait Acting<S: Scalar> {
     /// The time by which an actuator or a sensor comes late, s.
     fn delay(&self) -> Option<S> {
         None
+    }
+
+    /// Times at which it changes its form: steps end there, s.
+    fn breaks(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Longest step within which what it does by itself is well resolved, s.
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
     }
 
     /// Moves what is remembered from one moment to the next ([`Effect::memory`]): at an actuator whenever the command jumps or
@@ -381,4 +393,17 @@ pub trait Effect: Send + Sync {
 
     /// The same with tangents.
     fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>>;
+}
+
+/// An effect at a place of a model.
+#[derive(Clone)]
+pub struct Placement {
+    /// Its name in the model: its strengths are the parameters `name.strength`.
+    pub name: String,
+    /// The effect.
+    pub effect: Arc<dyn Effect>,
+    /// The port that it acts at.
+    pub port: Port,
+    /// A second port, where the effect needs one.
+    pub companion: Option<Port>,
 }

@@ -39,7 +39,9 @@ pub use catalogue::{
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
-pub use effect::{Acting, At, Dimension, DryFriction, Effect, EffectClass, PortKind, Scope, Strength, Trials};
+pub use effect::{
+    Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
+};
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;

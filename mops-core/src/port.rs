@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use crate::unit::Unit;
+
 /// A place where a missing force, rate, actuator or sensor effect may act.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Port {
     /// A force on a coordinate of second order, which may depend on its position and speed.
     Joint {
@@ -13,6 +15,8 @@ pub enum Port {
         position: String,
         /// The state that is its rate of change; the force enters its equation, before a mass matrix is solved.
         velocity: String,
+        /// Unit of the force, where the model tells it.
+        unit: Option<Unit>,
     },
     /// A term in the equation of a state, before a mass matrix is solved.
     Process {
@@ -20,6 +24,8 @@ pub enum Port {
         name: String,
         /// The state whose equation it is.
         state: String,
+        /// Unit of the term, where the model tells it.
+        unit: Option<Unit>,
     },
     /// What an input does before it acts.
     Actuator {

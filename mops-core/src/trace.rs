@@ -70,6 +70,34 @@ impl Trace {
         self.knots.last().copied().unwrap_or(0.0)
     }
 
+    /// Times at which segments begin and end, s.
+    pub fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    /// This trace, seen later by `time` (s, not negative), up to the same end; before it comes, its first value.
+    #[must_use]
+    pub fn delayed(&self, time: f64) -> Self {
+        let (start, end) = (self.start(), self.end());
+        let mut late = Self::starting_at(start, self.segments.len() + 1);
+        late.push_polynomial((start + time).min(end), [self.first(), 0.0, 0.0, 0.0, 0.0]);
+        for (segment, c) in self.segments.iter().enumerate() {
+            let (from, to) = (self.knots[segment] + time, self.knots[segment + 1] + time);
+            if from >= end {
+                break;
+            }
+            let part = ((end - from) / (to - from)).min(1.0);
+            let mut scale = 1.0;
+            let cut = c.map(|c| {
+                let scaled = c * scale;
+                scale *= part;
+                scaled
+            });
+            late.push_polynomial(to.min(end), cut);
+        }
+        late
+    }
+
     /// Whether the trace has no segment.
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()

@@ -148,6 +148,31 @@ impl Unit {
         self.is_compatible(other).then_some(self.factor / other.factor)
     }
 
+    /// The unit of a product of powers of units.
+    #[must_use]
+    pub fn product(factors: &[(&Self, i32)]) -> Self {
+        let mut text = String::new();
+        for (unit, power) in factors.iter().filter(|(unit, power)| *power > 0 && unit.text != "1") {
+            text.push_str(if text.is_empty() { "" } else { " " });
+            text.push_str(&unit.power(*power, 0).text);
+        }
+        if text.is_empty() {
+            text.push('1');
+        }
+        for (unit, power) in factors.iter().filter(|(unit, power)| *power < 0 && unit.text != "1") {
+            let own = if unit.text.contains(|c: char| !c.is_alphabetic()) {
+                format!("({})", unit.text)
+            } else {
+                unit.text.clone()
+            };
+            text.push_str(&format!("/{own}"));
+            if *power < -1 {
+                text.push_str(&format!("^{}", -power));
+            }
+        }
+        Self::known(&text)
+    }
+
     /// The unit of a product of powers of this unit and seconds, as `unit^power s^seconds`.
     #[must_use]
     pub fn power(&self, power: i32, seconds: i32) -> Self {

@@ -1,10 +1,10 @@
 //! What a model from text offers: parameters with start values, and places of effects.
 
-use mops_core::{Mistake, Parameter, Port, Variable, suggestion};
+use mops_core::{Mistake, Parameter, Port, Unit, Variable, suggestion};
 
 use super::definition::{self, Definition, under};
 use super::graph::Op;
-use super::system::System;
+use super::system::{Mass, System};
 
 /// Where a state starts.
 #[derive(Debug, Clone, Copy)]
@@ -77,13 +77,32 @@ pub(super) fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistak
         }
         let position = system.joints.iter().find(|&&(_, velocity)| velocity == s).map(|&(position, _)| position);
         let place = position.map_or_else(|| name(s), |p| given(p).map_or_else(|| name(p), |(name, ..)| name.clone()));
+        let unit = force_unit(d, system, s);
         if let Some(position) = position {
-            ports.push(Port::Joint { name: place.clone(), position: name(position), velocity: name(s) });
+            ports.push(Port::Joint {
+                name: place.clone(),
+                position: name(position),
+                velocity: name(s),
+                unit: unit.clone(),
+            });
         }
-        ports.push(Port::Process { name: place, state: name(s) });
+        ports.push(Port::Process { name: place, state: name(s), unit });
     }
     ports.extend(d.inputs.iter().map(|input| Port::Actuator { input: input.name.clone() }));
     let signals = d.states.iter().chain(d.outputs.iter().map(|(output, _)| output));
     ports.extend(signals.map(|signal| Port::Sensor { output: signal.name.clone() }));
     Ok(ports)
+}
+
+/// The unit of the terms in the equation of a state, where its derivative stands alone or times one declared quantity.
+fn force_unit(d: &Definition, system: &System, s: usize) -> Option<Unit> {
+    let rate = d.states[s].unit.power(1, -1);
+    let unit = match system.masses[s]? {
+        Mass::One => return Some(rate),
+        Mass::Parameter(index) => Unit::product(&[(&d.parameters[index].quantity.unit, 1), (&rate, 1)]),
+    };
+    let usual = ["N m", "N", "W", "kW"].map(Unit::known);
+    let turns = d.states[s].unit.is_compatible(&Unit::known("rad/s"));
+    let usual = usual.into_iter().filter(|u| turns || !u.is_compatible(&Unit::known("N m")));
+    Some(usual.into_iter().find(|u| u.factor_to(&unit).is_some_and(|f| (f - 1.0).abs() < 1e-12)).unwrap_or(unit))
 }

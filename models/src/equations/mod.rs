@@ -11,15 +11,17 @@ mod layout;
 mod lower;
 mod modes;
 mod options;
+mod ported;
 mod program;
 mod running;
 mod system;
 mod tape;
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Scalar,
+    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, Open, OperatingPoint, Scalar,
     State, Unit, Variable, WithTangents,
 };
 
@@ -52,6 +54,8 @@ pub struct Equations {
     compiled: Compiled,
     starts: Vec<Start>,
     tolerance: Tolerance,
+    /// The same with an input more in every equation that is a port; made at the first need.
+    opened: OnceLock<Compiled>,
 }
 
 impl Equations {
@@ -68,7 +72,7 @@ impl Equations {
 
     fn compile(definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, Mistake> {
         let d = &definition;
-        let system = System::new(d)?;
+        let system = System::new(d, &[])?;
         let (parameters, starts) = parameters(d, &system)?;
         let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
         let compiled = Compiled::new(&system, &names, d.inputs.len(), d.parameters.len())?;
@@ -94,7 +98,7 @@ impl Equations {
             horizon,
             analysis: AnalysisKind::Time,
         };
-        Ok(Self { definition, interface, compiled, starts, tolerance })
+        Ok(Self { definition, interface, compiled, starts, tolerance, opened: OnceLock::new() })
     }
 
     /// The same model with one more term at a port: `value` is an expression of the model's quantities, the numbers in it
@@ -183,6 +187,10 @@ impl Model for Equations {
 
     fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         Some(kernel::local(self, at))
+    }
+
+    fn ported(&self) -> Option<&dyn Open> {
+        Some(self)
     }
 }
 

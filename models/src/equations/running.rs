@@ -91,6 +91,13 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         std::array::from_fn(|k| bank.get(tape.results[k]))
     }
 
+    /// Holds the inputs at these values.
+    pub fn hold(&mut self, values: impl Iterator<Item = S>) {
+        for (drive, value) in self.drives.iter_mut().zip(values) {
+            *drive = Drive::held(value);
+        }
+    }
+
     /// The value of a signal.
     pub fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         match &self.model.signals[signal] {

@@ -45,6 +45,15 @@ pub struct Happening {
     pub resets: Vec<(usize, Id)>,
 }
 
+/// What a state's derivative is multiplied with in its own equation.
+#[derive(Debug, Clone, Copy)]
+pub enum Mass {
+    /// Nothing.
+    One,
+    /// A parameter.
+    Parameter(usize),
+}
+
 /// A model as a graph.
 #[derive(Debug)]
 pub struct System {
@@ -66,6 +75,8 @@ pub struct System {
     pub starts: Vec<Option<Id>>,
     /// Joints: position and speed.
     pub joints: Vec<(usize, usize)>,
+    /// What each state's derivative is multiplied with, where it is one thing.
+    pub masses: Vec<Option<Mass>>,
     /// Matrices of equations that are solved together, row by row.
     pub matrices: Vec<Vec<Id>>,
 }
@@ -75,7 +86,9 @@ impl System {
     ///
     /// # Errors
     /// Names that are not there, definitions in a circle, equations that do not determine the derivatives.
-    pub fn new(definition: &Definition) -> Result<Self, Mistake> {
+    ///
+    /// To the right-hand sides of the equations of the states `opened` further inputs are added, behind those declared.
+    pub fn new(definition: &Definition, opened: &[usize]) -> Result<Self, Mistake> {
         let d = definition;
         let mut l = Lowering::new(d)?;
         let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
@@ -107,12 +120,22 @@ impl System {
             row.coefficients.retain(|_, c| !l.graph.is(*c, 0.0));
         }
         let joints = joints(&l.graph, &rows);
+        let mass = |(state, row): (usize, &Row)| match row.coefficients.get(&state).map(|&id| (id, l.graph.op(id))) {
+            Some((_, Op::Parameter(index))) => Some(Mass::Parameter(index)),
+            Some((id, _)) if l.graph.is(id, 1.0) => Some(Mass::One),
+            _ => None,
+        };
+        let masses = rows.iter().enumerate().map(mass).collect();
         for term in &d.terms {
             if let Target::Equation(name) = &term.target {
                 let value = l.value(&term.value)?;
                 let row = &mut rows[state(name)];
                 row.force = l.graph.add(row.force, value);
             }
+        }
+        for (k, &state) in opened.iter().enumerate() {
+            let force = l.graph.add_op(Op::Input(d.inputs.len() + k));
+            rows[state].force = l.graph.add(rows[state].force, force);
         }
         let mut contacts = friction(&mut l, d, &joints, &mut rows)?;
         let mut matrices = Vec::new();
@@ -166,7 +189,19 @@ impl System {
         l.switches.truncate(switches);
         l.modes = modes;
         let Lowering { graph, switches, modes, .. } = l;
-        Ok(Self { graph, switches, modes, derivatives, signals, contacts, happenings, starts, joints, matrices })
+        Ok(Self {
+            graph,
+            switches,
+            modes,
+            derivatives,
+            signals,
+            contacts,
+            happenings,
+            starts,
+            joints,
+            masses,
+            matrices,
+        })
     }
 }
 

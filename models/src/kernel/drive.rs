@@ -58,6 +58,11 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// How fast it moves at present, per s; 0 for a sine.
+    pub fn slope(&self) -> f64 {
+        self.slope
+    }
+
     /// The next time after `t` at which the value or its slope jumps.
     pub fn next_break(&self, t: f64) -> f64 {
         self.input.map_or(f64::INFINITY, |input| input.next_break(t))

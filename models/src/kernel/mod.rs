@@ -18,7 +18,7 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 
 pub use integrate::{Step, integrate};
 pub use local::{Equations, local, rates_and_signals, rests};
-pub use record::{Recording, Simulate, analyse, record, tangents, wanted};
+pub use record::{Recording, Simulate, analyse, record, tangents, tangents_of, wanted};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
 ///

@@ -34,27 +34,34 @@ pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure
 /// # Errors
 /// The failure of the simulation.
 pub fn tangents(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
+    if seeds.is_empty() {
+        return analyse(model, job).map(|analysis| (analysis, Vec::new()));
+    }
+    tangents_of(|parameters| model.simulate(job, parameters), job.parameters, seeds)
+}
+
+/// The analysis and its tangents along the seeds, of which there is one at least, by a simulation over the scalar.
+///
+/// # Errors
+/// The failure of the simulation.
+pub fn tangents_of(
+    simulate: impl Fn(&[Along]) -> Result<Recording, Failure>,
+    parameters: &[f64],
+    seeds: &[Vec<f64>],
+) -> Result<WithTangents, Failure> {
     let mut analysis = None;
     let mut tangents = Vec::with_capacity(seeds.len());
     for seeds in seeds.chunks(DIRECTIONS) {
-        let recording = along(model, job, seeds)?;
+        let parameter = |(i, &value): (usize, &f64)| {
+            let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
+            Dual { value, tangent }
+        };
+        let parameters: Vec<Along> = parameters.iter().enumerate().map(parameter).collect();
+        let recording = simulate(&parameters)?;
         analysis.get_or_insert(recording.response);
         tangents.extend(recording.tangents.into_iter().take(seeds.len()).map(Analysis::Time));
     }
-    let analysis = match analysis {
-        Some(response) => Analysis::Time(response),
-        None => analyse(model, job)?,
-    };
-    Ok((analysis, tangents))
-}
-
-fn along(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<Recording, Failure> {
-    let parameter = |(i, &value): (usize, &f64)| {
-        let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
-        Dual { value, tangent }
-    };
-    let parameters: Vec<Along> = job.parameters.iter().enumerate().map(parameter).collect();
-    model.simulate(job, &parameters)
+    Ok((Analysis::Time(analysis.expect("there is a seed")), tangents))
 }
 
 /// Records signals along the steps.

@@ -1,0 +1,183 @@
+//! Dry friction at ports: which joints stick, and what holds them, found by asking the plant.
+//!
+//! The rates of a plant depend on its forces affinely, `v' = a + B f`, so that the force that holds joints is what makes
+//! their accelerations vanish; no mass matrix is needed.
+
+use mops_core::{Opening, Scalar};
+use nalgebra::{DMatrix, DVector};
+
+use super::dynamics::Driven;
+use crate::kernel::friction::Contact;
+
+/// The joints with dry friction.
+#[derive(Debug, Default)]
+pub(super) struct Contacts {
+    joints: Vec<Joint>,
+}
+
+/// A joint with dry friction.
+#[derive(Debug, Clone, Copy)]
+struct Joint {
+    /// The effect that is its friction.
+    actor: usize,
+    /// The force of its equation.
+    w: usize,
+    /// The state that is its speed.
+    velocity: usize,
+    contact: Contact,
+}
+
+impl Contacts {
+    pub(super) fn add(&mut self, actor: usize, w: usize, velocity: usize) {
+        self.joints.push(Joint { actor, w, velocity, contact: Contact::Stuck });
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    pub(super) fn any_stuck(&self) -> bool {
+        self.joints.iter().any(|joint| joint.contact == Contact::Stuck)
+    }
+
+    /// 1 where the joint of this effect slides forward, -1 backward; `None` where it sticks or has no dry friction.
+    pub(super) fn direction(&self, actor: usize) -> Option<f64> {
+        let joint = self.joints.iter().find(|joint| joint.actor == actor)?;
+        (joint.contact != Contact::Stuck).then(|| joint.contact.sign())
+    }
+}
+
+impl<S: Opening> Driven<'_, S> {
+    /// Adds the forces that hold stuck joints to `w`; their accelerations are then 0. Returns what holds each contact, 0
+    /// where it slides.
+    pub(super) fn hold(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) -> Vec<S> {
+        let joints = &self.contacts.joints;
+        let stuck: Vec<usize> = (0..joints.len()).filter(|&i| joints[i].contact == Contact::Stuck).collect();
+        let n = stuck.len();
+        let mut moved = w.to_vec();
+        self.moved(t, x, u, &mut moved, dx);
+        let free: Vec<S> = stuck.iter().map(|&i| dx[joints[i].velocity]).collect();
+        let mut columns = Vec::with_capacity(n);
+        for &j in &stuck {
+            moved.copy_from_slice(w);
+            moved[joints[j].w] += S::from(1.0);
+            self.moved(t, x, u, &mut moved, dx);
+            columns.push((0..n).map(|i| dx[joints[stuck[i]].velocity] - free[i]).collect::<Vec<S>>());
+        }
+        let held = solve(&columns, &free);
+        let mut forces = vec![S::from(0.0); joints.len()];
+        for (k, &j) in stuck.iter().enumerate() {
+            forces[j] = held[k];
+            w[joints[j].w] += held[k];
+        }
+        self.moved(t, x, u, w, dx);
+        for &j in &stuck {
+            dx[joints[j].velocity] = S::from(0.0);
+        }
+        forces
+    }
+
+    pub(super) fn contact_guard(&self, index: usize, t: f64, x: &[S], u: &mut Vec<S>, w: &mut Vec<S>) -> S {
+        let joint = self.contacts.joints[index];
+        if joint.contact != Contact::Stuck {
+            return x[joint.velocity] * joint.contact.sign();
+        }
+        let mut dx = vec![S::from(0.0); self.own];
+        let held = self.balance(t, x, u, w, &mut dx)[index] * self.forward(joint.w);
+        // What holds it backward is friction against forward motion.
+        let friction = self.friction(joint.actor, t, x, u);
+        friction.limit[usize::from(held.value() > 0.0)] - held.abs()
+    }
+
+    /// A contact's guard became negative. Returns whether the joint now sticks.
+    pub(super) fn contact_switch(&mut self, index: usize, t: f64, x: &mut [S]) -> bool {
+        let joint = self.contacts.joints[index];
+        if joint.contact == Contact::Stuck {
+            let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); self.own]);
+            let held = self.balance(t, x, &mut u, &mut w, &mut dx)[index].value() * self.forward(joint.w);
+            self.contacts.joints[index].contact = if held < 0.0 { Contact::Forward } else { Contact::Backward };
+            self.settle_contacts(t, x, Some(index));
+        } else {
+            x[joint.velocity] = S::from(0.0);
+            self.contacts.joints[index].contact = Contact::Stuck;
+            self.settle_contacts(t, x, None);
+        }
+        self.contacts.joints[index].contact == Contact::Stuck
+    }
+
+    /// Finds the contacts of joints at rest that agree with the forces, nearest to what they were; joints that move slide
+    /// the way they move. The joint `released` has just exceeded its limit and does not stick again.
+    pub(super) fn settle_contacts(&mut self, t: f64, x: &[S], released: Option<usize>) {
+        const CHOICES: [Contact; 3] = [Contact::Stuck, Contact::Forward, Contact::Backward];
+        let n = self.contacts.len();
+        let before: Vec<Contact> = self.contacts.joints.iter().map(|joint| joint.contact).collect();
+        let mut resting = Vec::new();
+        for i in 0..n {
+            let speed = x[self.contacts.joints[i].velocity].value();
+            if speed == 0.0 {
+                resting.push(i);
+            } else {
+                self.contacts.joints[i].contact = Contact::of(speed);
+            }
+        }
+        if resting.is_empty() {
+            return;
+        }
+        let mut best: Option<(f64, Vec<Contact>)> = None;
+        let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); self.own]);
+        for code in 0..3_usize.pow(u32::try_from(resting.len()).expect("few joints")) {
+            let mut digits = code;
+            for &i in &resting {
+                self.contacts.joints[i].contact = CHOICES[digits % 3];
+                digits /= 3;
+            }
+            let held = self.balance(t, x, &mut u, &mut w, &mut dx);
+            let mut excess: f64 = 0.0;
+            let mut departures = 0.0;
+            for &i in &resting {
+                let joint = self.contacts.joints[i];
+                departures += f64::from(u8::from(joint.contact != before[i]));
+                if joint.contact == Contact::Stuck {
+                    let friction = self.friction(joint.actor, t, x, &u);
+                    let held = held[i].value() * self.forward(joint.w);
+                    let limit = friction.limit[usize::from(held > 0.0)].value();
+                    let never = limit == 0.0 || released == Some(i);
+                    excess = if never { f64::INFINITY } else { excess.max((held.abs() - limit) / limit) };
+                } else {
+                    // Accelerations are compared with those that the friction itself makes.
+                    let a = dx[joint.velocity].value() * joint.contact.sign();
+                    excess = excess.max(if a < 0.0 { 1.0 - a } else { 0.0 });
+                }
+            }
+            let rank = if excess <= 1e-9 { departures } else { 10.0 + excess };
+            if best.as_ref().is_none_or(|(least, _)| rank < *least) {
+                best = Some((rank, self.contacts.joints.iter().map(|joint| joint.contact).collect()));
+            }
+        }
+        for (joint, contact) in self.contacts.joints.iter_mut().zip(best.expect("there are choices").1) {
+            joint.contact = contact;
+        }
+    }
+}
+
+/// Solves `columns f = -free` by elimination over the scalar; there are few.
+fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
+    let n = free.len();
+    if n == 1 {
+        return vec![-free[0] / columns[0][0]];
+    }
+    // Values by LU, tangents by one step of Newton's method, which is exact for them.
+    let matrix = DMatrix::from_fn(n, n, |i, j| columns[j][i].value());
+    let lu = matrix.lu();
+    let right = DVector::from_fn(n, |i, _| -free[i].value());
+    let Some(values) = lu.solve(&right) else { return vec![S::from(f64::NAN); n] };
+    let residual: Vec<S> = (0..n).map(|i| (0..n).fold(free[i], |sum, j| sum + columns[j][i] * values[j])).collect();
+    let mut held: Vec<S> = values.iter().map(|&v| S::from(v)).collect();
+    for direction in 0..S::DIRECTIONS {
+        let right = DVector::from_fn(n, |i, _| -residual[i].tangents()[direction]);
+        if let Some(tangent) = lu.solve(&right) {
+            held.iter_mut().zip(tangent.iter()).for_each(|(h, &t)| h.set_tangent(direction, t));
+        }
+    }
+    held
+}

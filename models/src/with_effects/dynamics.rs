@@ -1,0 +1,408 @@
+//! The equations of a plant together with those of the effects at its ports.
+
+use std::cell::RefCell;
+
+use mops_core::{Acting, At, Failure, Instant, Job, Opening, Plant, Scalar};
+
+use super::contacts::Contacts;
+use super::{Place, Site, WithEffects};
+use crate::kernel::Dynamics;
+use crate::kernel::drive::Drive;
+
+/// An effect in a simulation.
+pub(super) struct Actor<S> {
+    pub(super) acting: Box<dyn Acting<S>>,
+    pub(super) place: Place,
+    /// Where its states begin, and how many it has.
+    z: (usize, usize),
+    /// What it remembers.
+    pub(super) memory: Vec<S>,
+    inertial: bool,
+}
+
+/// An input, which an effect may delay.
+struct Command<'a, S> {
+    drive: Drive<'a, S>,
+    delay: Option<S>,
+}
+
+impl<S: Scalar> Command<'_, S> {
+    /// The time up to which a delayed input has come out.
+    fn out(&self, t: f64) -> f64 {
+        self.delay.map_or(t, |delay| (t - delay.value() + 1e-12 * (1.0 + t.abs())).max(0.0))
+    }
+
+    fn at(&self, t: f64) -> S {
+        match self.delay {
+            None => self.drive.at(t),
+            Some(delay) => {
+                let late = delay - delay.value();
+                self.drive.at((t - delay.value()).max(0.0)) - late * self.drive.slope()
+            }
+        }
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        let delay = self.delay.map_or(0.0, Scalar::value);
+        self.drive.next_break(if delay > 0.0 { self.out(t) } else { t }) + delay
+    }
+}
+
+/// A plant with effects; the state is that of the plant, then those of the effects.
+pub(super) struct Driven<'a, S> {
+    pub(super) plant: Box<dyn Plant<S> + 'a>,
+    pub(super) actors: Vec<Actor<S>>,
+    pub(super) contacts: Contacts,
+    commands: Vec<Command<'a, S>>,
+    /// Number of states of the plant.
+    pub(super) own: usize,
+    forces: usize,
+    breaks: Vec<f64>,
+    longest_step: f64,
+    started: bool,
+    scratch: RefCell<Scratch<S>>,
+    /// For each force the sign with which a positive one acts forward.
+    forward: Vec<f64>,
+}
+
+/// Inputs, forces and rates of the moment.
+#[derive(Debug, Default)]
+struct Scratch<S> {
+    u: Vec<S>,
+    w: Vec<S>,
+}
+
+impl<'a, S: Opening> Driven<'a, S> {
+    pub(super) fn new(
+        model: &WithEffects,
+        plant: Box<dyn Plant<S> + 'a>,
+        acting: &[usize],
+        job: &Job<'a>,
+        parameters: &[S],
+    ) -> Self {
+        let of = model.model.interface();
+        let own = model.model.equation_states().len();
+        let mut states = own;
+        let mut actors = Vec::new();
+        for &index in acting {
+            let (effect, place) = (&model.placements[index].effect, model.places[index]);
+            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
+            actors.push(Actor {
+                acting: S::act(effect.as_ref(), strengths),
+                place,
+                z: (states, effect.states()),
+                memory: vec![S::from(f64::NAN); effect.memory()],
+                inertial: effect.is_inertial(),
+            });
+            states += effect.states();
+        }
+        let delay = |input: usize| {
+            let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
+            late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
+        };
+        let commands = of.inputs.iter().enumerate();
+        let commands = commands.map(|(i, v)| Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i) });
+        let commands: Vec<_> = commands.collect();
+        let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
+        let mut breaks: Vec<f64> = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite()).collect();
+        breaks.sort_by(f64::total_cmp);
+        let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
+        let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
+        Self {
+            plant,
+            contacts: Contacts::default(),
+            actors,
+            commands,
+            own,
+            forces,
+            breaks,
+            longest_step: longest,
+            started: false,
+            scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new() }),
+            forward: vec![1.0; forces],
+        }
+    }
+
+    /// The state at the start; finds which joints have dry friction, and the signs of forces.
+    pub(super) fn start(&mut self, parameters: &[S]) -> Result<Vec<S>, Failure> {
+        let mut x = self.plant.start();
+        let total = self.actors.last().map_or(self.own, |a| a.z.0 + a.z.1);
+        x.resize(total, S::from(0.0));
+        let u: Vec<S> = self.commands.iter().map(|c| c.at(0.0)).collect();
+        let mut w = vec![S::from(0.0); self.forces];
+        let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
+        self.plant.settle(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w });
+        self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[0]);
+        for actor in &self.actors {
+            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = actor.place.site else {
+                continue;
+            };
+            w[k] = S::from(1.0);
+            self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[1]);
+            w[k] = S::from(0.0);
+            let gain = (rates[1][state] - rates[0][state]).value();
+            self.forward[k] = if gain < 0.0 { -1.0 } else { 1.0 };
+        }
+        for index in 0..self.actors.len() {
+            let actor = &self.actors[index];
+            let (first, count) = actor.z;
+            let value = self.passing(index, 0.0, &x, &u, &w);
+            let at = self.at(actor, 0.0, &x, &u, value);
+            let mut z = vec![S::from(0.0); count];
+            actor.acting.start(&at, &mut z);
+            if actor.acting.friction(&at, &z).is_some() {
+                let Site::Joint { w, velocity, .. } = actor.place.site else {
+                    return Err(Failure::Undefined("dry friction acts at a joint".into()));
+                };
+                self.contacts.add(index, w, velocity);
+            }
+            if let Some(starts) = actor.place.starts {
+                z.iter_mut().zip(&parameters[starts..]).for_each(|(z, &over)| *z += over);
+            }
+            x[first..first + count].copy_from_slice(&z);
+        }
+        Ok(x)
+    }
+
+    /// What passes an actuator or a sensor before this effect.
+    fn passing(&self, index: usize, t: f64, x: &[S], u: &[S], w: &[S]) -> S {
+        match self.actors[index].place.site {
+            Site::Actuator { input } => u[input],
+            Site::Sensor { signal } => self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w }),
+            _ => S::from(0.0),
+        }
+    }
+
+    /// What an effect sees.
+    fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> At<'b, S> {
+        let zero = S::from(0.0);
+        let (q, v) = match actor.place.site {
+            Site::Joint { position, velocity, .. } => (x[position], x[velocity]),
+            Site::Process { state, .. } => (x[state], zero),
+            _ => (value, zero),
+        };
+        let (other, other_speed) = match actor.place.companion {
+            Some(Site::Joint { position, velocity, .. }) => (x[position], x[velocity]),
+            Some(Site::Process { state, .. }) => (x[state], zero),
+            Some(Site::Actuator { input }) => (u.get(input).copied().unwrap_or(zero), zero),
+            Some(Site::Sensor { signal }) => {
+                (self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w: &vec![zero; self.forces] }), zero)
+            }
+            None => (zero, zero),
+        };
+        At { t, value, q, v, a: zero, mobility: zero, other, other_speed, u }
+    }
+
+    fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
+        &x[actor.z.0..actor.z.0 + actor.z.1]
+    }
+
+    /// The inputs as they reach the plant.
+    fn inputs(&self, t: f64, x: &[S], u: &mut Vec<S>) {
+        u.clear();
+        u.extend(self.commands.iter().map(|command| command.at(t)));
+        for actor in &self.actors {
+            let Site::Actuator { input } = actor.place.site else { continue };
+            let at = self.at(actor, t, x, u, u[input]);
+            let passed = if actor.memory.is_empty() {
+                actor.acting.value(&at, self.states(actor, x))
+            } else {
+                actor.acting.recall(&at, &actor.memory)
+            };
+            u[input] = passed;
+        }
+    }
+
+    /// Forces of the effects but those in proportion to the acceleration, and but friction that holds a joint.
+    fn forces(&self, t: f64, x: &[S], u: &[S], w: &mut Vec<S>) {
+        w.clear();
+        w.resize(self.forces, S::from(0.0));
+        for (index, actor) in self.actors.iter().enumerate() {
+            let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = actor.place.site else { continue };
+            if actor.inertial {
+                continue;
+            }
+            let at = self.at(actor, t, x, u, S::from(0.0));
+            let z = self.states(actor, x);
+            w[k] += actor.acting.value(&at, z) * self.forward[k];
+            if let Some(direction) = self.contacts.direction(index) {
+                let friction = actor.acting.friction(&at, z).expect("it has friction from the start");
+                let against = friction.sliding[usize::from(direction < 0.0)];
+                w[k] -= against * (direction * self.forward[k]);
+            }
+        }
+    }
+
+    /// The sign with which a force acts forward.
+    pub(super) fn forward(&self, w: usize) -> f64 {
+        self.forward[w]
+    }
+
+    pub(super) fn own_rates(&self, t: f64, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {
+        self.plant.rates(&Instant { t, x: &x[..self.own], u, w }, dx);
+    }
+
+    /// Rates of the plant for forces to which those in proportion to the acceleration are added.
+    pub(super) fn moved(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) {
+        for actor in self.actors.iter().filter(|actor| actor.inertial) {
+            let Site::Joint { w: k, velocity, .. } = actor.place.site else { continue };
+            self.own_rates(t, x, u, w, dx);
+            let free = dx[velocity];
+            w[k] += S::from(self.forward[k]);
+            self.own_rates(t, x, u, w, dx);
+            w[k] += S::from(-self.forward[k]);
+            let mut at = self.at(actor, t, x, u, S::from(0.0));
+            (at.a, at.mobility) = (free, dx[velocity] - free);
+            w[k] += actor.acting.value(&at, self.states(actor, x)) * self.forward[k];
+        }
+        self.own_rates(t, x, u, w, dx);
+    }
+
+    /// Inputs, and forces with the friction that holds joints; the rates of the plant.
+    pub(super) fn balance(&self, t: f64, x: &[S], u: &mut Vec<S>, w: &mut Vec<S>, dx: &mut [S]) -> Vec<S> {
+        self.inputs(t, x, u);
+        self.forces(t, x, u, w);
+        if self.contacts.any_stuck() {
+            return self.hold(t, x, u, w, dx);
+        }
+        self.moved(t, x, u, w, dx);
+        Vec::new()
+    }
+
+    /// Friction at a joint with a contact: sliding forces and limits against forward and backward.
+    pub(super) fn friction(&self, actor: usize, t: f64, x: &[S], u: &[S]) -> mops_core::DryFriction<S> {
+        let actor = &self.actors[actor];
+        let at = self.at(actor, t, x, u, S::from(0.0));
+        actor.acting.friction(&at, self.states(actor, x)).expect("it has friction from the start")
+    }
+
+    /// The value of a signal as it is measured; what is remembered comes in later.
+    pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w } = &mut *scratch;
+        let mut dx = vec![S::from(0.0); self.own];
+        // Outputs may contain rates: the forces count.
+        self.balance(t, x, u, w, &mut dx);
+        let mut value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
+        for actor in &self.actors {
+            if matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty() {
+                let at = self.at(actor, t, x, u, value);
+                value = actor.acting.value(&at, self.states(actor, x));
+            }
+        }
+        value
+    }
+
+    /// Moves what actuators remember to the command of the moment.
+    fn remember(&mut self, t: f64, x: &[S]) {
+        let mut u: Vec<S> = self.commands.iter().map(|command| command.at(t)).collect();
+        for index in 0..self.actors.len() {
+            let Site::Actuator { input } = self.actors[index].place.site else { continue };
+            let at = self.at(&self.actors[index], t, x, &u, u[input]);
+            let actor = &mut self.actors[index];
+            let passed = if actor.memory.is_empty() {
+                actor.acting.value(&at, &x[actor.z.0..actor.z.0 + actor.z.1])
+            } else {
+                actor.acting.remember(&at, &mut actor.memory);
+                actor.acting.recall(&at, &actor.memory)
+            };
+            u[input] = passed;
+        }
+    }
+
+    /// Passes a break of inputs. The time at which a delayed input jumps moves with the delay, and the state with it.
+    fn pass(&mut self, t: f64, x: &mut [S]) {
+        let delayed = self.commands.iter().any(|c| c.delay.is_some());
+        if delayed && S::DIRECTIONS > 0 && self.started {
+            for k in 0..self.commands.len() {
+                let Some(delay) = self.commands[k].delay else { continue };
+                let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
+                let (mut u, mut w) = (Vec::new(), Vec::new());
+                self.balance(t, x, &mut u, &mut w, &mut rates[0]);
+                let out = self.commands[k].out(t);
+                self.commands[k].drive.pass_break(out);
+                self.balance(t, x, &mut u, &mut w, &mut rates[1]);
+                let late = delay - delay.value();
+                for i in 0..self.own {
+                    x[i] += (rates[0][i] - rates[1][i]) * late;
+                }
+            }
+        }
+        for command in &mut self.commands {
+            let out = command.out(t);
+            command.drive.pass_break(out);
+        }
+    }
+}
+
+impl<S: Opening> Dynamics<S> for Driven<'_, S> {
+    type State = Vec<S>;
+
+    fn derivative(&self, t: f64, x: &Vec<S>, dx: &mut Vec<S>) {
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w } = &mut *scratch;
+        let (own, further) = dx.split_at_mut(self.own);
+        self.balance(t, x, u, w, own);
+        for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
+            // An actuator's state follows what comes to it, not what it passes on.
+            let value = match actor.place.site {
+                Site::Actuator { input } => self.commands[input].at(t),
+                _ => self.passing(index, t, x, u, w),
+            };
+            let at = self.at(actor, t, x, u, value);
+            let (first, count) = (actor.z.0 - self.own, actor.z.1);
+            actor.acting.rates(&at, self.states(actor, x), &mut further[first..first + count]);
+        }
+    }
+
+    fn guards(&self) -> usize {
+        self.plant.guards() + self.contacts.len()
+    }
+
+    fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> S {
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w } = &mut *scratch;
+        let own = self.plant.guards();
+        if index >= own {
+            return self.contact_guard(index - own, t, x, u, w);
+        }
+        let mut dx = vec![S::from(0.0); self.own];
+        self.balance(t, x, u, w, &mut dx);
+        self.plant.guard(index, &Instant { t, x: &x[..self.own], u, w })
+    }
+
+    fn switch(&mut self, index: usize, t: f64, x: &mut Vec<S>) -> &str {
+        let own = self.plant.guards();
+        let (mut u, mut w) = (Vec::new(), Vec::new());
+        let mut dx = vec![S::from(0.0); self.own];
+        if index >= own {
+            let sticks = self.contact_switch(index - own, t, x);
+            self.balance(t, x, &mut u, &mut w, &mut dx);
+            self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+            return if sticks { "a joint sticks" } else { "a joint slides" };
+        }
+        self.balance(t, x, &mut u, &mut w, &mut dx);
+        let before = x[..self.own].to_vec();
+        self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own])
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        let inputs = self.commands.iter().map(|command| command.next_break(t)).fold(f64::INFINITY, f64::min);
+        self.breaks.iter().copied().find(|&at| at > t).map_or(inputs, |at| at.min(inputs))
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.longest_step
+    }
+
+    fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+        self.pass(t, x);
+        self.remember(t, x);
+        let (mut u, mut w) = (Vec::new(), Vec::new());
+        let mut dx = vec![S::from(0.0); self.own];
+        self.started = true;
+        self.settle_contacts(t, x, None);
+        self.balance(t, x, &mut u, &mut w, &mut dx);
+        self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+    }
+}

@@ -1,0 +1,229 @@
+//! A model with effects at its ports: itself a model, whose parameters are those of the model and the strengths.
+
+mod contacts;
+mod dynamics;
+mod sensors;
+
+use std::sync::Arc;
+
+use mops_core::{
+    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Port, Scalar, State,
+    Unit, Variable, WithTangents,
+};
+
+use crate::kernel::{self, Recording, record, wanted};
+use dynamics::Driven;
+
+/// A model with effects.
+///
+/// Where every effect is neutral the model itself is simulated, to the last bit.
+pub struct WithEffects {
+    model: Arc<dyn Model>,
+    placements: Vec<Placement>,
+    places: Vec<Place>,
+    interface: Interface,
+}
+
+/// Where an effect acts, as indices; and where its strengths and start values stand among the parameters.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    site: Site,
+    companion: Option<Site>,
+    strengths: usize,
+    starts: Option<usize>,
+}
+
+/// A port, as indices into states, inputs, signals, and forces `w`.
+#[derive(Debug, Clone, Copy)]
+enum Site {
+    Joint { w: usize, position: usize, velocity: usize },
+    Process { w: usize, state: usize },
+    Actuator { input: usize },
+    Sensor { signal: usize },
+}
+
+impl WithEffects {
+    /// The model with these effects.
+    ///
+    /// # Errors
+    /// A model without ports, a port that it does not have, or one that the effect does not act at.
+    pub fn new(model: Arc<dyn Model>, placements: Vec<Placement>) -> Result<Self, Mistake> {
+        let of = model.interface();
+        if model.ported().is_none() {
+            let fact = "this model cannot take effects: it does not open its equations";
+            return Err(Mistake::here(fact).with_help("`mops describe KIND` says which places a model has"));
+        }
+        let mut interface = of.clone();
+        let mut places = Vec::new();
+        let states = model.equation_states();
+        for placement in &placements {
+            let Placement { name, effect, port, companion } = placement;
+            let kind = port.kind(&of.ports);
+            if !kind.is_some_and(|kind| effect.ports().contains(&kind)) {
+                let names = effect.ports().iter().map(|kind| format!("{kind:?}").to_lowercase()).collect::<Vec<_>>();
+                let fact = format!("`{}` does not act at {port}", effect.name());
+                return Err(Mistake::new("place", fact).with_help(format!("it acts at: {}", names.join(", "))));
+            }
+            let site = |port: &Port| Site::of(port, of, &states);
+            let here = site(port).ok_or_else(|| Mistake::new("place", format!("the model has no place {port}")))?;
+            let companion = match (effect.companion(), companion) {
+                (None, None) => None,
+                (Some(kind), Some(companion)) if companion.kind(&of.ports) == Some(kind) => site(companion),
+                (Some(kind), _) => {
+                    let fact =
+                        format!("`{}` needs a second place: {}", effect.name(), format!("{kind:?}").to_lowercase());
+                    return Err(Mistake::new("companion", fact).with_help("such as companion = \"joint:phi\""));
+                }
+                (None, Some(_)) => {
+                    return Err(Mistake::new("companion", format!("`{}` has no second place", effect.name()))
+                        .with_help("remove `companion`"));
+                }
+            };
+            let strengths = interface.parameters.len();
+            for strength in effect.strengths() {
+                let variable = Variable {
+                    name: format!("{name}.{}", strength.name),
+                    unit: unit(strength.dimension, port, of),
+                    about: strength.about.to_owned(),
+                };
+                let default = strength.neutral;
+                interface.parameters.push(Parameter { variable, default, range: strength.bounds });
+            }
+            let starts = effect.free_start().then_some(interface.parameters.len());
+            if effect.free_start() {
+                for k in 0..effect.states() {
+                    let parameter = format!("{name}.start{}", k + 1);
+                    interface.parameters.push(
+                        Parameter::new(
+                            &parameter,
+                            "1",
+                            "start value of a state of the effect, over where it would rest",
+                        )
+                        .with_default(0.0),
+                    );
+                    interface.states.push(State {
+                        name: format!("{name}.{}", k + 1),
+                        start: parameter,
+                        signal: None,
+                        rate_of: None,
+                    });
+                }
+            }
+            places.push(Place { site: here, companion, strengths, starts });
+        }
+        Ok(Self { model, placements, places, interface })
+    }
+
+    /// The model without effects.
+    pub fn model(&self) -> &Arc<dyn Model> {
+        &self.model
+    }
+
+    /// The effects.
+    pub fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
+    /// Number of parameters of the model itself.
+    fn own(&self) -> usize {
+        self.model.interface().parameters.len()
+    }
+
+    /// Whether an effect may change something, along the tangents too.
+    fn acts<S: Scalar>(&self, index: usize, parameters: &[S]) -> bool {
+        let neutral = self.placements[index].effect.strengths()[0].neutral;
+        let first = parameters[self.places[index].strengths];
+        neutral.is_none_or(|neutral| first.value() != neutral) || first.tangents().iter().any(|&t| t != 0.0)
+    }
+
+    fn simulate<S: Opening>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let open = self.model.ported().expect("looked at when it was made");
+        let plant = S::open(open, &parameters[..self.own()])?;
+        let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
+        let mut dynamics = Driven::new(self, plant, &acting, job, parameters);
+        let start = dynamics.start(parameters)?;
+        let signals = wanted(job, &self.interface.signals);
+        let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
+        let recording = record(&mut dynamics, start, job.horizon, &open.tolerance(), &signals, &output)?;
+        Ok(dynamics.remembered(recording, &signals))
+    }
+}
+
+impl Site {
+    fn of(port: &Port, interface: &Interface, states: &[Variable]) -> Option<Self> {
+        let state = |name: &str| states.iter().position(|s| s.name == name);
+        let force = |name: &str| {
+            let processes = interface.ports.iter().filter_map(|port| match port {
+                Port::Process { state, .. } => Some(state),
+                _ => None,
+            });
+            processes.into_iter().position(|state| state == name)
+        };
+        if !interface.ports.contains(port) {
+            return None;
+        }
+        Some(match port {
+            Port::Joint { position, velocity, .. } => {
+                Self::Joint { w: force(velocity)?, position: state(position)?, velocity: state(velocity)? }
+            }
+            Port::Process { state: name, .. } => Self::Process { w: force(name)?, state: state(name)? },
+            Port::Actuator { input } => {
+                Self::Actuator { input: interface.inputs.iter().position(|i| i.name == *input)? }
+            }
+            Port::Sensor { output } => {
+                Self::Sensor { signal: interface.signals.iter().position(|s| s.name == *output)? }
+            }
+        })
+    }
+}
+
+/// The unit of a strength at a port, where the model tells it.
+fn unit(dimension: Dimension, port: &Port, interface: &Interface) -> Unit {
+    let of = |name: &str| {
+        let all = interface.signals.iter().chain(&interface.inputs);
+        all.into_iter().find(|v| v.name == name).map_or_else(Unit::one, |v| v.unit.clone())
+    };
+    let (output, position, speed, value) = match port {
+        Port::Joint { position, velocity, unit, .. } => (unit.clone(), of(position), of(velocity), Unit::one()),
+        Port::Process { state, unit, .. } => (unit.clone(), of(state), of(state).power(1, -1), Unit::one()),
+        Port::Actuator { input } => (Some(of(input)), of(input), of(input).power(1, -1), of(input)),
+        Port::Sensor { output } => (Some(of(output)), of(output), of(output).power(1, -1), of(output)),
+    };
+    let output = output.unwrap_or_else(Unit::one);
+    let powers = [
+        (&output, dimension.output),
+        (&position, dimension.position),
+        (&speed, dimension.speed),
+        (&value, dimension.value),
+        (&Unit::known("s"), dimension.time),
+    ];
+    Unit::product(&powers.map(|(unit, power)| (unit, power.into())))
+}
+
+impl Model for WithEffects {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        if (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
+            return self.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response));
+        }
+        self.model.analyse(&Job { parameters: &job.parameters[..self.own()], ..*job })
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        let neutral = |i: usize| {
+            let first = self.places[i].strengths;
+            !self.acts(i, job.parameters) && seeds.iter().all(|seed| seed[first] == 0.0)
+        };
+        if seeds.is_empty() || (0..self.placements.len()).all(neutral) {
+            let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
+            return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
+        }
+        Some(kernel::tangents_of(|parameters| self.simulate(job, parameters), job.parameters, seeds))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! What sensors remember, and by how much they come late: brought in when the simulation is over, as nothing depends on it.
+
+use mops_core::{At, Opening, Trace};
+
+use super::Site;
+use super::dynamics::Driven;
+use crate::kernel::Recording;
+
+impl<S: Opening> Driven<'_, S> {
+    /// The recording with what sensors with a delay or a memory make of it.
+    pub(super) fn remembered(&mut self, mut recording: Recording, signals: &[(usize, String)]) -> Recording {
+        for actor in &mut self.actors {
+            let Site::Sensor { signal } = actor.place.site else { continue };
+            let Some(index) = signals.iter().position(|(s, _)| *s == signal) else { continue };
+            if let Some(delay) = actor.acting.delay() {
+                let time = delay.value();
+                let rate = recording.response.traces[index].1.derivative().delayed(time);
+                let value = &mut recording.response.traces[index].1;
+                *value = value.delayed(time);
+                for (tangent, &late) in recording.tangents.iter_mut().zip(delay.tangents()) {
+                    let trace = &mut tangent.traces[index].1;
+                    *trace = trace.delayed(time).moved(&rate, -late);
+                }
+            }
+            if !actor.memory.is_empty() {
+                let knots = recording.response.traces[index].1.knots().to_vec();
+                let before: Vec<Trace> = std::iter::once(&recording.response)
+                    .chain(&recording.tangents)
+                    .map(|response| response.traces[index].1.clone())
+                    .collect();
+                let mut after = vec![Trace::starting_at(knots[0], knots.len()); before.len()];
+                for ends in knots.windows(2) {
+                    let mut nodes = vec![[0.0; 5]; before.len()];
+                    for (node, s) in Trace::NODES.into_iter().enumerate() {
+                        // Just within the segment: at its ends the trace may jump.
+                        let t = ends[0] + (ends[1] - ends[0]) * s.clamp(1e-9, 1.0 - 1e-9);
+                        let mut value = S::from(before[0].at(t));
+                        (0..S::DIRECTIONS).for_each(|d| value.set_tangent(d, before[1 + d].at(t)));
+                        let zero = S::from(0.0);
+                        let at = At {
+                            t,
+                            value,
+                            q: value,
+                            v: zero,
+                            a: zero,
+                            mobility: zero,
+                            other: zero,
+                            other_speed: zero,
+                            u: &[],
+                        };
+                        actor.acting.remember(&at, &mut actor.memory);
+                        let measured = actor.acting.recall(&at, &actor.memory);
+                        nodes[0][node] = measured.value();
+                        (0..S::DIRECTIONS).for_each(|d| nodes[1 + d][node] = measured.tangents()[d]);
+                    }
+                    after.iter_mut().zip(nodes).for_each(|(trace, nodes)| trace.push(ends[1], nodes));
+                }
+                let responses = std::iter::once(&mut recording.response).chain(&mut recording.tangents);
+                responses.zip(after).for_each(|(response, trace)| response.traces[index].1 = trace);
+            }
+        }
+        recording
+    }
+}
