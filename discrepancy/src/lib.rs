@@ -2,10 +2,17 @@
 //! physical effect that the model lacks, and reports the error before and after.
 
 mod base;
+mod candidate;
+pub mod dev;
 mod diagnosis;
 mod fit;
 mod hygiene;
+mod screen;
+mod search;
 mod subject;
+mod trace_of;
+mod trajectory;
+mod variant;
 mod windows;
 
 pub use diagnosis::{
