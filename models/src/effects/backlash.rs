@@ -23,7 +23,7 @@ impl Definition for Backlash {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =
         &[Strength::positive("gap", "width of the gap", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.15, 0.4]))];
-    const MEMORY: usize = 2;
+    const MEMORY: usize = 1;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { gap: s[0] })
@@ -36,9 +36,8 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
     }
 
     fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
-        let first = memory[1].value() == 0.0;
+        let first = memory[0].value().is_nan();
         memory[0] = if first { at.value } else { self.recall(at, memory) };
-        memory[1] = S::from(1.0);
     }
 
     fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {

@@ -21,7 +21,7 @@ impl Definition for CrossTalk {
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const COMPANION: Option<PortKind> = Some(PortKind::Sensor);
     const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("k", "share of the other signal", Dimension::OUTPUT.over(Dimension::VALUE))];
+        &[Strength::signed("k", "share of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { k: s[0] })

@@ -25,7 +25,7 @@ impl Definition for InputRateLimit {
         &[Strength::positive("rate", "largest rate", Dimension::VALUE.over(Dimension::TIME))
             .neutral_at(f64::INFINITY)
             .tried(Trials::Scaled(&[0.3, 1.0, 3.0, 10.0]))];
-    const MEMORY: usize = 3;
+    const MEMORY: usize = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { rate: s[0] })
@@ -38,10 +38,9 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
     }
 
     fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
-        let first = memory[2].value() == 0.0;
+        let first = memory[0].value().is_nan();
         memory[0] = if first { at.value } else { self.recall(at, memory) };
         memory[1] = S::from(at.t);
-        memory[2] = S::from(1.0);
     }
 
     fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {

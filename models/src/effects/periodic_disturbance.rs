@@ -34,6 +34,10 @@ impl Definition for PeriodicDisturbance {
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn longest_step(&self) -> f64 {
+        std::f64::consts::TAU / (16.0 * self.w.value().abs())
+    }
+
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
         self.a * (self.w * at.t + self.phase).sin()
     }

@@ -42,6 +42,10 @@ impl Definition for WindGust {
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn breaks(&self) -> Vec<f64> {
+        vec![self.from.value(), self.from.value() + self.length.value()]
+    }
+
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
         let since = -self.from + at.t;
         if since.value() <= 0.0 || since.value() >= self.length.value() {

@@ -435,6 +435,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+        // What is remembered is moved up to the break, and across it.
+        if self.started {
+            self.remember(t, x);
+        }
         self.pass(t, x);
         self.remember(t, x);
         let (mut u, mut w) = (Vec::new(), Vec::new());

@@ -85,7 +85,7 @@ impl WithEffects {
             for strength in effect.strengths() {
                 let variable = Variable {
                     name: format!("{name}.{}", strength.name),
-                    unit: unit(strength.dimension, port, of),
+                    unit: unit(strength.dimension, port, placement.companion.as_ref(), of),
                     about: strength.about.to_owned(),
                 };
                 let default = strength.neutral;
@@ -180,16 +180,26 @@ impl Site {
 }
 
 /// The unit of a strength at a port, where the model tells it.
-fn unit(dimension: Dimension, port: &Port, interface: &Interface) -> Unit {
+fn unit(dimension: Dimension, port: &Port, companion: Option<&Port>, interface: &Interface) -> Unit {
     let of = |name: &str| {
         let all = interface.signals.iter().chain(&interface.inputs);
         all.into_iter().find(|v| v.name == name).map_or_else(Unit::one, |v| v.unit.clone())
     };
-    let (output, position, speed, value) = match port {
-        Port::Joint { position, velocity, unit, .. } => (unit.clone(), of(position), of(velocity), Unit::one()),
-        Port::Process { state, unit, .. } => (unit.clone(), of(state), of(state).power(1, -1), Unit::one()),
-        Port::Actuator { input } => (Some(of(input)), of(input), of(input).power(1, -1), of(input)),
-        Port::Sensor { output } => (Some(of(output)), of(output), of(output).power(1, -1), of(output)),
+    let position_and_speed = |port: &Port| match port {
+        Port::Joint { position, velocity, .. } => (of(position), of(velocity)),
+        Port::Process { state: name, .. } | Port::Actuator { input: name } | Port::Sensor { output: name } => {
+            (of(name), of(name).power(1, -1))
+        }
+    };
+    let (output, place) = match port {
+        Port::Joint { unit, .. } | Port::Process { unit, .. } => (unit.clone(), port),
+        Port::Actuator { input: name } | Port::Sensor { output: name } => (Some(of(name)), companion.unwrap_or(port)),
+    };
+    let (position, speed) = position_and_speed(place);
+    let value = match (port, companion) {
+        (Port::Joint { .. } | Port::Process { .. }, None) => Unit::one(),
+        (Port::Joint { .. } | Port::Process { .. }, Some(companion)) => position_and_speed(companion).0,
+        _ => position_and_speed(port).0,
     };
     let output = output.unwrap_or_else(Unit::one);
     let powers = [
