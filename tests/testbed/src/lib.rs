@@ -4,6 +4,7 @@
 //! A [`Trial`] is a study file, its data files and the truth. [`generate`] makes one from a plant, what is missing in its
 //! base model, a size and a seed; the same four give the same bits.
 
+mod bench;
 mod draw;
 mod effects;
 mod excitation;
@@ -11,9 +12,11 @@ mod fit;
 mod generate;
 mod law;
 mod outside;
+mod places;
 mod plant;
 mod plants;
 mod simulate;
+mod span;
 mod strength;
 mod study;
 mod trial;
@@ -26,5 +29,5 @@ pub use law::{At, Dry, Installed, Law, Spot};
 pub use outside::outside;
 pub use plant::{Output, Parameter, Place, Plant, Setup};
 pub use plants::plants;
-pub use simulate::{base_outputs, outputs};
+pub use simulate::{base_outputs, base_states, outputs};
 pub use trial::{Trial, TrueEffect, Truth};

@@ -1,66 +1,9 @@
-//! The integrator: classical Runge-Kutta of order 4 with fixed steps, and dry friction with exact rest.
-//!
-//! A joint with dry friction slides one way, slides the other way or rests. While it slides the direction in the formula
-//! is that of the mode, so that a step is smooth; where a step passes zero speed, the crossing is located (regula falsi on
-//! the length of the step), the speed set to exactly 0, and the joint rests if the force that holds it is within the
-//! breakaway level, else it slides on. While it rests, the force that keeps its acceleration at 0 is solved for, and it
-//! breaks away at the end of the step in which that force leaves the level. Inputs are held; delayed inputs end steps.
+//! A plant with effects as it runs through an experiment.
 
+use super::friction::Mode;
+use super::{FEW, MANY, SIZE, STEPS, State};
 use crate::law::{At, Installed, Spot};
 use crate::plant::{Place, Plant, Setup};
-
-/// Steps per sample of a plant with effects.
-pub const STEPS: usize = 20;
-/// Largest number of states, of the plant and of its effects.
-const SIZE: usize = 16;
-/// Largest number of places, inputs, outputs.
-const FEW: usize = 4;
-/// Largest number of parameters.
-const MANY: usize = 8;
-
-type State = [f64; SIZE];
-
-/// Clean outputs of the base model, by output and sample; `None` where it diverges. `steps` per sample.
-pub fn base_outputs(plant: &Plant, p: &[f64], start: &[f64], setup: &Setup, steps: usize) -> Option<Vec<Vec<f64>>> {
-    let outputs: Vec<usize> = plant.outputs.iter().map(|output| output.state).collect();
-    base_states(plant, p, start, setup, (steps, &outputs))
-}
-
-/// The same for some states; `None` where it diverges.
-pub fn base_states(
-    plant: &Plant,
-    p: &[f64],
-    start: &[f64],
-    setup: &Setup,
-    (steps, states): (usize, &[usize]),
-) -> Option<Vec<Vec<f64>>> {
-    let n = plant.states.len();
-    let h = setup.dt / steps as f64;
-    let w = [0.0; FEW];
-    let mut x = [0.0; SIZE];
-    x[..n].copy_from_slice(start);
-    let mut out: Vec<Vec<f64>> = states.iter().map(|_| Vec::with_capacity(setup.samples)).collect();
-    let mut u = [0.0; FEW];
-    let inputs = plant.inputs.len();
-    for k in 0..setup.samples {
-        for (y, &state) in out.iter_mut().zip(states) {
-            y.push(x[state]);
-        }
-        if k + 1 == setup.samples {
-            break;
-        }
-        for i in 0..inputs {
-            u[i] = setup.inputs[i][k];
-        }
-        for _ in 0..steps {
-            x = runge_kutta(&x, n, h, |_, x, dx| (plant.rates)(&x[..n], &u, p, &w, dx));
-        }
-        if !x[..n].iter().all(|v| v.abs() < 1e9) {
-            return None;
-        }
-    }
-    Some(out)
-}
 
 /// Clean outputs of the plant with effects, by output and sample; `None` where it diverges.
 pub fn outputs(
@@ -73,51 +16,20 @@ pub fn outputs(
     World::new(plant, p, setup, experiment, effects).run()
 }
 
-/// One step of the classical method of order 4 over `n` states; `rates(fraction, x, dx)`.
-fn runge_kutta(x: &State, n: usize, h: f64, rates: impl Fn(f64, &State, &mut [f64])) -> State {
-    let (mut k1, mut k2, mut k3, mut k4) = ([0.0; SIZE], [0.0; SIZE], [0.0; SIZE], [0.0; SIZE]);
-    let ahead = |k: &State, c: f64| {
-        let mut y = *x;
-        for i in 0..n {
-            y[i] += c * h * k[i];
-        }
-        y
-    };
-    rates(0.0, x, &mut k1);
-    rates(0.5, &ahead(&k1, 0.5), &mut k2);
-    rates(0.5, &ahead(&k2, 0.5), &mut k3);
-    rates(1.0, &ahead(&k3, 1.0), &mut k4);
-    let mut y = *x;
-    for i in 0..n {
-        y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-    }
-    y
-}
-
-/// What a joint with dry friction does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Mode {
-    /// No dry friction here.
-    Free,
-    /// It slides in this direction, 1 or -1.
-    Slides(f64),
-    /// It rests.
-    Rests,
-}
-
-struct World<'a> {
-    plant: &'a Plant,
+/// What runs.
+pub(super) struct World<'a> {
+    pub(super) plant: &'a Plant,
     p: &'a [f64],
     setup: &'a Setup,
     experiment: usize,
-    effects: &'a [Installed],
+    pub(super) effects: &'a [Installed],
     /// Where each effect's own states begin.
     own: Vec<usize>,
     /// States of plant and effects.
-    n: usize,
+    pub(super) n: usize,
     /// Commands that act now, delays included.
     u: [f64; FEW],
-    modes: [Mode; FEW],
+    pub(super) modes: [Mode; FEW],
 }
 
 impl<'a> World<'a> {
@@ -180,6 +92,7 @@ impl<'a> World<'a> {
                 let length = cut[1] - cut[0];
                 self.commands(t + 0.5 * (cut[0] + cut[1]));
                 self.settle(t + cut[0], &mut x);
+                self.break_away(t + cut[0], &x);
                 let steps = (length / setup.dt * STEPS as f64).ceil();
                 for i in 0..steps as usize {
                     let at = t + cut[0] + length * i as f64 / steps;
@@ -205,7 +118,7 @@ impl<'a> World<'a> {
         }
     }
 
-    fn at<'s>(&'s self, effect: usize, t: f64, x: &'s State) -> At<'s> {
+    pub(super) fn at<'s>(&'s self, effect: usize, t: f64, x: &'s State) -> At<'s> {
         let plant = self.plant;
         let (q, v) = match self.effects[effect].spot {
             Spot::Place(j) => match plant.places[j] {
@@ -222,7 +135,7 @@ impl<'a> World<'a> {
         At { t, experiment: self.experiment, q, v, x: &x[..plant.states.len()], u: &self.u, z }
     }
 
-    fn settle(&self, t: f64, x: &mut State) {
+    pub(super) fn settle(&self, t: f64, x: &mut State) {
         for (i, effect) in self.effects.iter().enumerate() {
             if let Some(settle) = &effect.law.settle {
                 let before = *x;
@@ -247,7 +160,7 @@ impl<'a> World<'a> {
     }
 
     /// Derivatives; the forces that hold resting joints are left in `held`.
-    fn rates(&self, t: f64, x: &State, dx: &mut [f64], held: &mut [f64; FEW]) {
+    pub(super) fn rates(&self, t: f64, x: &State, dx: &mut [f64], held: &mut [f64; FEW]) {
         let (n, m) = (self.plant.states.len(), self.plant.places.len());
         let (mut u, mut w, mut p) = (self.u, [0.0; FEW], [0.0; MANY]);
         p[..self.p.len()].copy_from_slice(self.p);
@@ -298,110 +211,6 @@ impl<'a> World<'a> {
         for j in (0..m).filter(|&j| resting(j)) {
             dx[self.plant.places[j].equation()] = 0.0;
         }
-    }
-
-    /// The levels at a joint for a direction, of all effects there.
-    fn hold(&self, j: usize, t: f64, x: &State, way: f64) -> f64 {
-        let here = self.effects.iter().enumerate().filter(|(_, e)| e.spot == Spot::Place(j));
-        here.filter_map(|(i, e)| e.law.dry.as_ref().map(|dry| dry(&self.at(i, t, x), way).hold)).sum()
-    }
-
-    /// Modes at the start.
-    fn begin(&mut self, t: f64, x: &State) {
-        for j in 0..self.plant.places.len() {
-            let speed = x[self.plant.places[j].equation()];
-            if self.modes[j] != Mode::Free && speed != 0.0 {
-                self.modes[j] = Mode::Slides(speed.signum());
-            }
-        }
-        self.break_away(t, x);
-    }
-
-    /// Lets joints go that rest under more than the level.
-    fn break_away(&mut self, t: f64, x: &State) {
-        for j in 0..self.plant.places.len() {
-            if self.modes[j] == Mode::Rests {
-                let (mut dx, mut held) = ([0.0; SIZE], [0.0; FEW]);
-                self.rates(t, x, &mut dx, &mut held);
-                let way = -held[j].signum();
-                if held[j].abs() > self.hold(j, t, x, way) {
-                    self.modes[j] = Mode::Slides(way);
-                }
-            }
-        }
-    }
-
-    fn step(&self, t: f64, x: &State, h: f64) -> State {
-        runge_kutta(x, self.n, h, |c, x, dx| self.rates(t + c * h, x, dx, &mut [0.0; FEW]))
-    }
-
-    /// Advances by `h`, through what joints with dry friction do.
-    fn advance(&mut self, t: f64, x: State, h: f64) -> State {
-        let (mut x, mut t, mut left) = (x, t, h);
-        for _ in 0..12 {
-            let y = self.step(t, &x, left);
-            let turned = (0..self.plant.places.len()).filter_map(|j| match self.modes[j] {
-                Mode::Slides(way) if way * y[self.plant.places[j].equation()] < 0.0 => {
-                    Some((j, self.crossing(j, t, &x, left, &y)))
-                }
-                _ => None,
-            });
-            let first = turned.min_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((j, length)) = first else {
-                x = y;
-                t += left;
-                break;
-            };
-            if length > 0.0 {
-                x = self.step(t, &x, length);
-                x[self.plant.places[j].equation()] = 0.0;
-            }
-            self.modes[j] = Mode::Rests;
-            if length <= 0.0 {
-                continue; // It would turn back at once: it rests to the end of this step.
-            }
-            t += length;
-            left -= length;
-            self.break_away(t, &x);
-            if left <= 1e-9 * h {
-                break;
-            }
-        }
-        self.break_away(t, &x);
-        self.settle(t, &mut x);
-        x
-    }
-
-    /// Length of the step at whose end the speed of joint `j` is 0.
-    fn crossing(&self, j: usize, t: f64, x: &State, h: f64, end: &State) -> f64 {
-        let equation = self.plant.places[j].equation();
-        let (mut low, mut high) = ((0.0, x[equation]), (h, end[equation]));
-        if low.1 == 0.0 {
-            return 0.0;
-        }
-        let mut last = 0;
-        for _ in 0..30 {
-            let middle = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let speed = self.step(t, x, middle)[equation];
-            if speed.abs() < 1e-12 * (low.1.abs() + high.1.abs()) || high.0 - low.0 < 1e-12 * h {
-                return middle;
-            }
-            // Illinois: the end that stays twice counts half.
-            if speed * low.1 > 0.0 {
-                low = (middle, speed);
-                if last == 1 {
-                    high.1 *= 0.5;
-                }
-                last = 1;
-            } else {
-                high = (middle, speed);
-                if last == -1 {
-                    low.1 *= 0.5;
-                }
-                last = -1;
-            }
-        }
-        high.0
     }
 }
 
