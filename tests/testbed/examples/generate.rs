@@ -1,5 +1,5 @@
-//! Writes cases into a folder: `generate FOLDER [COUNT] [SEED]` draws a mix; `generate FOLDER all SEED` tries every effect
-//! in every plant at every size.
+//! Writes cases into a folder: `generate FOLDER [COUNT] [SEED]` draws a mix; `generate FOLDER all SEED` writes nothing, and
+//! shows which sizes every effect reaches in every plant.
 
 use std::path::Path;
 use std::time::Instant;
@@ -31,8 +31,8 @@ fn mix(folder: &Path, count: usize, seed: u64) -> std::io::Result<()> {
         let names = [effects[draw.below(effects.len())].name, effects[draw.below(effects.len())].name];
         let missing = match draw.below(10) {
             0 => Missing::Nothing,
-            1 => Missing::Outside(outside[draw.below(outside.len())].name),
-            2 => Missing::Effects(&names),
+            1 | 2 => Missing::Outside(outside[draw.below(outside.len())].name),
+            3 => Missing::Effects(&names),
             _ => Missing::Effects(&names[..1]),
         };
         tried += 1;

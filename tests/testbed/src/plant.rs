@@ -2,6 +2,9 @@
 
 use crate::draw::Draw;
 
+/// `rates(x, u, p, w, dx)` writes the derivatives of the states.
+pub type Rates = fn(&[f64], &[f64], &[f64], &[f64], &mut [f64]);
+
 /// A plant: `E(x) x' = f(x, u; p) + w` with a term `w` at each place, 0 in the base model.
 #[derive(Debug)]
 pub struct Plant {
@@ -21,8 +24,8 @@ pub struct Plant {
     pub constants: &'static [(&'static str, f64, &'static str)],
     /// The equations, as lines of the study file.
     pub equations: &'static str,
-    /// `rates(x, u, p, w, dx)`: derivatives of the states.
-    pub rates: fn(&[f64], &[f64], &[f64], &[f64], &mut [f64]),
+    /// Derivatives of the states.
+    pub rates: Rates,
     /// Draws experiment 0 (calibration), 1 or 2 (selection).
     pub setup: fn(&mut Draw, usize) -> Setup,
     /// What else effects must know.

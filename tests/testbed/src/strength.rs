@@ -14,7 +14,8 @@ pub fn find(
 ) -> Option<f64> {
     let excess = |value: f64| (value * value - floor * floor).max(1e-6 * floor * floor).sqrt();
     let wanted = excess(size).ln();
-    let (mut below, mut above): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+    let mut below: Option<(f64, f64)> = None;
+    let mut above: Option<(f64, f64)> = None;
     let mut e = start.clamp(low, high);
     for _ in 0..24 {
         let value = error(e);

@@ -32,7 +32,7 @@ fn the_size_that_is_asked_for_is_met_to_five_percent() {
         ("pendulum", "cogging"),
         ("tanks", "leak"),
         ("room", "sensor-drift"),
-        ("ball", "quadratic-drag"),
+        ("ball", "wind-gust"),
     ] {
         for size in SIZES {
             let trial = first(plant, Missing::Effects(&[effect]), size);

@@ -30,17 +30,20 @@ pub struct Scene<'a> {
     draw: RefCell<Draw>,
 }
 
+/// An effect with all its numbers, and the names and values of its strengths.
+pub type Made = (Law, Vec<(&'static str, f64)>);
+
 /// An effect whose shape is drawn and whose strength is open.
 pub struct Family {
     /// Smallest and largest strength that make sense.
     pub bounds: (f64, f64),
     /// The effect at a strength, with the names and values of its strengths.
-    pub make: Box<dyn Fn(f64) -> (Law, Vec<(&'static str, f64)>)>,
+    pub make: Box<dyn Fn(f64) -> Made>,
 }
 
 impl Family {
     /// Strengths up to a largest one.
-    pub fn up_to(high: f64, make: impl Fn(f64) -> (Law, Vec<(&'static str, f64)>) + 'static) -> Option<Self> {
+    pub fn up_to(high: f64, make: impl Fn(f64) -> Made + 'static) -> Option<Self> {
         let sensible = high.is_finite() && high > 0.0;
         sensible.then(|| Self { bounds: (high * 1e-6, high), make: Box::new(make) })
     }
