@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use mops_testbed::{Draw, Missing, SIZES, effects, generate, outside, plants};
+use mops_testbed::{Draw, Effect, Missing, SIZES, effects, generate, outside, plants};
 
 fn main() -> std::io::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -22,21 +22,23 @@ fn main() -> std::io::Result<()> {
 /// What a mix asks for, one after the other.
 fn mix(folder: &Path, count: usize, seed: u64) -> std::io::Result<()> {
     let mut draw = Draw::new(seed, "mix");
-    let (plants, effects, outside) = (plants(), effects(), outside());
-    let mut written = 0;
-    let mut tried = 0;
+    let (mut written, mut tried) = (0, 0);
     while written < count {
-        let plant = plants[written % plants.len()].name;
+        let plant = plants()[written % plants().len()];
+        let fitting = |all: Vec<&'static Effect>| -> Vec<&str> {
+            all.into_iter().filter(|effect| !(effect.fits)(plant).is_empty()).map(|effect| effect.name).collect()
+        };
+        let (effects, outside) = (fitting(effects()), fitting(outside()));
         let size = SIZES[draw.below(SIZES.len())];
-        let names = [effects[draw.below(effects.len())].name, effects[draw.below(effects.len())].name];
+        let names = [effects[draw.below(effects.len())], effects[draw.below(effects.len())]];
         let missing = match draw.below(10) {
             0 => Missing::Nothing,
-            1 | 2 => Missing::Outside(outside[draw.below(outside.len())].name),
-            3 => Missing::Effects(&names),
+            1 => Missing::Outside(outside[draw.below(outside.len())]),
+            2 | 3 => Missing::Effects(&names),
             _ => Missing::Effects(&names[..1]),
         };
         tried += 1;
-        if let Some(trial) = generate(plant, missing, size, seed * 1_000_000 + tried) {
+        if let Some(trial) = generate(plant.name, missing, size, seed * 1_000_000 + tried) {
             trial.write(&folder.join(&trial.name))?;
             println!("{:60} reached {:.3}", trial.name, trial.truth.size);
             written += 1;

@@ -66,8 +66,8 @@ fn stiction_holds_up_to_its_level_and_lets_go_to_the_lower_one() {
 #[test]
 fn a_spring_with_dry_friction_loses_the_same_amplitude_in_every_half_swing() {
     // m x'' = -k x - c sgn v: each half swing ends 2 c/k nearer; it ends within the band where c holds k x.
-    let (m, k, c, start) = (1.0, 100.0, 0.5, 0.0473);
-    let half = std::f64::consts::PI * (m / k as f64).sqrt();
+    let (m, k, c, start) = (1.0, 100.0_f64, 0.5, 0.0473);
+    let half = std::f64::consts::PI * (m / k).sqrt();
     let x =
         run(plant("spring"), &[m, 0.0, k], &setup(half / 50.0, 401, &[start, 0.0], |_| 0.0), dry(c, c), Spot::Place(0));
     let turns = [start, -(start - 2.0 * c / k), start - 4.0 * c / k, -(start - 6.0 * c / k), start - 8.0 * c / k];
