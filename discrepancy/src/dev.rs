@@ -22,7 +22,7 @@ pub fn dev(study: &Study, effects: &[Arc<dyn Effect>]) {
     let s = Search {
         subject: &subject,
         effects,
-        limits: Limits { effects: 3, refits: 10, least_gain: 25.0 },
+        limits: Limits { effects: 3, refits: 10, finalists: 5, least_gain: 25.0 },
         simulations: &sims,
     };
     let Some(mut current) = s.declared(&cal) else {

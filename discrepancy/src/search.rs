@@ -32,6 +32,8 @@ pub struct Limits {
     pub effects: usize,
     /// Candidates that are fitted in each round.
     pub refits: usize,
+    /// Those of them that are fitted to the end.
+    pub finalists: usize,
     /// Fall of the sum of squares, per the dispersion of the residuals, below which nothing is added.
     pub least_gain: f64,
 }
@@ -88,26 +90,21 @@ impl<'a> Search<'a> {
                 locals.clone_from(&fitted.point.locals[0]);
             }
         }
-        self.trial(&[], tuners, locals, &[])
+        self.trial(&[], tuners, locals, &[], 40)
     }
 
     /// Fits a variant to all data that may choose.
-    pub fn trial(&self, added: &[Added], tuners: &[f64], locals: Vec<Vec<f64>>, held: &[usize]) -> Option<Trial<'a>> {
+    pub fn trial(
+        &self,
+        added: &[Added],
+        tuners: &[f64],
+        locals: Vec<Vec<f64>>,
+        held: &[usize],
+        iterations: usize,
+    ) -> Option<Trial<'a>> {
         let (fit, point, variant) = problem(self.subject, added, self.pieces(), tuners, locals, held, self.simulations);
-        let fitted = fit.solve(point, 40)?;
-        let mut added = added.to_vec();
-        for (index, a) in added.iter_mut().enumerate() {
-            let count = a.candidate.effect.strengths().len();
-            let piece = a.candidate.only.and_then(|only| fit.pieces.iter().position(|p| p.measurement == only));
-            a.strengths = variant.strengths(&fit, &fitted.point, index, count, piece.unwrap_or(0));
-            for own in &mut a.own {
-                let piece = fit.pieces.iter().position(|p| p.measurement == own.0);
-                if let Some(piece) = piece {
-                    own.2 = variant.strengths(&fit, &fitted.point, index, count, piece)[own.1];
-                }
-            }
-        }
-        Some(Trial { added, fit, variant, fitted })
+        let fitted = fit.solve(point, iterations)?;
+        Some(Trial { added: added.to_vec(), fit, variant, fitted }.read())
     }
 
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
@@ -125,24 +122,35 @@ impl<'a> Search<'a> {
                 chosen.push(i);
             }
         }
-        let mut trials: Vec<Trial<'a>> = chosen
+        let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|i| {
                 let added: Vec<Added> = from.added.iter().cloned().chain([screened[i].added.clone()]).collect();
-                self.from(from, &added)
+                self.from(from, &added, 4)
             })
+            .collect();
+        // Those that lead after a few steps go on to the end.
+        let mut order: Vec<usize> = (0..started.len()).collect();
+        order.sort_by(|&a, &b| started[a].score().total_cmp(&started[b].score()));
+        let leading = &order[..order.len().min(self.limits.finalists)];
+        let mut trials: Vec<Trial<'a>> = started
+            .into_iter()
+            .enumerate()
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
             .collect();
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
         Some(Round { screened, trials })
     }
 
     /// Fits a variant from where another ended.
-    pub fn from(&self, from: &Trial<'a>, added: &[Added]) -> Option<Trial<'a>> {
+    pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
         let own = |piece: &Piece| self.subject.measurements[piece.measurement].locals.len();
         let locals = from.fit.pieces.iter().zip(&from.fitted.point.locals);
         let locals = locals.map(|(piece, values)| values[..own(piece)].to_vec()).collect();
-        self.trial(added, tuners, locals, &[])
+        self.trial(added, tuners, locals, &[], iterations)
     }
 
     fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
@@ -171,7 +179,30 @@ fn still() -> mops_core::At<'static, f64> {
     mops_core::At { t: 0.0, value: 0.0, q: 0.0, v: 1.0, a: 0.0, mobility: 1.0, other: 0.0, other_speed: 0.0, u: &[] }
 }
 
-impl Trial<'_> {
+impl<'a> Trial<'a> {
+    /// Takes the strengths from the solution.
+    fn read(mut self) -> Self {
+        for (index, a) in self.added.iter_mut().enumerate() {
+            let count = a.candidate.effect.strengths().len();
+            let in_piece = |m: usize| self.fit.pieces.iter().position(|p| p.measurement == m);
+            let (variant, fit, point) = (&self.variant, &self.fit, &self.fitted.point);
+            let piece = a.candidate.only.and_then(in_piece).unwrap_or(0);
+            a.strengths = variant.strengths(fit, point, index, count, piece);
+            for own in &mut a.own {
+                if let Some(piece) = in_piece(own.0) {
+                    own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
+                }
+            }
+        }
+        self
+    }
+
+    /// Fitted to the end.
+    fn continued(self, _: &Search<'a>) -> Option<Self> {
+        let fitted = self.fit.solve(self.fitted.point.clone(), 40)?;
+        Some(Self { fitted, ..self }.read())
+    }
+
     /// Number of unknowns that its effects bring in.
     pub fn unknowns(&self) -> usize {
         let shared = self.fitted.point.globals.len() - self.fit.subject.globals.len();

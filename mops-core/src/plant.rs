@@ -28,6 +28,11 @@ pub trait Plant<S: Scalar> {
     /// The value of a signal, by its index in the interface.
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S;
 
+    /// The state that a signal shows as it is, by index; `None` for a signal that is computed.
+    fn shows(&self, _signal: usize) -> Option<usize> {
+        None
+    }
+
     /// Number of its guards.
     fn guards(&self) -> usize {
         0

@@ -96,6 +96,10 @@ impl<S: Scalar> Plant<S> for Opened<'_, S> {
         held.running.signal(signal, at.t, &held.x)
     }
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        self.at.borrow().running.shows(signal)
+    }
+
     fn guards(&self) -> usize {
         self.at.borrow().running.guards()
     }

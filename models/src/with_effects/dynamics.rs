@@ -71,6 +71,7 @@ pub(super) struct Driven<'a, S> {
 struct Scratch<S> {
     u: Vec<S>,
     w: Vec<S>,
+    dx: Vec<S>,
 }
 
 impl<'a, S: Opening> Driven<'a, S> {
@@ -119,7 +120,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             breaks,
             longest_step: longest,
             started: false,
-            scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new() }),
+            scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
             further: Vec::new(),
         }
@@ -317,19 +318,27 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// The value of a signal as it is measured; what is remembered comes in later.
     pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
-        let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
-        let mut dx = vec![S::from(0.0); self.own];
-        // Outputs may contain rates: the forces count.
-        self.balance(t, x, u, w, &mut dx);
-        let mut value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        for actor in &self.actors {
-            if matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty() {
-                let at = self.at(actor, t, x, u, value);
-                value = actor.acting.value(&at, self.states(actor, x));
+        let here = |actor: &&Actor<S>| {
+            matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
+        };
+        let simple = |actor: &Actor<S>| actor.place.companion.is_none();
+        if let Some(state) = self.plant.shows(signal) {
+            if self.actors.iter().filter(here).all(simple) {
+                let see = |value: S, actor: &Actor<S>| {
+                    actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
+                };
+                return self.actors.iter().filter(here).fold(x[state], see);
             }
         }
-        value
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w, dx, .. } = &mut *scratch;
+        dx.resize(self.own, S::from(0.0));
+        // Outputs may contain rates: the forces count.
+        self.balance(t, x, u, w, dx);
+        let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
+        self.actors.iter().filter(here).fold(value, |value, actor| {
+            actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x))
+        })
     }
 
     /// Moves what actuators remember to the command of the moment.
@@ -379,7 +388,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn derivative(&self, t: f64, x: &Vec<S>, dx: &mut Vec<S>) {
         let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
+        let Scratch { u, w, .. } = &mut *scratch;
         let (own, further) = dx.split_at_mut(self.own);
         self.balance(t, x, u, w, own);
         for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
@@ -400,13 +409,13 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> S {
         let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
+        let Scratch { u, w, dx } = &mut *scratch;
         let own = self.plant.guards();
         if index >= own {
             return self.contact_guard(index - own, t, x, u, w);
         }
-        let mut dx = vec![S::from(0.0); self.own];
-        self.balance(t, x, u, w, &mut dx);
+        dx.resize(self.own, S::from(0.0));
+        self.balance(t, x, u, w, dx);
         self.plant.guard(index, &Instant { t, x: &x[..self.own], u, w })
     }
 
