@@ -59,6 +59,8 @@ pub(super) struct Driven<'a, S> {
     forces: usize,
     breaks: Vec<f64>,
     longest_step: f64,
+    /// What a clock shows at time 0, s.
+    begins: f64,
     started: bool,
     scratch: RefCell<Scratch<S>>,
     /// For each force the sign with which a positive one acts forward.
@@ -106,7 +108,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         let commands = commands.map(|(i, v)| Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i) });
         let commands: Vec<_> = commands.collect();
         let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
-        let mut breaks: Vec<f64> = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite()).collect();
+        let begins = job.case.begins;
+        let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
+        let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
         breaks.sort_by(f64::total_cmp);
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
@@ -119,6 +123,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
+            begins,
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
@@ -193,7 +198,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             None => (zero, zero),
         };
-        At { t, value, q, v, a: zero, mobility: zero, other, other_speed, u }
+        At { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u }
     }
 
     fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
