@@ -57,6 +57,7 @@ pub fn catalogue() -> Catalogue {
         models: mops_models::kinds(),
         criteria: mops_criteria::kinds(),
         solvers: mops_solvers::kinds(),
+        effects: mops_models::effects::effects(),
         studies: mops_studies::shipped(),
     }
 }

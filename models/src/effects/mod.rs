@@ -55,6 +55,7 @@ mod sensor_gap;
 mod sensor_lag;
 mod sensor_quantisation;
 mod sensor_saturation;
+mod spill_over;
 mod stiction;
 mod stribeck_friction;
 mod tabulated_friction;

@@ -81,6 +81,25 @@ fn an_edge_keeps_a_level_where_as_much_spills_as_comes_in() {
 }
 
 #[test]
+fn what_spills_runs_into_the_next_tank() {
+    let pair = r#"
+states     = { g = "m", h = "m" }
+inputs     = { u = "m^3/s" }
+parameters = { A = "m^2" }
+der        = { g = "A*g' = u", h = "A*h' = 0" }
+"#;
+    let model = with(pair, "spill-over", "process:g", Some("process:h"));
+    // As the tank above; of what has spilled, 0.5 t - A g, a quarter is in the second tank.
+    let times = [2.0, 5.0, 9.0];
+    let parameters = [2.0, 0.0, 0.0, 4.0, 1.0, 1.0, 0.25];
+    let upper = values(&model, &parameters, Input::Constant(0.5), "g", &times);
+    let lower = values(&model, &parameters, Input::Constant(0.5), "h", &times);
+    let expected: Vec<f64> = times.iter().zip(&upper).map(|(t, g)| 0.25 * (0.5 * t - 2.0 * g) / 2.0).collect();
+    close(&lower, &expected, 1e-9);
+    close(&upper[1..2], &[1.0 + 0.125 * (1.0 - (-2.0_f64).exp())], 1e-6);
+}
+
+#[test]
 fn a_loss_to_the_surroundings_decays_to_them() {
     let model = with(TANK, "linear-loss", "process:h", None);
     let times = [0.5, 2.0, 6.0];
