@@ -63,10 +63,11 @@ pub(super) struct Driven<'a, S> {
     scratch: RefCell<Scratch<S>>,
     /// For each force the sign with which a positive one acts forward.
     forward: Vec<f64>,
+    /// Forces from outside; none but where the equations are looked at.
+    further: Vec<S>,
 }
 
-/// Inputs, forces and rates of the moment.
-#[derive(Debug, Default)]
+/// Inputs and forces of the moment.
 struct Scratch<S> {
     u: Vec<S>,
     w: Vec<S>,
@@ -120,6 +121,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new() }),
             forward: vec![1.0; forces],
+            further: Vec::new(),
         }
     }
 
@@ -217,6 +219,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     /// Forces of the effects but those in proportion to the acceleration, and but friction that holds a joint.
     fn forces(&self, t: f64, x: &[S], u: &[S], w: &mut Vec<S>) {
         w.clear();
+        w.extend_from_slice(&self.further);
         w.resize(self.forces, S::from(0.0));
         for (index, actor) in self.actors.iter().enumerate() {
             let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = actor.place.site else { continue };
@@ -235,6 +238,42 @@ impl<'a, S: Opening> Driven<'a, S> {
                 w[k] -= against * (direction * self.forward[k]);
             }
         }
+    }
+
+    /// Number of states, those of the effects included.
+    pub(super) fn size(&self) -> usize {
+        self.actors.last().map_or(self.own, |actor| actor.z.0 + actor.z.1)
+    }
+
+    /// The inputs as they are commanded, delays included.
+    pub(super) fn commanded(&self, t: f64) -> Vec<S> {
+        self.commands.iter().map(|command| command.at(t)).collect()
+    }
+
+    /// Takes the contacts and memories of another simulation.
+    pub(super) fn take(&mut self, contacts: &Contacts, memories: &[Vec<f64>]) {
+        self.contacts = contacts.clone();
+        for (actor, memory) in self.actors.iter_mut().zip(memories) {
+            actor.memory = memory.iter().map(|&m| S::from(m)).collect();
+        }
+    }
+
+    /// Holds the commands.
+    pub(super) fn command(&mut self, drives: impl Iterator<Item = Drive<'a, S>>) {
+        self.commands = drives.map(|drive| Command { drive, delay: None }).collect();
+    }
+
+    /// Rates of all states and values of signals, with `further` forces at the ports.
+    pub(super) fn look(&mut self, t: f64, x: &[S], further: &[S], signals: &[usize]) -> (Vec<S>, Vec<S>) {
+        self.further = further.to_vec();
+        let x = x.to_vec();
+        let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); x.len()]);
+        self.balance(t, &x, &mut u, &mut w, &mut dx[..self.own]);
+        self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+        self.derivative(t, &x, &mut dx);
+        let outputs = signals.iter().map(|&signal| self.signal(signal, t, &x)).collect();
+        self.further.clear();
+        (dx, outputs)
     }
 
     /// The sign with which a force acts forward.

@@ -1,5 +1,6 @@
 //! A model with effects at its ports: itself a model, whose parameters are those of the model and the strengths.
 
+mod along;
 mod contacts;
 mod dynamics;
 mod sensors;
@@ -12,6 +13,7 @@ use mops_core::{
 };
 
 use crate::kernel::{self, Recording, record, wanted};
+pub use along::Moment;
 use dynamics::Driven;
 
 /// A model with effects.
