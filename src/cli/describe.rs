@@ -1,16 +1,16 @@
-//! `mops describe`: the manual page of a kind or of a shipped study.
+//! `mops describe`: the manual page of a kind, an effect or a shipped study.
 
 use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::{Catalogue, Diagnostic, suggestion};
 
-use super::{Trouble, print};
+use super::{Trouble, effect, print};
 
 /// What is described.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, a shipped study, a table of study files (study, models, tuners, cases,
+    /// A kind of model, criterion or solver, an effect, a shipped study, a table of study files (study, models, tuners, cases,
     /// experiments, criteria, solver), or a key of one, such as `step` or `hold`.
     name: String,
 }
@@ -27,6 +27,10 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
         print(&mops_core::file::describe(name, &schema()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {
+        print(&effect::page(effect.as_ref()));
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
@@ -47,6 +51,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let known: Vec<&str> = kinds
         .by_ref()
         .map(|(name, _)| name)
+        .chain(catalogue.effects.iter().map(|effect| effect.name()))
         .chain(catalogue.studies.iter().map(|s| s.name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();

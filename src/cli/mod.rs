@@ -3,6 +3,7 @@
 mod check;
 mod data;
 mod describe;
+mod effect;
 mod families;
 mod findings;
 mod linear_plots;
@@ -52,9 +53,9 @@ enum Command {
     Run(run::Arguments),
     /// Check a study and its data without running anything.
     Check(check::Arguments),
-    /// List the kinds of model, criterion and solver, and the shipped studies.
-    List,
-    /// Describe a kind, a shipped study, or a signal list of a model: formula, options, units, source.
+    /// List the kinds of model, criterion and solver, the effects a model may lack, and the shipped studies.
+    List(list::Arguments),
+    /// Describe a kind, an effect, a shipped study, or a signal list of a model: formula, options, units, source.
     Describe(describe::Arguments),
     /// Write a commented study to start from, or a copy of a shipped one.
     New(new::Arguments),
@@ -102,7 +103,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
-        Command::List => list::list(catalogue),
+        Command::List(arguments) => list::list(catalogue, &arguments),
         Command::Describe(arguments) => describe::describe(catalogue, &arguments),
         Command::New(arguments) => new::new(catalogue, &arguments),
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),

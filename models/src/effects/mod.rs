@@ -215,6 +215,7 @@ pub fn effects() -> Vec<Arc<dyn Effect>> {
         effect::<torque_ripple::TorqueRipple>(),
         effect::<eccentricity::Eccentricity>(),
         effect::<cross_talk::CrossTalk>(),
+        effect::<spill_over::SpillOver>(),
         effect::<sensor_gap::SensorGap>(),
         effect::<position_ripple::PositionRipple>(),
         effect::<load_dependent_friction::LoadDependentFriction>(),
