@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use mops_core::{Analysis, Case, Hold, Input, Job, Model, ModelOptions, Placement, Port};
+use mops_core::{Analysis, Case, Effect, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind, Strength};
 
 use super::effects;
 use crate::equations::EquationsOptions;
@@ -21,6 +21,13 @@ states     = { h = "m" }
 inputs     = { u = "m^3/s" }
 parameters = { A = "m^2" }
 der        = { h = "A*h' = u" }
+"#;
+
+const PAIR: &str = r#"
+states     = { g = "m", h = "m" }
+inputs     = { u = "m^3/s" }
+parameters = { A = "m^2" }
+der        = { g = "A*g' = u", h = "A*h' = 0" }
 "#;
 
 /// One effect at a place of a model.
@@ -82,13 +89,7 @@ fn an_edge_keeps_a_level_where_as_much_spills_as_comes_in() {
 
 #[test]
 fn what_spills_runs_into_the_next_tank() {
-    let pair = r#"
-states     = { g = "m", h = "m" }
-inputs     = { u = "m^3/s" }
-parameters = { A = "m^2" }
-der        = { g = "A*g' = u", h = "A*h' = 0" }
-"#;
-    let model = with(pair, "spill-over", "process:g", Some("process:h"));
+    let model = with(PAIR, "spill-over", "process:g", Some("process:h"));
     // As the tank above; of what has spilled, 0.5 t - A g, a quarter is in the second tank.
     let times = [2.0, 5.0, 9.0];
     let parameters = [2.0, 0.0, 0.0, 4.0, 1.0, 1.0, 0.25];
@@ -313,4 +314,169 @@ fn a_short_gust_is_not_stepped_over() {
     let model = with(BLOCK, "wind-gust", "joint:x", None);
     let found = values(&model, &[2.0, 0.0, 0.0, 40.0, 50.0, 0.01], NOTHING, "v", &[100.0]);
     close(&found, &[0.1], 1e-7);
+}
+
+#[test]
+fn what_stores_energy_gives_it_back() {
+    type Potential = fn(f64) -> f64;
+    let cases: [(&str, Vec<f64>, Potential); 8] = [
+        ("constant-force", vec![0.7], |q| -0.7 * q),
+        ("linear-stiffness", vec![3.0, 0.2], |q| 1.5 * (q - 0.2).powi(2)),
+        ("cubic-stiffness", vec![3.0, 0.2], |q| 0.75 * (q - 0.2).powi(4)),
+        ("quadratic-stiffness", vec![0.3], |q| 0.1 * q.powi(3)),
+        ("end-stop", vec![30.0, -0.3, 0.4], |q| 15.0 * ((q - 0.4).max(0.0).powi(2) + (-0.3 - q).max(0.0).powi(2))),
+        ("imbalance", vec![2.0, 0.3], |q| -2.0 * (q - 0.3).cos()),
+        ("cogging", vec![2.0, 6.0, 0.3], |q| (6.0 * q + 0.3).cos() / 3.0),
+        ("position-ripple", vec![2.0, 5.5, 0.3], |q| 2.0 * (5.5 * q + 0.3).cos() / 5.5),
+    ];
+    for (name, strengths, potential) in cases {
+        let model = with(BLOCK, name, "joint:x", None);
+        let parameters: Vec<f64> = [2.0, 0.1, 0.8].into_iter().chain(strengths).collect();
+        let times: Vec<f64> = (1..20).map(|k| f64::from(k) * 0.25).collect();
+        let [x, v] = ["x", "v"].map(|signal| values(&model, &parameters, NOTHING, signal, &times));
+        let energy: Vec<f64> = x.iter().zip(&v).map(|(x, v)| v * v + potential(*x)).collect();
+        let start = 0.8 * 0.8 + potential(0.1);
+        close(&energy, &vec![start; energy.len()], 1e-5);
+    }
+}
+
+#[test]
+fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
+    let cases: [(&str, &[f64], f64, f64); 18] = [
+        ("input-bias", &[0.3], 1.0, 1.3),
+        ("input-gain", &[-0.2], 2.0, 1.6),
+        ("input-saturation", &[1.5], -2.0, -1.5),
+        ("input-saturation", &[1.5], 1.2, 1.2),
+        ("input-dead-zone", &[0.5], -2.0, -1.5),
+        ("input-dead-zone", &[0.5], 0.4, 0.0),
+        ("input-asymmetry", &[0.25], 2.0, 2.5),
+        ("input-asymmetry", &[0.25], -2.0, -1.5),
+        ("quadratic-input", &[0.1], -2.0, -2.4),
+        ("input-quantisation", &[0.25], 0.9, 1.0),
+        ("sensor-bias", &[0.3], 1.0, 1.3),
+        ("sensor-gain", &[-0.2], 2.0, 1.6),
+        ("sensor-saturation", &[1.5], 2.0, 1.5),
+        ("sensor-quantisation", &[0.25], -0.9, -1.0),
+        ("sensor-dead-zone", &[0.5, 1.0], 2.0, 1.5),
+        ("sensor-dead-zone", &[0.5, 1.0], 1.3, 1.0),
+        ("sensor-gap", &[0.5, 1.0], 1.3, 1.0),
+        ("sensor-gap", &[0.5, 1.0], 1.6, 1.6),
+    ];
+    for (name, strengths, value, expected) in cases {
+        let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
+        let mut seen = [0.0; 11];
+        seen[0] = value;
+        let found = effect.act(strengths).value(&super::at(&seen), &[]);
+        assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");
+    }
+}
+
+/// A place of each sort on a block or in a tank, with what it needs beside it.
+fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
+    let mut all = Vec::new();
+    for effect in effects() {
+        for port in effect.ports() {
+            let process = *port == PortKind::Process;
+            let place = match port {
+                PortKind::Joint => "joint:x",
+                PortKind::Process => "process:g",
+                PortKind::Actuator => "actuator:u",
+                PortKind::Sensor => "sensor:x",
+            };
+            let companion = effect.companion().map(|kind| match kind {
+                PortKind::Joint => "joint:x",
+                PortKind::Process => "process:h",
+                PortKind::Actuator => "actuator:u",
+                PortKind::Sensor => "sensor:v",
+            });
+            let text = if process { PAIR } else { BLOCK };
+            all.push((with(text, effect.name(), place, companion), effect.name(), process));
+        }
+    }
+    all
+}
+
+/// Strengths at which the effects act within the range of the motion below.
+fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
+    let of = |s: &Strength| match s.name {
+        "limit" | "w" | "n" => 1.1,
+        "rest" | "centre" | "hole" | "around" | "phase" | "skew" => 0.15,
+        "low" => -0.4,
+        "high" | "level" | "sigma" => 0.6,
+        "zero" => 0.0,
+        "r1" | "r2" | "r3" | "top" => 1.2,
+        "rate" => 1.37,
+        "length" => 1.3,
+        "p" => 1.4,
+        _ => 0.3,
+    };
+    let mut all: Vec<f64> = effect.strengths().iter().map(of).collect();
+    if name == "bouc-wen" {
+        all[3] = 1.5;
+    }
+    all
+}
+
+#[test]
+fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
+    // A command in steps, of which none is a round number of any strength.
+    let times: Vec<f64> = (0..8).map(|k| f64::from(k) * 0.5).collect();
+    let levels = vec![1.3, 0.4, -1.7, 0.7, 1.9, -0.9, -1.4, 0.8];
+    for (model, name, process) in everywhere() {
+        let values = if process { levels.iter().map(|u| u + 1.8).collect() } else { levels.clone() };
+        let input = Input::Sampled { times: times.clone(), values, hold: Hold::Zero };
+        let effect = Arc::clone(&model.placements()[0].effect);
+        let mut parameters = if process { vec![2.0, 0.7, 0.8] } else { vec![2.0, 0.1, 0.6] };
+        let first = parameters.len();
+        parameters.extend(acting(name, effect.as_ref()));
+        let count = parameters.len();
+        parameters.resize(model.interface().parameters.len(), 0.05);
+        let case = Case { inputs: vec![("u".to_owned(), input.clone())], ..Case::default() };
+        let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
+        let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: 3.7 };
+        let plain = analysis(&model, &parameters, input.clone(), 3.7);
+        // Rounding has no slope where it does not jump.
+        let shaped = |k: &usize| !name.ends_with("quantisation") && !effect.strengths()[*k].fixed;
+        let moved: Vec<usize> = (0..count - first).filter(shaped).map(|k| first + k).collect();
+        let seed = |i: &usize| (0..parameters.len()).map(|j| f64::from(u8::from(*i == j))).collect();
+        let seeds: Vec<Vec<f64>> = moved.iter().map(seed).collect();
+        let (value, tangents) = model.tangents(&job, &seeds).expect("it has them").expect("it simulates");
+        let names: Vec<String> = model.interface().signals.iter().map(|s| s.name.clone()).collect();
+        for signal in &names {
+            let same = value.trace(signal).last().to_bits() == plain.trace(signal).last().to_bits();
+            assert!(same, "{name}: tangents change no bit");
+        }
+        for (i, tangent) in moved.iter().zip(&tangents) {
+            let run = |by: f64| {
+                let mut parameters = parameters.clone();
+                parameters[*i] += by;
+                analysis(&model, &parameters, input.clone(), 3.7)
+            };
+            let (up, down) = (run(1e-4), run(-1e-4));
+            for signal in &names {
+                let difference = (up.trace(signal).last() - down.trace(signal).last()) / 2e-4;
+                let exact = tangent.trace(signal).last();
+                let agree = (exact - difference).abs() < 2e-3 * (1.0 + difference.abs());
+                assert!(
+                    agree,
+                    "{name} {} {signal} {exact} {difference}",
+                    model.interface().parameters[*i].variable.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_sensor_lacks_lets_the_other_signals_alone() {
+    for (model, name, _) in everywhere() {
+        if !matches!(model.placements()[0].port, Port::Sensor { .. }) {
+            continue;
+        }
+        let effect = Arc::clone(&model.placements()[0].effect);
+        let mut parameters = vec![2.0, 0.1, 0.6];
+        parameters.extend(acting(name, effect.as_ref()));
+        parameters.resize(model.interface().parameters.len(), 0.05);
+        close(&values(&model, &parameters, Input::Constant(0.7), "v", &[3.0]), &[0.6 + 0.35 * 3.0], 1e-8);
+    }
 }
