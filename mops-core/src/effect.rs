@@ -301,7 +301,7 @@ pub trait Acting<S: Scalar> {
     /// input that reaches the plant. At a sensor: what is measured.
     fn value(&self, at: &At<'_, S>, z: &[S]) -> S;
 
-    /// At a companion that is a process: what is added to its equation.
+    /// At a joint or process whose companion is one too: what is added to the companion's equation.
     fn onward(&self, _at: &At<'_, S>, _z: &[S]) -> S {
         S::from(0.0)
     }

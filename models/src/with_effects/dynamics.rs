@@ -229,7 +229,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             let at = self.at(actor, t, x, u, S::from(0.0));
             let z = self.states(actor, x);
             w[k] += actor.acting.value(&at, z) * self.forward[k];
-            if let Some(Site::Process { w: next, .. }) = actor.place.companion {
+            if let Some(Site::Joint { w: next, .. } | Site::Process { w: next, .. }) = actor.place.companion {
                 w[next] += actor.acting.onward(&at, z) * self.forward[next];
             }
             if let Some(direction) = self.contacts.direction(index) {

@@ -30,6 +30,13 @@ parameters = { A = "m^2" }
 der        = { g = "A*g' = u", h = "A*h' = 0" }
 "#;
 
+const COUPLED: &str = r#"
+states     = { x = "m", v = "m/s", y = "m", w = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", k = "N/m" }
+der        = { x = "v", v = "m*v' = u - k*(x - y)", y = "w", w = "m*w' = k*(x - y)" }
+"#;
+
 /// One effect at a place of a model.
 fn with(text: &str, name: &str, place: &str, companion: Option<&str>) -> WithEffects {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
@@ -219,6 +226,24 @@ fn a_mass_on_a_flexible_mode_swings_at_both_its_frequencies() {
 }
 
 #[test]
+fn a_coupling_with_play_lets_go_within_its_gap() {
+    let model = with(COUPLED, "coupling-play", "joint:x", Some("joint:y"));
+    // Masses 2 at rest, apart by 0; x at 1: the gap of 1 is crossed after 0.5 s, then they bounce for half a period of
+    // sqrt(2 k/m) = 4 rad/s, and have exchanged their speeds.
+    let parameters = [2.0, 16.0, 0.0, 1.0, 0.0, 0.0, 16.0, 1.0];
+    let times = [0.4, 0.5 + PI / 4.0 + 0.2];
+    close(&values(&model, &parameters, NOTHING, "v", &times), &[1.0, 0.0], 1e-5);
+    close(&values(&model, &parameters, NOTHING, "w", &times), &[0.0, 1.0], 1e-5);
+}
+
+#[test]
+fn a_spring_with_play_lets_go_within_its_gap() {
+    let model = with(&BLOCK.replace("= u\"", "= u - 8*x\""), "spring-play", "joint:x", None);
+    let found = values(&model, &[2.0, 0.0, 1.0, 8.0, 1.0], NOTHING, "v", &[0.4, 0.5 + PI / 2.0 + 0.2]);
+    close(&found, &[1.0, -1.0], 1e-5);
+}
+
+#[test]
 fn an_added_mass_is_as_heavy_as_one_that_was_declared() {
     let model = with(BLOCK, "added-mass", "joint:x", None);
     close(&values(&model, &[2.0, 0.0, 0.0, 3.0], Input::Constant(10.0), "v", &[2.0]), &[4.0], 1e-9);
@@ -383,13 +408,21 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
                 PortKind::Actuator => "actuator:u",
                 PortKind::Sensor => "sensor:x",
             };
+            let coupled = effect.name() == "coupling-play";
             let companion = effect.companion().map(|kind| match kind {
+                PortKind::Joint if coupled => "joint:y",
                 PortKind::Joint => "joint:x",
                 PortKind::Process => "process:h",
                 PortKind::Actuator => "actuator:u",
                 PortKind::Sensor => "sensor:v",
             });
-            let text = if process { PAIR } else { BLOCK };
+            let text = if process {
+                PAIR
+            } else if coupled {
+                COUPLED
+            } else {
+                BLOCK
+            };
             all.push((with(text, effect.name(), place, companion), effect.name(), process));
         }
     }
@@ -426,7 +459,11 @@ fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
         let values = if process { levels.iter().map(|u| u + 1.8).collect() } else { levels.clone() };
         let input = Input::Sampled { times: times.clone(), values, hold: Hold::Zero };
         let effect = Arc::clone(&model.placements()[0].effect);
-        let mut parameters = if process { vec![2.0, 0.7, 0.8] } else { vec![2.0, 0.1, 0.6] };
+        let mut parameters = match name {
+            "coupling-play" => vec![2.0, 3.0, 0.1, 0.6, 0.0, 0.0],
+            _ if process => vec![2.0, 0.7, 0.8],
+            _ => vec![2.0, 0.1, 0.6],
+        };
         let first = parameters.len();
         parameters.extend(acting(name, effect.as_ref()));
         let count = parameters.len();
@@ -456,7 +493,8 @@ fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
             for signal in &names {
                 let difference = (up.trace(signal).last() - down.trace(signal).last()) / 2e-4;
                 let exact = tangent.trace(signal).last();
-                let agree = (exact - difference).abs() < 2e-3 * (1.0 + difference.abs());
+                // Where a step passes a kink, tangents are as exact as the step is short.
+                let agree = (exact - difference).abs() < 5e-3 * (1.0 + difference.abs());
                 assert!(
                     agree,
                     "{name} {} {signal} {exact} {difference}",
