@@ -141,8 +141,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
         self.plant.settle(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w });
         self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[0]);
-        for actor in &self.actors {
-            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = actor.place.site else {
+        let sites = self.actors.iter().flat_map(|actor| [Some(actor.place.site), actor.place.companion]);
+        for site in sites.flatten() {
+            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = site else {
                 continue;
             };
             w[k] = S::from(1.0);
@@ -234,6 +235,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             let at = self.at(actor, t, x, u, S::from(0.0));
             let z = self.states(actor, x);
             w[k] += actor.acting.value(&at, z) * self.forward[k];
+            if let Some(Site::Joint { w: next, .. } | Site::Process { w: next, .. }) = actor.place.companion {
+                w[next] += actor.acting.onward(&at, z) * self.forward[next];
+            }
             if let Some(direction) = self.contacts.direction(index) {
                 let friction = actor.acting.friction(&at, z).expect("it has friction from the start");
                 let against = friction.sliding[usize::from(direction < 0.0)];

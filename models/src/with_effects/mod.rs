@@ -229,7 +229,10 @@ impl Model for WithEffects {
             let first = self.places[i].strengths;
             !self.acts(i, job.parameters) && seeds.iter().all(|seed| seed[first] == 0.0)
         };
-        if seeds.is_empty() || (0..self.placements.len()).all(neutral) {
+        if seeds.is_empty() {
+            return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
+        }
+        if (0..self.placements.len()).all(neutral) {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }
