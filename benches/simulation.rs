@@ -129,8 +129,17 @@ fn simulate<S: Scalar>(
 ) -> ([S; 4], Work) {
     let [a, b, c, d, ba, bp, ca, cp] = parameters;
     let drive = Drive::new(Some(input));
-    let mut dynamics =
-        FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] };
+    let mut dynamics = FurutaDynamics {
+        a,
+        b,
+        c,
+        d,
+        viscous: [bp, ba],
+        coulomb: [cp, ca],
+        drive,
+        outside: [S::from(0.0); 2],
+        contact: [Contact::Forward; 2],
+    };
     integrate(&mut dynamics, 0.0, END, START.map(S::from), &TOLERANCE, sink).expect("it simulates")
 }
 

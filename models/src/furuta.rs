@@ -1,8 +1,8 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter,
-    Quantity, Scalar, State, Unit, Variable, WithTangents,
+    Along, Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, Open, OperatingPoint,
+    Parameter, Plant, Quantity, Scalar, State, Unit, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +10,8 @@ use serde::Deserialize;
 use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
 use crate::kernel::{
-    self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, rests, wanted,
+    self, Dynamics, Equations, Holds, Opened, Recording, Simulate, Tolerance, mechanism, rates_and_signals, record,
+    rests, wanted,
 };
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
@@ -100,7 +101,7 @@ impl Furuta {
                 state("dtheta", "dtheta0", "dtheta", Some("theta")),
             ],
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
-            ports: Vec::new(),
+            ports: mechanism::ports(&["phi", "theta"], &["u"]),
             horizon,
             analysis: AnalysisKind::Time,
         };
@@ -127,6 +128,24 @@ impl Model for Furuta {
 
     fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         Some(kernel::local(self, at))
+    }
+
+    fn ported(&self) -> Option<&dyn Open> {
+        Some(self)
+    }
+}
+
+impl Open for Furuta {
+    fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
+        Self::plant(parameters)
+    }
+
+    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure> {
+        Self::plant(parameters)
+    }
+
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
     }
 }
 
@@ -162,7 +181,20 @@ impl Furuta {
             let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
             return Err(Failure::Undefined(fact));
         }
-        Ok(FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] })
+        let (viscous, coulomb) = ([bp, ba], [cp, ca]);
+        let outside = [S::from(0.0); 2];
+        Ok(FurutaDynamics { a, b, c, d, viscous, coulomb, drive, outside, contact: [Contact::Forward; 2] })
+    }
+
+    /// The start values.
+    fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
+        parameters[8..].try_into().expect("four start values come last")
+    }
+
+    /// Opened at its ports.
+    fn plant<'a, S: Scalar>(parameters: &[S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)))?;
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 
     /// The value of a signal: the states, then the torque.
@@ -174,7 +206,7 @@ impl Furuta {
 impl Simulate for Furuta {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
-        let start = parameters[8..].try_into().expect("four start values come last");
+        let start = Self::start(parameters);
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -195,8 +227,17 @@ pub struct FurutaDynamics<'a, S> {
     pub coulomb: [S; 2],
     /// Torque on the arm, N m.
     pub drive: Drive<'a, S>,
+    /// Torques on pendulum and arm from outside the model, N m.
+    pub outside: [S; 2],
     /// How pendulum and arm move.
     pub contact: [Contact; 2],
+}
+
+impl<S: Scalar> Holds<S> for FurutaDynamics<'_, S> {
+    fn hold(&mut self, u: &[S], w: &[S]) {
+        self.drive = Drive::held(u[0]);
+        self.outside = [w[1], w[0]];
+    }
 }
 
 impl<S: Scalar> FurutaDynamics<'_, S> {
@@ -208,9 +249,10 @@ impl<S: Scalar> FurutaDynamics<'_, S> {
         let coupling = self.c * cos;
         let arm = self.b + self.a * sin * sin;
         let turning = self.a * dphi * sin * cos;
-        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta;
-        let arm_force =
-            self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi + self.drive.at(t);
+        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta + self.outside[0];
+        let arm_force = self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi
+            + self.drive.at(t)
+            + self.outside[1];
         (coupling, arm, [pendulum_force, arm_force])
     }
 

@@ -73,6 +73,13 @@ impl Catalogue {
     }
 }
 
+impl Interface {
+    /// The ports that effects act at: a joint stands for the equation of its speed.
+    pub fn places(&self) -> impl Iterator<Item = &Port> {
+        self.ports.iter().filter(|port| port.kind(&self.ports).is_some())
+    }
+}
+
 impl Port {
     /// The port of a model that is called so, as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
     ///
@@ -86,7 +93,7 @@ impl Port {
             return Err(Mistake::here("this model has no places for effects: it does not open its equations")
                 .with_help("remove `effects`, or take a model of its equations (`mops describe equations`)"));
         }
-        let names: Vec<String> = model.ports.iter().map(ToString::to_string).collect();
+        let names: Vec<String> = model.places().map(ToString::to_string).collect();
         // A kind alone, or a name alone, is not far from what was meant.
         let meant: Vec<&str> = names.iter().filter(|n| n.split(':').any(|part| part == text)).map(|n| &**n).collect();
         let help = if meant.is_empty() {

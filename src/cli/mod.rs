@@ -9,6 +9,7 @@ mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod places;
 mod progress;
 mod run;
 mod schema;

@@ -92,7 +92,7 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
     }
 
     /// Holds the inputs at these values.
-    pub fn hold(&mut self, values: impl Iterator<Item = S>) {
+    pub fn hold_drives(&mut self, values: impl Iterator<Item = S>) {
         for (drive, value) in self.drives.iter_mut().zip(values) {
             *drive = Drive::held(value);
         }

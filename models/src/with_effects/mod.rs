@@ -150,8 +150,7 @@ impl Site {
         let Placement { effect, port, companion, .. } = placement;
         let kind = |port: &Port| port.kind(&interface.ports);
         let site = |key: &str, port: &Port| {
-            Self::of(port, interface, states)
-                .ok_or_else(|| Mistake::new(key, format!("the model has no place {port}")))
+            Self::of(port, interface, states).ok_or_else(|| Mistake::new(key, format!("the model has no place {port}")))
         };
         if !kind(port).is_some_and(|kind| effect.ports().contains(&kind)) {
             let names: Vec<&str> = effect.ports().iter().map(|kind| kind.name()).collect();

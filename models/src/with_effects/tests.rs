@@ -104,3 +104,117 @@ fn tangents_along_strengths_are_those_of_differences() {
         }
     }
 }
+
+fn built_in(kind: &str) -> Arc<dyn Model> {
+    let kinds = crate::kinds();
+    let kind = kinds.iter().find(|known| known.name == kind).expect("it is there");
+    Arc::from(kind.default_model().expect("every option has a default"))
+}
+
+/// Parameters in the order of the model, by name; others at their defaults.
+fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
+    let unknown = given.iter().find(|(name, _)| !model.interface().parameters.iter().any(|p| p.variable.name == *name));
+    assert_eq!(unknown, None);
+    let value = |p: &mops_core::Parameter| {
+        given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, value)| *value).or(p.default)
+    };
+    model.interface().parameters.iter().map(|p| value(p).expect(&p.variable.name)).collect()
+}
+
+/// Traces of signals over 6 s with a torque that pushes, holds and lets go, and the events.
+fn pushed(
+    model: &dyn Model,
+    given: &[(&str, f64)],
+    signals: &[&str],
+) -> (Vec<mops_core::Trace>, Vec<mops_core::Event>) {
+    let times: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.1).collect();
+    let push = |&t: &f64| {
+        if t < 2.0 {
+            0.06 * (4.0 * t).sin()
+        } else if t < 4.0 {
+            0.008
+        } else {
+            -0.03
+        }
+    };
+    let values_of = times.iter().map(push).collect();
+    let inputs = vec![("u".to_owned(), Input::Sampled { times, values: values_of, hold: Hold::Zero })];
+    let case = Case { inputs, ..Case::default() };
+    let index = |name: &&str| model.interface().signals.iter().position(|s| s.name == **name).expect("it is there");
+    let wanted: Vec<usize> = signals.iter().map(index).collect();
+    let parameters = values(model, given);
+    let job = Job { case: &case, parameters: &parameters, signals: &wanted, horizon: 6.0 };
+    let analysis = model.analyse(&job).expect("it simulates");
+    let response = analysis.response().expect("it is a simulation").clone();
+    (signals.iter().map(|name| response.trace(name).expect("it was asked for").clone()).collect(), response.events)
+}
+
+/// The largest difference of two models' signals.
+fn apart(a: &[mops_core::Trace], b: &[mops_core::Trace]) -> f64 {
+    let at = |k: i32| f64::from(k) * 0.013;
+    let difference = |k: i32| a.iter().zip(b).map(move |(a, b)| (a.at(at(k)) - b.at(at(k))).abs()).fold(0.0, f64::max);
+    (0..460).map(difference).fold(0.0, f64::max)
+}
+
+const LUMPED: [(&str, f64); 7] =
+    [("a", 0.0044), ("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("theta0", 2.2)];
+
+#[test]
+fn dry_friction_as_an_effect_is_that_of_the_model_sticking_included() {
+    let plain = built_in("furuta");
+    let signals = ["phi", "dphi", "theta", "dtheta"];
+    let (own, events) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012)]].concat(), &signals);
+    assert!(events.iter().any(|event| event.what == "arm sticks"), "{events:?}");
+    let arm = with(&plain, &[("coulomb-friction", "joint:phi")]);
+    let (added, events) = pushed(&arm, &[&LUMPED[..], &[("e0.c", 0.012)]].concat(), &signals);
+    assert!(events.iter().any(|event| event.what == "a joint sticks"), "{events:?}");
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+
+    // The same in both joints, and shared between the model and the effect.
+    let (own, _) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012), ("cp", 0.001)]].concat(), &signals);
+    let both = with(&plain, &[("coulomb-friction", "joint:phi"), ("coulomb-friction", "joint:theta")]);
+    let (added, _) = pushed(&both, &[&LUMPED[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &signals);
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+    let (shared, _) = pushed(&arm, &[&LUMPED[..], &[("ca", 0.008), ("cp", 0.001), ("e0.c", 0.004)]].concat(), &signals);
+    assert!(apart(&own, &shared) < 1e-7, "{}", apart(&own, &shared));
+}
+
+#[test]
+fn a_pendulum_of_equations_takes_friction_as_the_built_in_one_does() {
+    let text = equations(include_str!("../../tests/equations/furuta-free.toml"));
+    let text = with(&text, &[("coulomb-friction", "joint:ph"), ("coulomb-friction", "joint:th")]);
+    let of_text = [("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("th0", 2.2)];
+    let (added, _) = pushed(&text, &[&of_text[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &["ph", "th"]);
+    let plain = built_in("furuta");
+    let (own, _) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012), ("cp", 0.001)]].concat(), &["phi", "theta"]);
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+}
+
+#[test]
+fn bodies_with_bearings_take_forces_at_every_joint() {
+    // A bearing whose table is flat is Coulomb friction, one that rises by 0.002 in 1 rad/s has viscous friction besides.
+    let bodies = [("J", 4e-3), ("Ja", 0.01), ("m", 0.04), ("l", 0.1), ("r", 0.2), ("theta0", 2.2)];
+    for (kind, signals) in [("furuta-2-joint", &["phi", "theta"][..]), ("furuta-3-joint", &["phi", "theta", "psi"])] {
+        let plain = built_in(kind);
+        let third: &[(&str, f64)] = if signals.len() == 3 { &[("c", 2.0), ("d", 2e-3), ("psi0", 0.02)] } else { &[] };
+        let own = [&bodies[..], third, &[("tau11", 0.012), ("tau21", 0.001), ("tau22", 0.002)]].concat();
+        let mut own = own;
+        own.extend(if third.is_empty() {
+            vec![("tau12", 0.012)]
+        } else {
+            ["tau01", "tau05", "tau12"].map(|n| (n, 0.012)).to_vec()
+        });
+        let (own, _) = pushed(plain.as_ref(), &own, signals);
+        let added = with(
+            &plain,
+            &[
+                ("coulomb-friction", "joint:phi"),
+                ("coulomb-friction", "joint:theta"),
+                ("viscous-friction", "joint:theta"),
+            ],
+        );
+        let strengths = [("e0.c", 0.012), ("e1.c", 0.001), ("e2.d", 0.001)];
+        let (added, _) = pushed(&added, &[&bodies[..], third, &strengths].concat(), signals);
+        assert!(apart(&own, &added) < 1e-7, "{kind}: {}", apart(&own, &added));
+    }
+}

@@ -130,8 +130,9 @@ fn kind<'t, 'k, K>(
                 .with_help(help));
         };
         if found.is_some() {
+            let article = if what.starts_with('e') { "an" } else { "a" };
             return Err(value
-                .key_diagnostic(format!("a {what} is of one kind, but two are named"))
+                .key_diagnostic(format!("{article} {what} is of one kind, but two are named"))
                 .with_help("remove one"));
         }
         found = Some((kind, value));

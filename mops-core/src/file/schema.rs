@@ -8,7 +8,8 @@ use serde_json::{Map, Value, json};
 
 use super::entries::Entries;
 use super::sections::{
-    CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
+    CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection,
+    TunerSection,
 };
 use super::tasks::{ExcitationSection, SensitivitySection, SweepSection};
 use crate::catalogue::Catalogue;
