@@ -166,8 +166,10 @@ impl<S: Opening> Driven<'_, S> {
 /// Solves `columns f = -free` by elimination over the scalar; there are few.
 fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
     let n = free.len();
-    if n == 1 {
-        return vec![-free[0] / columns[0][0]];
+    match n {
+        0 => return Vec::new(),
+        1 => return vec![-free[0] / columns[0][0]],
+        _ => {}
     }
     // Values by LU, tangents by one step of Newton's method, which is exact for them.
     let matrix = DMatrix::from_fn(n, n, |i, j| columns[j][i].value());

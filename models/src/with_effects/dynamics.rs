@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use mops_core::{Acting, At, Failure, Instant, Job, Opening, Plant, Scalar};
+use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -18,6 +18,27 @@ pub(super) struct Actor<S> {
     /// What it remembers.
     pub(super) memory: Vec<S>,
     inertial: bool,
+}
+
+impl WithEffects {
+    /// The effects of these indices; their states stand behind the `own` of the plant.
+    pub(super) fn actors<S: Opening>(&self, acting: &[usize], own: usize, parameters: &[S]) -> Vec<Actor<S>> {
+        let mut states = own;
+        let actor = |&index: &usize| {
+            let (effect, place) = (&self.placements[index].effect, self.places[index]);
+            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
+            let z = (states, effect.states());
+            states += effect.states();
+            Actor {
+                acting: S::act(effect.as_ref(), strengths),
+                place,
+                z,
+                memory: vec![S::from(f64::NAN); effect.memory()],
+                inertial: effect.is_inertial(),
+            }
+        };
+        acting.iter().map(actor).collect()
+    }
 }
 
 /// An input, which an effect may delay.
@@ -74,28 +95,12 @@ struct Scratch<S> {
 
 impl<'a, S: Opening> Driven<'a, S> {
     pub(super) fn new(
-        model: &WithEffects,
+        of: &Interface,
+        own: usize,
         plant: Box<dyn Plant<S> + 'a>,
-        acting: &[usize],
+        actors: Vec<Actor<S>>,
         job: &Job<'a>,
-        parameters: &[S],
     ) -> Self {
-        let of = model.model.interface();
-        let own = model.model.equation_states().len();
-        let mut states = own;
-        let mut actors = Vec::new();
-        for &index in acting {
-            let (effect, place) = (&model.placements[index].effect, model.places[index]);
-            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
-            actors.push(Actor {
-                acting: S::act(effect.as_ref(), strengths),
-                place,
-                z: (states, effect.states()),
-                memory: vec![S::from(f64::NAN); effect.memory()],
-                inertial: effect.is_inertial(),
-            });
-            states += effect.states();
-        }
         let delay = |input: usize| {
             let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)

@@ -2,17 +2,19 @@
 
 mod contacts;
 mod dynamics;
+mod own;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Port, Scalar, State,
-    Unit, Variable, WithTangents,
+    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Plant, Port, Scalar,
+    State, Unit, Variable, WithTangents,
 };
 
-use crate::kernel::{self, Recording, record, wanted};
+use crate::kernel::{self, Recording, Tolerance, record, wanted};
 use dynamics::Driven;
+pub use own::{Own, OwnModel};
 
 /// A model with effects.
 ///
@@ -131,13 +133,29 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let mut dynamics = Driven::new(self, plant, &acting, job, parameters);
+        let own = self.model.equation_states().len();
+        let actors = self.actors(&acting, own, parameters);
+        let mut dynamics = Driven::new(self.model.interface(), own, plant, actors, job);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
         let recording = record(&mut dynamics, start, job.horizon, &open.tolerance(), &signals, &output)?;
         Ok(dynamics.remembered(recording, &signals))
     }
+}
+
+/// Simulates a plant without effects.
+fn alone<'a, S: Opening>(
+    interface: &Interface,
+    plant: Box<dyn Plant<S> + 'a>,
+    tolerance: &Tolerance,
+    job: &Job<'a>,
+) -> Result<Recording, Failure> {
+    let own = plant.start().len();
+    let mut dynamics = Driven::new(interface, own, plant, Vec::new(), job);
+    let start = dynamics.start(&[])?;
+    let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
+    record(&mut dynamics, start, job.horizon, tolerance, &wanted(job, &interface.signals), &output)
 }
 
 impl Site {

@@ -258,7 +258,8 @@ pub(super) struct ResponseTable {
     pub real: Option<String>,
     /// Column of the imaginary part.
     pub imaginary: Option<String>,
-    /// Column of the magnitude: in dB where its header or `decibel` says so, else a factor.
+    /// Column of the magnitude: in dB where its header or `decibel` says so, else in the unit of its header, else in that of
+    /// the output over that of the input.
     pub magnitude: Option<String>,
     /// Column of the phase: in the unit of its header, else deg.
     pub phase: Option<String>,
