@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
-use mops_core::{Case, Hold, Input, Job, Model, ModelOptions, Placement, Port};
+use mops_core::{
+    Case, Failure, Hold, Input, Instant, Interface, Job, Model, ModelOptions, OperatingPoint, Parameter, Placement,
+    Plant, Port, Scalar, Variable,
+};
 
-use super::WithEffects;
+use super::{Own, OwnModel, WithEffects};
 use crate::effects::effects;
 use crate::equations::EquationsOptions;
+use crate::kernel::mechanism;
 
 fn equations(text: &str) -> Arc<dyn Model> {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
@@ -115,9 +119,8 @@ fn built_in(kind: &str) -> Arc<dyn Model> {
 fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
     let unknown = given.iter().find(|(name, _)| !model.interface().parameters.iter().any(|p| p.variable.name == *name));
     assert_eq!(unknown, None);
-    let value = |p: &mops_core::Parameter| {
-        given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, value)| *value).or(p.default)
-    };
+    let value =
+        |p: &Parameter| given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, value)| *value).or(p.default);
     model.interface().parameters.iter().map(|p| value(p).expect(&p.variable.name)).collect()
 }
 
@@ -217,4 +220,73 @@ fn bodies_with_bearings_take_forces_at_every_joint() {
         let (added, _) = pushed(&added, &[&bodies[..], third, &strengths].concat(), signals);
         assert!(apart(&own, &added) < 1e-7, "{kind}: {}", apart(&own, &added));
     }
+}
+
+/// `theta'' = u - 4 sin(theta) + w`, written in Rust.
+struct Pendulum(Interface);
+
+impl Pendulum {
+    fn new() -> Self {
+        let joint = mechanism::Joint { angle: "theta", about: "pendulum", start: 0.5, events: [""; 4] };
+        let gravity = vec![Parameter::new("d", "N m", "gravity torque")];
+        let interface = mechanism::interface(&[joint], gravity, vec![Variable::new("u", "N m", "torque")]);
+        Self(Interface { ports: mechanism::ports(&["theta"], &["u"]), ..interface })
+    }
+}
+
+struct At<S>([S; 3]);
+
+impl<S: Scalar> Plant<S> for At<S> {
+    fn start(&self) -> Vec<S> {
+        self.0[1..].to_vec()
+    }
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        dx[0] = at.x[1];
+        dx[1] = at.u[0] - self.0[0] * at.x[0].sin() + at.w[0];
+    }
+}
+
+impl OwnModel for Pendulum {
+    fn interface(&self) -> &Interface {
+        &self.0
+    }
+    fn plant<S: Scalar>(&self, parameters: &[S]) -> Result<impl Plant<S> + use<S>, Failure> {
+        Ok(At(parameters.try_into().expect("one parameter and two start values")))
+    }
+}
+
+#[test]
+fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_text() {
+    let own: Arc<dyn Model> = Arc::new(Own(Pendulum::new()));
+    let text = equations(
+        r#"
+        states = { theta = "rad", dtheta = "rad/s" }
+        inputs = { u = "N m" }
+        parameters = { d = "N m" }
+        constants = { J = "1 kg m2" }
+        start = { theta = "0.5" }
+        der = { theta = "dtheta", dtheta = "J*dtheta' = u - d*sin(theta)" }
+        "#,
+    );
+    let names: Vec<String> = own.interface().ports.iter().map(ToString::to_string).collect();
+    assert_eq!(names, ["joint:theta", "process:theta", "actuator:u", "sensor:theta", "sensor:dtheta"]);
+    let signals = ["theta", "dtheta"];
+    let both = |given: &[(&str, f64)], effects: &[(&str, &str)]| {
+        let [a, b] = [&own, &text].map(|model| pushed(&with(model, effects), given, &signals).0);
+        apart(&a, &b)
+    };
+    assert!(both(&[("d", 4.0)], &[]) < 1e-8);
+    assert!(both(&[("d", 4.0), ("e0.c", 0.05)], &[("coulomb-friction", "joint:theta")]) < 1e-7);
+
+    let at = OperatingPoint { parameters: &[4.0, 0.0, 0.0], states: &[0.3, 0.0], inputs: &[0.0], at_rest: true };
+    let local = own.local(&at).expect("it has equations").expect("it is defined");
+    assert!((local.slopes[(1, 0)] + 4.0 * 0.3_f64.cos()).abs() < 1e-14 && local.slopes[(1, 2)] == 1.0);
+    assert_eq!(own.start_values(at.parameters), Some(vec![0.0, 0.0]));
+
+    let case = Case::default();
+    let job = Job { case: &case, parameters: &[4.0, 0.01, 0.0], signals: &[0], horizon: 2.0 };
+    let (analysis, tangents) = own.tangents(&job, &[vec![0.0, 1.0, 0.0]]).expect("it has them").expect("it simulates");
+    // A small swing is 0.01 cos(2 t), and so is its slope by the start value but for 1e-4 of it.
+    assert!((analysis.trace("theta").at(2.0) - 0.01 * 4.0_f64.cos()).abs() < 1e-6);
+    assert!((tangents[0].trace("theta").at(2.0) - 4.0_f64.cos()).abs() < 1e-3);
 }
