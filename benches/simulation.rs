@@ -145,7 +145,7 @@ fn simulate<S: Scalar>(
 
 /// The model as a study uses it, with traces of all signals.
 fn analysis(physical: [f64; 8]) -> impl Fn() -> Analysis {
-    let model = Furuta::new(None, TOLERANCE);
+    let model = Furuta::model(None, TOLERANCE);
     let case = Case { inputs: vec![("u".into(), torque())], ..Case::default() };
     let parameters: Vec<f64> = physical.into_iter().chain(START).collect();
     move || {

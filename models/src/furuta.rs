@@ -1,8 +1,8 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    Along, Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, Open, OperatingPoint,
-    Parameter, Plant, Quantity, Scalar, State, Unit, Variable, WithTangents,
+    AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity,
+    Scalar, State, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,8 +10,8 @@ use serde::Deserialize;
 use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
 use crate::kernel::{
-    self, Dynamics, Equations, Holds, Opened, Recording, Simulate, Tolerance, mechanism, rates_and_signals, record,
-    rests, wanted,
+    Dynamics, Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, mechanism, rates_and_signals,
+    record, rests, wanted,
 };
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
@@ -49,7 +49,7 @@ impl ModelOptions for FurutaOptions {
         self.tolerance.check()?;
         let horizon = self.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|e| Mistake::new("horizon", e))?;
-        Ok(Box::new(Furuta::new(horizon, self.tolerance)))
+        Ok(Box::new(Furuta::model(horizon, self.tolerance)))
     }
 }
 
@@ -61,7 +61,7 @@ pub struct Furuta {
 
 impl Furuta {
     /// A Furuta pendulum that is simulated to `horizon` (s) where no experiment says otherwise.
-    pub fn new(horizon: Option<f64>, tolerance: Tolerance) -> Self {
+    pub fn model(horizon: Option<f64>, tolerance: Tolerance) -> Kernel<Self> {
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
         let friction =
             |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY).with_default(0.0);
@@ -105,47 +105,26 @@ impl Furuta {
             horizon,
             analysis: AnalysisKind::Time,
         };
-        Self { interface, tolerance }
+        Kernel(Self { interface, tolerance })
     }
 }
 
-impl Model for Furuta {
+impl Written for Furuta {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..4].to_vec()
-    }
-
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
-    }
-
-    fn ported(&self) -> Option<&dyn Open> {
-        Some(self)
-    }
-}
-
-impl Open for Furuta {
-    fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
-        Self::plant(parameters)
-    }
-
-    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure> {
-        Self::plant(parameters)
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)))?;
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 }
 
@@ -189,12 +168,6 @@ impl Furuta {
     /// The start values.
     fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
         parameters[8..].try_into().expect("four start values come last")
-    }
-
-    /// Opened at its ports.
-    fn plant<'a, S: Scalar>(parameters: &[S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)))?;
-        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 
     /// The value of a signal: the states, then the torque.

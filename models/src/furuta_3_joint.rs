@@ -1,8 +1,7 @@
 //! The Furuta pendulum whose pendulum can also tilt sideways, against a spring.
 
 use mops_core::{
-    Along, Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, Open, OperatingPoint, Parameter,
-    Plant, Quantity, Scalar, Variable, WithTangents,
+    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -12,7 +11,8 @@ use crate::kernel::drive::Drive;
 use crate::kernel::elements::{BearingFriction, SpringDamper};
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
 use crate::kernel::{
-    self, Equations, Holds, Opened, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted,
+    Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds,
+    wanted,
 };
 
 /// The Furuta pendulum of `furuta-2-joint` with a third joint: at its top the pendulum tilts by `psi` in the plane through
@@ -78,7 +78,10 @@ impl ModelOptions for Furuta3JointOptions {
         let interface = mechanism::interface(&[ARM, PENDULUM, TILT], parameters, vec![arm_torque()]);
         let ports = mechanism::ports(&["phi", "theta", "psi"], &["u"]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Furuta3Joint { interface: Interface { ports, horizon, ..interface }, tolerance: self.tolerance }))
+        Ok(Box::new(Kernel(Furuta3Joint {
+            interface: Interface { ports, horizon, ..interface },
+            tolerance: self.tolerance,
+        })))
     }
 }
 
@@ -90,43 +93,22 @@ struct Furuta3Joint {
     tolerance: Tolerance,
 }
 
-impl Model for Furuta3Joint {
+impl Written for Furuta3Joint {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..6].to_vec()
-    }
-
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
-    }
-
-    fn ported(&self) -> Option<&dyn Open> {
-        Some(self)
-    }
-}
-
-impl Open for Furuta3Joint {
-    fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
-        Self::plant(parameters)
-    }
-
-    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure> {
-        Self::plant(parameters)
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 }
 
@@ -186,12 +168,6 @@ impl Furuta3Joint {
     /// The start values.
     fn start<S: Scalar>(parameters: &[S]) -> [S; 6] {
         *parameters.last_chunk().expect("six start values come last")
-    }
-
-    /// Opened at its ports.
-    fn plant<'a, S: Scalar>(parameters: &[S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
-        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 
     /// The value of a signal: the states, then the torque.
