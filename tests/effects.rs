@@ -136,3 +136,16 @@ fn check_and_describe_tell_the_places() {
     assert!(print(&["describe", "furuta"]).contains("joint:theta"));
     assert!(!print(&["describe", "pid-loop"]).contains("laces for effects"));
 }
+
+#[test]
+fn editors_are_told_the_effects_and_what_each_needs() {
+    let output = cargo_bin_cmd!("mops").arg("schema").output().unwrap();
+    let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let named = &schema["properties"]["models"]["additionalProperties"]["properties"]["effects"];
+    assert!(named["description"].as_str().unwrap().contains("arm.c"), "{named:#}");
+    let effect = &named["additionalProperties"];
+    assert_eq!(effect["additionalProperties"], false);
+    let friction = &effect["properties"]["coulomb-friction"];
+    assert_eq!(friction["required"], serde_json::json!(["place"]), "{friction:#}");
+    assert!(friction["description"].as_str().unwrap().contains("sgn(v)"), "{friction:#}");
+}

@@ -203,7 +203,7 @@ response = { frequency-fit = { signal = 'ph', input = 'u' }, demand = 1 }
     }
     let wrong = measured("rad/V", 1.0).unwrap_err();
     assert!(wrong.contains("the response is measured in `rad/V`, that of the model is in `rad/(N m)`"), "{wrong}");
-    assert!(wrong.contains("study.toml:13:15"), "{wrong}");
+    assert!(wrong.contains("study.toml:12:15"), "{wrong}");
 }
 
 #[test]
