@@ -64,6 +64,18 @@ pub enum PortKind {
     Sensor,
 }
 
+impl PortKind {
+    /// Its name, as places begin with it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Process => "process",
+            Self::Actuator => "actuator",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
 impl Port {
     /// Its sort; `None` for the equation of a joint's speed, which its [`Port::Joint`] stands for.
     pub fn kind(&self, ports: &[Self]) -> Option<PortKind> {

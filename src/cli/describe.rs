@@ -3,8 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, suggestion};
+use mops_core::{Catalogue, Diagnostic, ModelKind, suggestion};
 
+use super::places::places;
 use super::{Trouble, effect, print};
 
 /// What is described.
@@ -26,7 +27,10 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         return Ok(ExitCode::SUCCESS);
     }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
-        print(&mops_core::file::describe(name, &schema()));
+        let model = catalogue.models.iter().find(|kind| kind.name == name).and_then(ModelKind::default_model);
+        let places = model.map_or_else(String::new, |model| places(model.interface()));
+        let places = if places.is_empty() { places } else { format!("\nPlaces for effects:\n  {places}\n") };
+        print(&(mops_core::file::describe(name, &schema()) + &places));
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {

@@ -12,6 +12,7 @@ mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod places;
 mod progress;
 mod remains;
 mod run;

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use mops_core::{Acting, At, Failure, Instant, Job, Opening, Plant, Scalar};
+use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -18,6 +18,27 @@ pub(super) struct Actor<S> {
     /// What it remembers.
     pub(super) memory: Vec<S>,
     inertial: bool,
+}
+
+impl WithEffects {
+    /// The effects of these indices; their states stand behind the `own` of the plant.
+    pub(super) fn actors<S: Opening>(&self, acting: &[usize], own: usize, parameters: &[S]) -> Vec<Actor<S>> {
+        let mut states = own;
+        let actor = |&index: &usize| {
+            let (effect, place) = (&self.placements[index].effect, self.places[index]);
+            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
+            let z = (states, effect.states());
+            states += effect.states();
+            Actor {
+                acting: S::act(effect.as_ref(), strengths),
+                place,
+                z,
+                memory: vec![S::from(f64::NAN); effect.memory()],
+                inertial: effect.is_inertial(),
+            }
+        };
+        acting.iter().map(actor).collect()
+    }
 }
 
 /// An input, which an effect may delay.
@@ -59,6 +80,8 @@ pub(super) struct Driven<'a, S> {
     forces: usize,
     breaks: Vec<f64>,
     longest_step: f64,
+    /// For each signal the state that it shows as it is.
+    shows: Vec<Option<usize>>,
     /// What a clock shows at time 0, s.
     begins: f64,
     started: bool,
@@ -78,28 +101,12 @@ struct Scratch<S> {
 
 impl<'a, S: Opening> Driven<'a, S> {
     pub(super) fn new(
-        model: &WithEffects,
+        of: &Interface,
+        own: usize,
         plant: Box<dyn Plant<S> + 'a>,
-        acting: &[usize],
+        actors: Vec<Actor<S>>,
         job: &Job<'a>,
-        parameters: &[S],
     ) -> Self {
-        let of = model.model.interface();
-        let own = model.model.equation_states().len();
-        let mut states = own;
-        let mut actors = Vec::new();
-        for &index in acting {
-            let (effect, place) = (&model.placements[index].effect, model.places[index]);
-            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
-            actors.push(Actor {
-                acting: S::act(effect.as_ref(), strengths),
-                place,
-                z: (states, effect.states()),
-                memory: vec![S::from(f64::NAN); effect.memory()],
-                inertial: effect.is_inertial(),
-            });
-            states += effect.states();
-        }
         let delay = |input: usize| {
             let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
@@ -108,6 +115,10 @@ impl<'a, S: Opening> Driven<'a, S> {
         let commands = commands.map(|(i, v)| Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i) });
         let commands: Vec<_> = commands.collect();
         let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
+        let shown = |signal: &mops_core::Variable| {
+            let all = of.states.len() == own;
+            of.states.iter().position(|state| all && state.signal.as_ref() == Some(&signal.name))
+        };
         let begins = job.case.begins;
         let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
         let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
@@ -123,6 +134,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
+            shows: of.signals.iter().map(shown).collect(),
             begins,
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
@@ -331,7 +343,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
         };
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
-        if let Some(state) = self.plant.shows(signal) {
+        if let Some(state) = self.shows[signal] {
             if self.actors.iter().filter(here).all(simple) {
                 let see = |value: S, actor: &Actor<S>| {
                     actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
@@ -345,9 +357,10 @@ impl<'a, S: Opening> Driven<'a, S> {
         // Outputs may contain rates: the forces count.
         self.balance(t, x, u, w, dx);
         let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        self.actors.iter().filter(here).fold(value, |value, actor| {
-            actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x))
-        })
+        self.actors
+            .iter()
+            .filter(here)
+            .fold(value, |value, actor| actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x)))
     }
 
     /// Moves what actuators remember to the command of the moment.
