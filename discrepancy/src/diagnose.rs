@@ -40,7 +40,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, Mistake> {
     let subject = Subject::new(study)?;
     let simulations = AtomicUsize::new(0);
-    let limits = Limits { effects: options.max_effects, refits: 10, finalists: 5 };
+    let limits = Limits { refits: 10, finalists: 5 };
     let search = Search { subject: &subject, effects, limits, simulations: &simulations };
     let lost = || {
         Mistake::new("tuners", "the declared model cannot be simulated from anywhere near the start values")
@@ -61,7 +61,7 @@ pub fn diagnose(
             return Err(Mistake::here("the diagnosis was interrupted"));
         }
         watch.stage(&format!("search for effect {}", k + 1), 0.1 + 0.7 * k as f64 / options.max_effects as f64);
-        let Some(mut round) = search.round(&current) else { break };
+        let Some(round) = search.round(&current) else { break };
         let Some(best) = round.trials.first() else { break };
         let dispersion = Dispersion::of(best);
         let worth = (best.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
@@ -74,11 +74,8 @@ pub fn diagnose(
             rounds.push(round);
             break;
         }
-        let next = round.trials.remove(0);
-        let next = search.over_or_in_windows(&next);
-        round.trials.insert(0, search.again(&next).ok_or_else(lost)?);
+        current = search.over_or_in_windows(best);
         rounds.push(round);
-        current = next;
     }
     watch.stage("what can be left out", 0.82);
     let mut last = search.over_whole(&current).unwrap_or(current);

@@ -35,8 +35,6 @@ pub struct Trial<'a> {
 /// What the search is asked.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Largest number of effects added.
-    pub effects: usize,
     /// Candidates that are fitted in each round.
     pub refits: usize,
     /// Those of them that are fitted to the end.
@@ -198,6 +196,17 @@ impl<'a> Search<'a> {
             .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
             .collect();
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        if from.windows > 1 {
+            // Windows forgive what whole records do not: these decide, where they can be fitted.
+            let wholes: Vec<Trial<'a>> = trials[..trials.len().min(self.limits.finalists)]
+                .par_iter()
+                .filter_map(|t| self.over_whole(t))
+                .collect();
+            if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
+                trials = wholes;
+                trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            }
+        }
         let directions = screened.iter().map(|s| s.directions).sum();
         Some(Round { screened, trials, directions, before: from.score() })
     }
