@@ -5,13 +5,18 @@ mod base;
 mod candidate;
 pub mod dev;
 mod diagnosis;
+mod family;
 mod fit;
+mod gaussian;
+mod held_out;
 mod hygiene;
+mod locate;
 mod screen;
 mod search;
 mod subject;
 mod trace_of;
 mod trajectory;
+mod unknown;
 mod variant;
 mod windows;
 

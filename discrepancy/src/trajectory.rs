@@ -121,16 +121,18 @@ impl Trajectory {
     /// What a signal at the nodes, in a column (inputs, then forces), adds to the residuals.
     pub fn response(&self, column: usize, signal: &[f64]) -> Vec<f64> {
         let n = self.moments.first().map_or(0, |m| m.x.len());
-        let mut states = Vec::with_capacity(self.knots.len());
-        let mut x = DVector::zeros(n);
-        states.push(x.clone());
-        let mut next = DVector::zeros(n);
-        for (interval, f) in self.intervals.iter().zip(signal.chunks(2)) {
-            next.gemv(1.0, &interval.transition, &x, 0.0);
-            next.axpy(f[0], &interval.gains[0].column(column), 1.0);
-            next.axpy(f[1], &interval.gains[1].column(column), 1.0);
-            std::mem::swap(&mut x, &mut next);
-            states.push(x.clone());
+        // The states at the knots, one after the other; at rest until the signal begins.
+        let mut states = vec![0.0; n * self.knots.len()];
+        let begin = signal.iter().position(|&f| f != 0.0).unwrap_or(signal.len()) / 2;
+        for (k, interval) in self.intervals.iter().enumerate().skip(begin) {
+            let (done, next) = states.split_at_mut(n * (k + 1));
+            let next = &mut next[..n];
+            for (gain, &f) in interval.gains.iter().zip(&signal[2 * k..2 * k + 2]) {
+                next.iter_mut().zip(gain.column(column).iter()).for_each(|(x, g)| *x += f * g);
+            }
+            for (slopes, &x) in interval.transition.as_slice().chunks_exact(n.max(1)).zip(&done[n * k..]) {
+                next.iter_mut().zip(slopes).for_each(|(next, slope)| *next += slope * x);
+            }
         }
         let mut residuals = Vec::new();
         for ((samples, &row), noise) in self.samples.iter().zip(&self.rows).zip(&self.noise) {
@@ -139,7 +141,7 @@ impl Trajectory {
                 let m = &self.moments[node];
                 let mut y = 0.0;
                 for i in 0..n {
-                    y += m.c[(row, i)] * states[knot][i];
+                    y += m.c[(row, i)] * states[n * knot + i];
                 }
                 (y + m.d[(row, column)] * signal[node]) / noise
             }));
