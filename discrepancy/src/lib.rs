@@ -11,9 +11,13 @@ mod gaussian;
 mod held_out;
 mod hygiene;
 mod locate;
+#[cfg(test)]
+mod locate_tests;
 mod screen;
 mod search;
 mod subject;
+#[cfg(test)]
+mod testing;
 mod trace_of;
 mod trajectory;
 mod unknown;

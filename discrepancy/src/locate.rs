@@ -143,13 +143,14 @@ fn table(unknown: &Unknown, choice: &Choice) -> Option<Table> {
     })
 }
 
-/// The share of the squares above the noise that a signal takes away, the freedom it uses paid for.
+/// The share of the squares above the noise that a signal takes away, the freedom it uses paid for; what is less than the
+/// spread of the noise's own squares counts as that much.
 fn share(unknown: &Unknown, coefficients: &[f64], freedom: f64) -> f64 {
     let n = &unknown.normals;
     let left = &unknown.residuals + &unknown.columns * DVector::from_column_slice(coefficients);
     let before = n.chi2 - n.freedom;
     let after = left.norm_squared() - (n.freedom - freedom);
-    if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 }
+    ((before - after.max(0.0)) / before.max((2.0 * n.freedom).sqrt())).clamp(0.0, 1.0)
 }
 
 /// The longest curve that is kept.
