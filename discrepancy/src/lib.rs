@@ -3,7 +3,7 @@
 
 mod base;
 mod candidate;
-pub mod dev;
+mod diagnose;
 mod diagnosis;
 mod family;
 mod fit;
@@ -13,6 +13,7 @@ mod hygiene;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
+mod repaired;
 mod screen;
 mod search;
 mod subject;
@@ -22,8 +23,10 @@ mod trace_of;
 mod trajectory;
 mod unknown;
 mod variant;
+mod weigh;
 mod windows;
 
+pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
     StrengthValue, Unexplained, Verdict,
