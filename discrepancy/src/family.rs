@@ -18,7 +18,7 @@ pub enum Over {
     Speed,
     /// Of the input.
     Input,
-    /// Of the time since the start, the same in all experiments.
+    /// Of the time since the start of the experiment, the same in all.
     Time,
 }
 
@@ -37,7 +37,7 @@ impl Over {
 /// What a place looks like at a moment.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Look {
-    /// Time, s.
+    /// Time since the start of the experiment, s.
     pub t: f64,
     /// Position.
     pub position: f64,
@@ -86,16 +86,19 @@ pub struct Family {
 const KNOTS: u32 = 13;
 
 impl Family {
-    /// Signals that are free over time: about `total` knots, shared out among the pieces, at most one for two samples.
+    /// Signals that are free over time: about `total` knots, shared out among the pieces with these spans, at most
+    /// one for two samples.
     #[allow(clippy::cast_precision_loss)]
-    pub fn free(horizons: &[f64], samples: &[usize], total: usize, first: usize) -> Self {
-        let share = (total / horizons.len().max(1)).max(12);
+    pub fn free(spans: &[[f64; 2]], samples: &[usize], total: usize, first: usize) -> Self {
+        let share = (total / spans.len().max(1)).max(12);
         let counts: Vec<usize> = samples.iter().map(|n| share.min(n / 2).max(4)).collect();
-        let even = |n: usize, end: f64| (0..n).map(move |k| end * k as f64 / (n - 1) as f64).collect();
-        let blocks = counts.iter().zip(horizons).enumerate().map(|(piece, (&n, &horizon))| Block {
+        let even = |n: usize, [from, to]: [f64; 2]| {
+            (0..n).map(move |k| from + (to - from) * k as f64 / (n - 1) as f64).collect()
+        };
+        let blocks = counts.iter().zip(spans).enumerate().map(|(piece, (&n, &span))| Block {
             piece: Some(piece),
-            knots: even(n, horizon),
-            places: even(n, 1.0),
+            knots: even(n, span),
+            places: even(n, [0.0, 1.0]),
         });
         let spacing = 1.0 / counts.iter().max().map_or(1.0, |&n| (n - 1) as f64);
         let lengths = [1.5, 5.0, 20.0, 80.0].map(|l| l * spacing).to_vec();

@@ -160,7 +160,7 @@ fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, mode
     let estimate = unknown.normals.estimate(&unknown.prior(&choice.terms)?, choice.variance)?;
     let coefficients = estimate.coefficients.as_slice();
     let units = Units::of(port, model);
-    let mut over_time = Vec::new();
+    let mut over_time: Vec<(String, Curve)> = Vec::new();
     let arguments = [(Over::Position, units.position), (Over::Speed, units.speed), (Over::Input, units.input)];
     let mut over: Vec<(Over, String, Curve)> = arguments.map(|(over, unit)| (over, unit, Curve::default())).into();
     for (piece, looks) in unknown.looks.iter().enumerate().filter(|(_, looks)| !looks.is_empty()) {
@@ -171,8 +171,15 @@ fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, mode
             curve.x.extend(kept().map(|(look, _)| look.of(*over)));
             curve.y.extend(kept().map(|(_, s)| *s));
         }
-        let name = fit.subject.measurements[fit.pieces[piece].measurement].name.clone();
-        over_time.push((name, Curve { x: kept().map(|(l, _)| l.t).collect(), y: kept().map(|(_, s)| *s).collect() }));
+        // The windows of an experiment follow each other.
+        let name = &fit.subject.measurements[fit.pieces[piece].measurement].name;
+        if over_time.last().is_none_or(|(last, _)| last != name) {
+            over_time.push((name.clone(), Curve::default()));
+        }
+        if let Some((_, curve)) = over_time.last_mut() {
+            curve.x.extend(kept().map(|(look, _)| look.t));
+            curve.y.extend(kept().map(|(_, s)| *s));
+        }
     }
     let varies = |curve: &Curve| curve.x.iter().any(|x| x != &curve.x[0]);
     over.retain(|(_, _, curve)| varies(curve));

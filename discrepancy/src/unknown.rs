@@ -5,7 +5,7 @@ use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
 
 use crate::family::{Family, Look, Over};
-use crate::fit::{Fit, dot};
+use crate::fit::{Fit, Piece, dot};
 use crate::gaussian::{Normals, Prior, joined};
 use crate::screen::Scene;
 use crate::trace_of::{Spot, spot};
@@ -46,13 +46,14 @@ impl Unknown {
     pub fn new(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Option<Self> {
         let spots: Vec<Option<Spot>> = fit.pieces.iter().map(|piece| spot(port, model, piece)).collect();
         let looks: Vec<Vec<Look>> = (0..spots.len()).map(|piece| looks(spots[piece], piece, fit, scene)).collect();
-        let horizons: Vec<f64> = fit.pieces.iter().map(|piece| piece.horizon).collect();
+        let span = |piece: &Piece| [piece.case.begins, piece.case.begins + piece.horizon];
+        let spans: Vec<[f64; 2]> = fit.pieces.iter().map(span).collect();
         let samples: Vec<usize> = fit
             .pieces
             .iter()
             .map(|piece| piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0))
             .collect();
-        let mut families = vec![Family::free(&horizons, &samples, FREE, 0)];
+        let mut families = vec![Family::free(&spans, &samples, FREE, 0)];
         for over in [Over::Position, Over::Speed, Over::Input, Over::Time] {
             let first = families[families.len() - 1].columns.end;
             let values = looks.iter().flatten().map(|look| look.of(over));
@@ -114,12 +115,13 @@ pub fn basis(scene: &Scene) -> DMatrix<f64> {
 /// What a place looks like: at the nodes of the motion, or at the samples of a sensor.
 fn looks(here: Option<Spot>, piece: usize, fit: &Fit<'_>, scene: &Scene) -> Vec<Look> {
     let along = &scene.trajectories[piece];
+    let begins = fit.pieces[piece].case.begins;
     let moment = |m: &mops_models::Moment| {
         let input = m.u.first().copied().unwrap_or(0.0);
         match here {
-            Some(Spot::Joint(_, q, v)) => Look { t: m.t, position: m.x[q], speed: m.x[v], input },
-            Some(Spot::Process(_, s)) => Look { t: m.t, position: m.x[s], speed: 0.0, input },
-            Some(Spot::Actuator(i)) => Look { t: m.t, position: 0.0, speed: 0.0, input: m.u[i] },
+            Some(Spot::Joint(_, q, v)) => Look { t: begins + m.t, position: m.x[q], speed: m.x[v], input },
+            Some(Spot::Process(_, s)) => Look { t: begins + m.t, position: m.x[s], speed: 0.0, input },
+            Some(Spot::Actuator(i)) => Look { t: begins + m.t, position: 0.0, speed: 0.0, input: m.u[i] },
             _ => Look::default(),
         }
     };
@@ -132,7 +134,7 @@ fn looks(here: Option<Spot>, piece: usize, fit: &Fit<'_>, scene: &Scene) -> Vec<
                 let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
                 if b > a { (y[b] - y[a]) / (t[b] - t[a]) } else { 0.0 }
             };
-            (0..y.len()).map(|k| Look { t: t[k], position: y[k], speed: rate(k), input: 0.0 }).collect()
+            (0..y.len()).map(|k| Look { t: begins + t[k], position: y[k], speed: rate(k), input: 0.0 }).collect()
         }
         Some(_) => along.moments.iter().map(moment).collect(),
     }
