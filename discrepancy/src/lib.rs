@@ -5,14 +5,23 @@ mod base;
 mod candidate;
 mod diagnose;
 mod diagnosis;
+mod family;
 mod fit;
+mod gaussian;
+mod held_out;
 mod hygiene;
+mod locate;
+#[cfg(test)]
+mod locate_tests;
 mod repaired;
 mod screen;
 mod search;
 mod subject;
+#[cfg(test)]
+mod testing;
 mod trace_of;
 mod trajectory;
+mod unknown;
 mod variant;
 mod weigh;
 mod windows;
