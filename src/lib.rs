@@ -38,6 +38,7 @@
 //! ```
 
 mod cli;
+mod diagnosis;
 mod report;
 mod solve;
 mod tasks;
@@ -46,6 +47,7 @@ use std::process::ExitCode;
 
 pub use mops_core::*;
 pub use mops_criteria as criteria;
+pub use mops_discrepancy as discrepancy;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface};

@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Problem, Record, Run, SolverChoice, Stop, Study,
-    Watch, conclude,
+    Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Problem, Record, Run,
+    SolverChoice, Stop, Study, Watch, conclude,
 };
+
+use mops_discrepancy::Diagnosis;
 
 use crate::tasks;
 
@@ -19,6 +21,8 @@ pub struct Options {
     pub max_evaluations: usize,
     /// Number of threads; all cores where absent. It changes no bit of the result.
     pub jobs: Option<usize>,
+    /// Effects that a diagnosis may find.
+    pub effects: Vec<Arc<dyn Effect>>,
 }
 
 /// Points a run may evaluate where nothing else is said.
@@ -27,7 +31,7 @@ pub const DEFAULT_EVALUATIONS: usize = 20_000;
 impl Default for Options {
     fn default() -> Self {
         let solver = mops_solvers::kinds().first().expect("there are solvers").default_choice();
-        Self { solver, max_evaluations: DEFAULT_EVALUATIONS, jobs: None }
+        Self { solver, max_evaluations: DEFAULT_EVALUATIONS, jobs: None, effects: mops_models::effects::effects() }
     }
 }
 
@@ -41,15 +45,24 @@ pub struct Solved {
     pub best: Evaluation,
     /// Every point, in the order of evaluation.
     pub archive: Vec<Record>,
+    /// What the model lacks, where that was searched.
+    pub diagnosis: Option<Diagnosis>,
 }
 
-/// The solver cannot treat the problem: why, and what would.
+/// The solver or the task cannot treat the study: why, and what would; with the keys that lead to the place, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unsuitable(pub String);
+pub struct Unsuitable(pub Mistake);
+
+impl From<String> for Unsuitable {
+    fn from(why: String) -> Self {
+        Self(Mistake::here(why))
+    }
+}
 
 impl std::fmt::Display for Unsuitable {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.0.message)?;
+        self.0.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
     }
 }
 
@@ -75,7 +88,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();
-    solver.accepts(problem.shape()).map_err(Unsuitable)?;
+    solver.accepts(problem.shape()).map_err(Unsuitable::from)?;
     let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch);
     let stop = run.solve(solver.as_mut(), &problem.start());
     let pareto = pareto(&run, stop);
@@ -84,7 +97,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     outcome.seconds = begun.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
-    Ok(Solved { outcome, problem, best, archive })
+    Ok(Solved { outcome, problem, best, archive, diagnosis: None })
 }
 
 /// Looks at the start values alone, and concludes.
@@ -105,7 +118,7 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
     outcome.seconds = begun.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
-    Solved { outcome, problem, best, archive }
+    Solved { outcome, problem, best, archive, diagnosis: None }
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.

@@ -15,3 +15,18 @@ fn a_study_in_rust_finds_the_best_compromise() {
     let best = grid.fold(f64::INFINITY, f64::min);
     assert!(outcome.worst_scaled <= best * 1.001, "{} {best}", outcome.worst_scaled);
 }
+
+#[path = "../examples/repaired.rs"]
+mod repaired;
+
+#[test]
+fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
+    let study = repaired::study().unwrap();
+    assert_eq!((study.name.as_str(), study.task), ("furuta-swing-repaired", mops::Task::Calibration));
+    // Start values are those found, the term that is not needed is no tuner, experiments and criteria are the user's.
+    let start = |name: &str| study.tuners.iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
+    assert_eq!((start("b"), start("bp"), start("ca")), (Some(1.133e-3), None, Some(5e-4)));
+    let keys: Vec<String> = study.rows.iter().map(|row| study.key(row)).collect();
+    assert_eq!(keys, ["horizontal/phi", "horizontal/theta", "upright/phi", "upright/theta"]);
+    assert_eq!(study.cases[1].role(), mops::Role::Validation);
+}

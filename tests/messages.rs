@@ -710,3 +710,44 @@ fn a_study_written_on_windows_is_read_and_pointed_into() {
     let marked = Case::new("a byte order mark", &format!("\u{feff}{}", broken(DESIGN, "name = \"loop\"", "name = 7")));
     assert!(marked.message().contains("[study.toml:2:8]"), "{}", marked.message());
 }
+
+/// The calibration as a diagnosis, with this in its table, called as one.
+fn diagnosis(what: &'static str, table: &str) -> Case {
+    let study = format!("{}\n[diagnosis]\n{table}\n", broken(CALIBRATION, "\"calibration\"", "\"diagnosis\""));
+    Case::new(what, &study).with("swing.csv", RECORDING)
+}
+
+#[test]
+fn a_diagnosis_that_cannot_be_made() {
+    let diagnose: &[&str] = &["diagnose", "study.toml", "--out", "out"];
+    check(
+        "diagnosis",
+        &[
+            diagnosis("an unknown effect", "effects = [\"viscous-friction\", \"coulomb-frction\"]"),
+            diagnosis("an unknown effect that is left out", "without = [\"viscos-friction\"]"),
+            diagnosis(
+                "an effect that is named and left out",
+                "effects = [\"coulomb-friction\"]\nwithout = [\"coulomb-friction\"]",
+            ),
+            diagnosis("no effect to try", "effects = []"),
+            diagnosis("no effect to add", "max-effects = 0"),
+            diagnosis("a certain false alarm", "level = 1.0"),
+            diagnosis("a misspelt key", "max-efects = 2"),
+            Case::new("a design, which has no measurement", DESIGN).called(diagnose),
+            calibration("only validation data", "free     =", "role     = \"validation\"\nfree     =").called(diagnose),
+            calibration("an experiment without a channel", "channels = {", "channels = {}\n# {").called(diagnose),
+            calibration("an export without a diagnosis", "9e-4", "9.1e-4").called(&[
+                "run",
+                "study.toml",
+                "--export",
+                "rust",
+            ]),
+            calibration("an export to an unknown language", "9e-4", "9.1e-4").called(&[
+                "diagnose",
+                "study.toml",
+                "--export",
+                "python",
+            ]),
+        ],
+    );
+}

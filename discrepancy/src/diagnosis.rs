@@ -52,6 +52,10 @@ pub struct Found {
     pub effect: String,
     /// The place, as `kind:name`.
     pub place: String,
+    /// Its name in the repaired model, such as `phi-coulomb-friction`: its strengths are the parameters `name.strength`.
+    pub name: String,
+    /// The second place of an effect that needs one, such as where cross-talk comes from, as `kind:name`.
+    pub companion: Option<String>,
     /// Its class, such as `dissipative`.
     pub class: String,
     /// Its formula, for people.

@@ -95,7 +95,8 @@ impl Port {
 ///
 /// `output` is what the effect adds: a force, torque or flow in the equation, the unit of the input at an actuator, of the
 /// signal at a sensor. `position` and `speed` are those of the joint (at a process: of the state and its rate), `value` that
-/// of the input or signal, `time` is s.
+/// of the input or signal, `time` is s. Of a companion are the position and speed at an actuator or sensor, and the value at
+/// a joint or process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
     /// Power of what it adds.
@@ -283,7 +284,7 @@ pub struct At<'a, S> {
     pub a: S,
     /// What a unit force adds to the acceleration, likewise.
     pub mobility: S,
-    /// At the companion: the position of a joint, a state, a signal; 0 without one.
+    /// At the companion: the position of a joint, a state, an input, a signal; 0 without one.
     pub other: S,
     /// The speed of the companion, if it is a joint.
     pub other_speed: S,
@@ -332,8 +333,8 @@ pub trait Acting<S: Scalar> {
         f64::INFINITY
     }
 
-    /// Moves what is remembered from one moment to the next ([`Effect::memory`]): at an actuator whenever the command jumps or
-    /// changes its slope, at a sensor along the simulation.
+    /// Moves what is remembered from one moment to the next ([`Effect::memory`]), NaN before the first: at an actuator
+    /// whenever the command jumps or changes its slope, before and after it, at a sensor along the simulation.
     fn remember(&self, _at: &At<'_, S>, _memory: &mut [S]) {}
 
     /// As [`Acting::value`] for an effect that remembers.

@@ -64,9 +64,9 @@ pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
-    Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, Draft, ExcitationDraft, ExcitationTask, Free, JobPlan,
-    Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask, Row,
-    SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
+    Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, DiagnosisTask, Draft, ExcitationDraft, ExcitationTask,
+    Free, JobPlan, Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask,
+    Row, SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};

@@ -87,6 +87,9 @@ pub struct Findings {
     /// The objective over one tuner or two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,
+    /// What the model lacks, as the search for it writes it down.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diagnosis: Option<Value>,
 }
 
 /// How rich inputs are, and what regressions make of them.

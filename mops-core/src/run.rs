@@ -26,6 +26,10 @@ pub trait Watch: Sync {
 
     /// New points were evaluated.
     fn evaluated(&self, _state: &State) {}
+
+    /// Something that goes in stages, and counts no points, is in this one, such as `screening 412 candidates`; `done` is
+    /// the share of the whole that lies behind it, from 0 to 1.
+    fn stage(&self, _what: &str, _done: f64) {}
 }
 
 /// Nobody looks on.

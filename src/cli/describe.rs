@@ -6,13 +6,13 @@ use clap::Args;
 use mops_core::{Catalogue, Diagnostic, ModelKind, suggestion};
 
 use super::places::places;
-use super::{Trouble, print};
+use super::{Trouble, effects, print};
 
 /// What is described.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, a shipped study, a table of study files (study, models, tuners, cases,
-    /// experiments, criteria, solver), or a key of one, such as `step` or `hold`.
+    /// A kind of model, criterion or solver, an effect, a shipped study, a table of study files (study, models, tuners,
+    /// cases, experiments, criteria, solver, diagnosis), or a key of one, such as `step` or `hold`.
     name: String,
 }
 
@@ -33,6 +33,10 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&(mops_core::file::describe(name, &schema()) + &places));
         return Ok(ExitCode::SUCCESS);
     }
+    if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {
+        print(&effects::page(effect.as_ref()));
+        return Ok(ExitCode::SUCCESS);
+    }
     if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
         let file = |path| study.file(path).map(String::from_utf8_lossy).unwrap_or_default();
         print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")));
@@ -51,6 +55,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let known: Vec<&str> = kinds
         .by_ref()
         .map(|(name, _)| name)
+        .chain(catalogue.effects.iter().map(|effect| effect.name()))
         .chain(catalogue.studies.iter().map(|s| s.name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();

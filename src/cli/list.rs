@@ -20,16 +20,18 @@ pub(super) fn list(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
     let models = catalogue.models.iter().map(|k| row(k.name, first_line((k.schema)())));
     let criteria = catalogue.criteria.iter().map(|k| row(k.name, first_line((k.schema)())));
     let solvers = catalogue.solvers.iter().map(|k| row(k.name, first_line((k.schema)())));
+    let effects = catalogue.effects.iter().map(|effect| row(effect.name(), first_statement(effect.about())));
     let text = [
         ("studies (mops run NAME)", studies.collect()),
         ("models", models.collect()),
         ("criteria", criteria.collect()),
         ("solvers", solvers.collect::<Vec<_>>()),
+        ("effects that a model may lack (mops diagnose STUDY)", effects.collect()),
     ]
     .map(|(title, rows)| table(&[title, ""], &[], rows))
     .join("\n");
     print(&format!(
-        "{text}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver.\n"
+        "{text}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver, diagnosis.\n"
     ));
     Ok(ExitCode::SUCCESS)
 }

@@ -3,6 +3,9 @@
 mod check;
 mod data;
 mod describe;
+mod diagnose;
+mod diagnosis;
+mod effects;
 mod families;
 mod findings;
 mod linear_plots;
@@ -11,6 +14,7 @@ mod list;
 mod new;
 mod places;
 mod progress;
+mod remains;
 mod run;
 mod schema;
 mod simulate;
@@ -51,9 +55,11 @@ struct Arguments {
 enum Command {
     /// Solve a study and write result.json, report.html, plots and evaluations.
     Run(run::Arguments),
+    /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
+    Diagnose(diagnose::Arguments),
     /// Check a study and its data without running anything.
     Check(check::Arguments),
-    /// List the kinds of model, criterion and solver, and the shipped studies.
+    /// List the kinds of model, criterion and solver, the effects a model may lack, and the shipped studies.
     List,
     /// Describe a kind, a shipped study, or a signal list of a model: formula, options, units, source.
     Describe(describe::Arguments),
@@ -102,6 +108,7 @@ fn print(text: &str) {
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
+        Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
         Command::List => list::list(catalogue),
         Command::Describe(arguments) => describe::describe(catalogue, &arguments),

@@ -10,6 +10,8 @@ use mops_core::{RunState, Watch};
 pub(super) struct Progress {
     bar: ProgressBar,
     interrupted: Arc<AtomicBool>,
+    /// Whether the bar shows stages instead of points.
+    staged: AtomicBool,
 }
 
 impl Progress {
@@ -28,7 +30,7 @@ impl Progress {
             }
             eprintln!("interrupted: writing the best point so far; again to end at once");
         });
-        Self { bar, interrupted }
+        Self { bar, interrupted, staged: AtomicBool::new(false) }
     }
 
     /// Takes the bar away.
@@ -51,5 +53,17 @@ impl Watch for Progress {
             format!(", violated by {:.3e}", state.best.violation)
         };
         self.bar.set_message(format!("best {:.6}{violation}{failed}", state.best.objective));
+    }
+
+    fn stage(&self, what: &str, done: f64) {
+        // Stages are no points: the bar shows their share of the whole, in thousandths.
+        if !self.staged.swap(true, Ordering::Relaxed) {
+            let style = "{bar:30} {percent:>3} %, {elapsed} so far, {msg}";
+            self.bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
+            self.bar.set_length(1000);
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
+        self.bar.set_message(what.to_owned());
     }
 }

@@ -4,19 +4,24 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Place, Study, Task, suggestion};
+use mops_core::{Catalogue, Diagnostic, Mistake, Place, Study, Task, suggestion};
 
 use super::progress::Progress;
-use super::study::{StudyArguments, open};
-use super::{Trouble, cannot_write, findings, print, tables};
+use super::remains::leave;
+use super::study::{StudyArguments, home, open, open_as};
+use super::{Trouble, cannot_write, diagnosis, findings, print, tables};
+use crate::diagnosis::Original;
 use crate::report::Report;
 use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solve};
 
-/// What can be said to a run.
+/// What `mops diagnose` sets.
+const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
+
+/// What can be said to every run.
 #[derive(Args)]
-pub(super) struct Arguments {
+pub(super) struct Common {
     #[command(flatten)]
     study: StudyArguments,
     /// Folder for the result; results/<study> where absent.
@@ -28,27 +33,72 @@ pub(super) struct Arguments {
     /// Number of threads; all cores where absent. The result is the same, bit for bit.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Kind of solver, with its default options, instead of the study's.
-    #[arg(long)]
-    solver: Option<String>,
-    /// Largest number of points evaluated.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
-    max_evaluations: Option<u64>,
     /// Say nothing but errors.
     #[arg(long)]
     quiet: bool,
     /// Print result.json on standard output, and nothing else.
     #[arg(long)]
     json: bool,
+    /// Of a diagnosis: write the repaired model as source too, repaired.rs.
+    #[arg(long, value_name = "LANGUAGE")]
+    export: Option<Language>,
+}
+
+/// A language that a repaired model is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Language {
+    /// A program that builds and solves the repaired study.
+    Rust,
+}
+
+/// What can be said to a run.
+#[derive(Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// Kind of solver, with its default options, instead of the study's.
+    #[arg(long)]
+    solver: Option<String>,
+    /// Largest number of points evaluated.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    max_evaluations: Option<u64>,
+}
+
+/// What is done with the study.
+pub(super) enum Search<'a> {
+    /// What it is for, with this solver and budget where they are given.
+    Task { solver: Option<&'a str>, max_evaluations: Option<u64> },
+    /// What its model lacks.
+    Diagnosis,
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let StudyFile { mut study, solver, max_evaluations, source } = open(catalogue, &arguments.study)?;
-    if let Some(seed) = arguments.seed {
-        study.seed = seed;
+    let Arguments { common, solver, max_evaluations } = arguments;
+    go(catalogue, common, &Search::Task { solver: solver.as_deref(), max_evaluations: *max_evaluations })
+}
+
+/// Runs the study and leaves the result behind.
+pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, Trouble> {
+    let mut file = match search {
+        Search::Task { .. } => open(catalogue, &arguments.study)?,
+        Search::Diagnosis => open_as(catalogue, &arguments.study, Some(DIAGNOSIS))?,
+    };
+    if arguments.export.is_some() && file.study.task != Task::Diagnosis {
+        return Err(Diagnostic::new(
+            "`--export` writes the repaired model of a diagnosis, and this study is for something else",
+        )
+        .with_help("call `mops diagnose`, or leave `--export` out")
+        .into());
     }
-    let solver = match &arguments.solver {
-        None => solver,
+    if let Some(seed) = arguments.seed {
+        file.study.seed = seed;
+    }
+    let (chosen, limit) = match search {
+        Search::Task { solver, max_evaluations } => (*solver, *max_evaluations),
+        Search::Diagnosis => (None, None),
+    };
+    let solver = match chosen {
+        None => file.solver.clone(),
         Some(name) => {
             let names = catalogue.solvers.iter().map(|kind| kind.name);
             let kind = catalogue
@@ -59,32 +109,41 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             kind.default_choice()
         }
     };
-    let limit = arguments.max_evaluations.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+    let limit = limit.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let options = Options {
         solver,
-        max_evaluations: limit.or(max_evaluations).unwrap_or(DEFAULT_EVALUATIONS),
+        max_evaluations: limit.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS),
         jobs: arguments.jobs.map(usize::from),
+        effects: catalogue.effects.clone(),
     };
     let talks = !arguments.quiet && !arguments.json;
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(&study.name));
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(&file.study.name));
     let progress = Progress::new(talks, options.max_evaluations);
     if talks {
-        for warning in &study.warnings {
+        for warning in &file.study.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
         }
-        print(&introduction(&study, &options));
+        print(&introduction(&file.study, &options));
     }
-    let solved = solve(study, &options, &progress).map_err(|why| Diagnostic::new(why.0))?;
+    let solved = solve(file.study.clone(), &options, &progress).map_err(|why| refused(&why.0, &file))?;
     progress.finish();
 
     let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
-    write(&folder, &json, &solved, &source.text)?;
+    write(&folder, &json, &solved, &file.source.text)?;
+    if let Some(diagnosis) = &solved.diagnosis {
+        let text = without_settings(&file.source.text, &arguments.study.settings, search);
+        let (settings, study) = (&arguments.study.settings, solved.problem.study());
+        let original = Original { text, settings, study, effects: &catalogue.effects };
+        leave(&folder, diagnosis, &original, &home(catalogue, &arguments.study), arguments.export.is_some())?;
+    }
     if arguments.json {
         print(&json);
     } else if talks {
-        // Of inputs alone there are no criteria to show.
-        if solved.outcome.task != Task::Excitation {
-            print(&tables::outcome(&solved.outcome));
+        match &solved.diagnosis {
+            Some(found) => print(&diagnosis::text(found, solved.outcome.seconds)),
+            // Of inputs alone there are no criteria to show.
+            None if solved.outcome.task == Task::Excitation => {}
+            None => print(&tables::outcome(&solved.outcome)),
         }
         print(&findings::text(&solved.outcome));
         print(&format!("\nresult, report and plots are in {}\n", folder.display()));
@@ -99,8 +158,33 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
+/// A study that cannot be treated; the place is shown where there is one.
+fn refused(why: &Mistake, file: &StudyFile) -> Diagnostic {
+    if why.path.is_empty() {
+        Diagnostic { help: why.help.clone(), ..Diagnostic::new(why.message.clone()) }
+    } else {
+        file.locate(why)
+    }
+}
+
+/// The text of a study file as it was before the settings of the command line were put at its end.
+fn without_settings<'t>(text: &'t str, settings: &[String], search: &Search<'_>) -> &'t str {
+    let extra = matches!(search, Search::Diagnosis).then_some(DIAGNOSIS);
+    let all: String =
+        settings.iter().map(String::as_str).chain(extra).map(|setting| format!("# --set {setting}\n")).collect();
+    text.strip_suffix(all.as_str()).unwrap_or(text)
+}
+
 fn introduction(study: &Study, options: &Options) -> String {
     let active = study.tuners.iter().filter(|t| t.active).count();
+    if study.task == Task::Diagnosis {
+        let experiments = study.cases.iter().filter_map(|case| case.experiment.as_ref());
+        let (count, channels) = experiments.fold((0, 0), |(n, m), e| (n + 1, m + e.channels.len()));
+        let model = &study.name;
+        return format!(
+            "{model}: {active} tuners, {count} experiments with {channels} channels; looking for what the model lacks\n"
+        );
+    }
     format!(
         "{}: {} tuners, {} criteria over {} cases, solver {}\n",
         study.name,
@@ -115,7 +199,7 @@ fn introduction(study: &Study, options: &Options) -> String {
 fn solves(study: &Study) -> bool {
     match study.task {
         Task::Design | Task::Calibration => true,
-        Task::Excitation => false,
+        Task::Excitation | Task::Diagnosis => false,
         Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
         Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
     }
@@ -128,8 +212,10 @@ fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), T
     std::fs::write(&result, json).map_err(cannot_write(&result))?;
     let evaluations = folder.join("evaluations.csv");
     write_evaluations(&evaluations, solved).map_err(|e| cannot_write(&evaluations)(std::io::Error::other(e)))?;
-    let Solved { outcome, problem, best, archive } = solved;
-    Report { outcome, problem, best, archive, text }.write(folder).map_err(cannot_write(folder))
+    let Solved { outcome, problem, best, archive, diagnosis } = solved;
+    Report { outcome, problem, best, archive, diagnosis: diagnosis.as_ref(), text }
+        .write(folder)
+        .map_err(cannot_write(folder))
 }
 
 /// One line per point: tuners, criteria, objective, violation.

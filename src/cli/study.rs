@@ -44,18 +44,46 @@ impl Files for Inside {
     }
 }
 
+/// Where a study and its data are.
+pub(super) enum Home {
+    /// In a file; data are in its folder.
+    File(PathBuf),
+    /// In the program.
+    Shipped(Shipped),
+}
+
+/// Where the study is; a folder stands for the study in it.
+pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
+    let path = Path::new(&arguments.study);
+    match catalogue.studies.iter().find(|s| s.name == arguments.study) {
+        Some(shipped) if !path.is_file() => Home::Shipped(*shipped),
+        _ if path.is_dir() => Home::File(path.join("study.toml")),
+        _ => Home::File(path.to_owned()),
+    }
+}
+
 /// Reads and checks a study.
 pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<StudyFile, Diagnostic> {
+    open_as(catalogue, arguments, None)
+}
+
+/// The same with one more setting.
+pub(super) fn open_as(
+    catalogue: &Catalogue,
+    arguments: &StudyArguments,
+    setting: Option<&str>,
+) -> Result<StudyFile, Diagnostic> {
     let StudyArguments { study, settings } = arguments;
-    let path = Path::new(study);
-    let shipped = catalogue.studies.iter().find(|s| s.name == study);
-    if let (Some(shipped), false) = (shipped, path.is_file()) {
-        let text = shipped.file("study.toml").expect("every shipped study has one");
-        let text = std::str::from_utf8(text).expect("shipped studies are text");
-        return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &Inside(*shipped));
-    }
-    // A folder stands for the study in it.
-    let path = if path.is_dir() { path.join("study.toml") } else { path.to_owned() };
+    let settings: Vec<String> = settings.iter().cloned().chain(setting.map(str::to_owned)).collect();
+    let settings = settings.as_slice();
+    let path = match home(catalogue, arguments) {
+        Home::File(path) => path,
+        Home::Shipped(shipped) => {
+            let text = shipped.file("study.toml").expect("every shipped study has one");
+            let text = std::str::from_utf8(text).expect("shipped studies are text");
+            return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &Inside(shipped));
+        }
+    };
     let bytes = std::fs::read(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();

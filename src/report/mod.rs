@@ -8,6 +8,7 @@ mod comparison;
 mod contour;
 mod convergence;
 mod criteria;
+mod diagnosis;
 mod excitation;
 mod figures;
 mod legend;
@@ -32,9 +33,10 @@ use std::io;
 use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
+use mops_discrepancy::Diagnosis;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
-pub(crate) use numbers::{file_name, significant};
+pub(crate) use numbers::{FileNames, file_name, significant};
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
@@ -49,6 +51,8 @@ pub struct Report<'a> {
     pub best: &'a Evaluation,
     /// All points, in the order of their evaluation; the first is the start.
     pub archive: &'a [Record],
+    /// What the model lacks, where that was searched.
+    pub diagnosis: Option<&'a Diagnosis>,
     /// The study file with its settings.
     pub text: &'a str,
 }
@@ -69,10 +73,12 @@ impl Report<'_> {
             None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
-        let pictures = page::Pictures { responses, left_out, convergence, sweep, excitation };
+        let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
+        let pictures = page::Pictures { responses, left_out, convergence, sweep, excitation, diagnosis };
         let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation];
         let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
-        let mut names = numbers::FileNames::default();
+        let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
+        let mut names = FileNames::default();
         for (name, plot) in groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots) {
             let name = names.unique(name);
             fs::write(plots.join(format!("{name}.svg")), plot.svg())?;
@@ -86,7 +92,7 @@ impl Report<'_> {
         match self.outcome.task {
             Task::Design | Task::Calibration => true,
             Task::Sensitivity => self.archive.len() > 1,
-            Task::Excitation | Task::Sweep => false,
+            Task::Excitation | Task::Sweep | Task::Diagnosis => false,
         }
     }
 

@@ -70,13 +70,13 @@ pub(crate) fn file_name(name: &str) -> String {
 
 /// Hands out file names, each only once, also where the file system ignores case.
 #[derive(Debug, Default)]
-pub(super) struct FileNames {
+pub(crate) struct FileNames {
     taken: Vec<String>,
 }
 
 impl FileNames {
     /// A safe file name for `name` that was not handed out before.
-    pub(super) fn unique(&mut self, name: &str) -> String {
+    pub(crate) fn unique(&mut self, name: &str) -> String {
         let safe = file_name(name);
         let candidates = (1..).map(|i| if i == 1 { safe.clone() } else { format!("{safe}-{i}") });
         let free = |candidate: &String| !self.taken.contains(&candidate.to_lowercase());

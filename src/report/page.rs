@@ -7,7 +7,7 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::numbers::significant;
 use super::verdict::{self, Tone};
-use super::{calibration, criteria, excitation, sensitivity, tuners};
+use super::{calibration, criteria, diagnosis, excitation, sensitivity, tuners};
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {
@@ -17,6 +17,7 @@ pub(super) struct Pictures {
     pub(super) convergence: Option<Group>,
     pub(super) sweep: Option<Group>,
     pub(super) excitation: Option<Group>,
+    pub(super) diagnosis: Option<diagnosis::Pictures>,
 }
 
 /// The whole page.
@@ -40,6 +41,9 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     @if !warnings.is_empty() {
                         (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
                     }
+                    @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
+                        (diagnosis::sections(found, pictures))
+                    }
                     @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
                     @if let Some(found) = &outcome.found.sensitivity {
                         (section(sensitivity::title(found), sensitivity::section(found)))
@@ -51,7 +55,7 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                         }))
                     }
                     @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
-                    @if !outcome.tuners.is_empty() { (section("Tuners", tuners::table(report))) }
+                    @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
                     @if !pictures.responses.is_empty() {
                         (section("Responses", html! {
                             @if let Some(text) = &pictures.left_out { p { (text) } }
@@ -98,7 +102,7 @@ pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
     html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
 }
 
-fn section(title: &str, content: Markup) -> Markup {
+pub(super) fn section(title: &str, content: Markup) -> Markup {
     let id = title.to_lowercase().replace(' ', "-");
     html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (content) } }
 }
@@ -117,16 +121,20 @@ fn header(report: &Report<'_>) -> Markup {
             h1 { (outcome.study) }
             p class=(class) { (rich(&sentence)) }
             dl {
-                (fact("Solver", &outcome.solver))
-                (fact("Evaluations", &outcome.evaluations.to_string()))
+                @if let Some(found) = report.diagnosis {
+                    @for (name, value) in diagnosis::facts(found) { (fact(name, &value)) }
+                } @else {
+                    (fact("Solver", &outcome.solver))
+                    (fact("Evaluations", &outcome.evaluations.to_string()))
+                }
                 (fact("Simulations", &outcome.simulations.to_string()))
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
                 (fact("Seed", &outcome.seed.to_string()))
             }
-            dl class="long" {
+            @if report.diagnosis.is_none() { dl class="long" {
                 (fact("Stopped", verdict::stop(outcome)))
                 @if outcome.task == Task::Design { (fact("Pareto", verdict::pareto(outcome.pareto))) }
-            }
+            } }
         }
     }
 }
@@ -142,10 +150,11 @@ fn task(task: Task) -> &'static str {
         Task::Excitation => "Excitation",
         Task::Sensitivity => "Sensitivity",
         Task::Sweep => "Sweep",
+        Task::Diagnosis => "Diagnosis",
     }
 }
 
-fn figures(group: &Group) -> Markup {
+pub(super) fn figures(group: &Group) -> Markup {
     html! {
         @if !group.title.is_empty() { h3 { (rich(&group.title)) } }
         @for sentence in &group.about { p { (rich(sentence)) } }

@@ -27,7 +27,7 @@ pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
 }
 
 /// Of points with increasing x, those that can be seen. Source (M4): U. Jugel et al., PVLDB 7 (2014) 797-808.
-fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
     let (start, width) = (first.0, (last.0 - first.0) / COLUMNS);
     if points.len() as f64 <= 4.0 * COLUMNS || width <= 0.0 {

@@ -16,6 +16,9 @@ pub(super) enum Tone {
 /// The verdict, and how good it is.
 pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     let outcome = report.outcome;
+    if let Some(found) = report.diagnosis {
+        return super::diagnosis::verdict(found);
+    }
     if outcome.task == Task::Excitation {
         return excitation(outcome);
     }
@@ -46,6 +49,7 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
             Some(words) => (Tone::Good, words.clone()),
             None => (Tone::Bad, "Nothing was swept.".to_owned()),
         },
+        Task::Diagnosis => (Tone::Bad, "Nothing was diagnosed.".to_owned()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a study can be for: a line for every task, and a file for each that is more than a search.
 
+pub(crate) mod diagnosis;
 mod excitation;
 mod sensitivity;
 mod sweep;
@@ -18,6 +19,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::Excitation => Ok(excitation::perform(study, options, watch)),
         Task::Sensitivity => sensitivity::perform(study, options, watch),
         Task::Sweep => sweep::perform(study, options, watch),
+        Task::Diagnosis => diagnosis::perform(study, options, watch),
     }
 }
 

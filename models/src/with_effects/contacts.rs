@@ -10,7 +10,7 @@ use super::dynamics::Driven;
 use crate::kernel::friction::Contact;
 
 /// The joints with dry friction.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Contacts {
     joints: Vec<Joint>,
 }

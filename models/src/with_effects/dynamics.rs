@@ -21,8 +21,15 @@ pub(super) struct Actor<S> {
 }
 
 impl WithEffects {
-    /// The effects of these indices; their states stand behind the `own` of the plant.
-    pub(super) fn actors<S: Opening>(&self, acting: &[usize], own: usize, parameters: &[S]) -> Vec<Actor<S>> {
+    /// The plant with the effects of these indices.
+    pub(super) fn driven<'a, S: Opening>(
+        &self,
+        plant: Box<dyn Plant<S> + 'a>,
+        acting: &[usize],
+        job: &Job<'a>,
+        parameters: &[S],
+    ) -> Driven<'a, S> {
+        let own = self.model.equation_states().len();
         let mut states = own;
         let actor = |&index: &usize| {
             let (effect, place) = (&self.placements[index].effect, self.places[index]);
@@ -37,7 +44,8 @@ impl WithEffects {
                 inertial: effect.is_inertial(),
             }
         };
-        acting.iter().map(actor).collect()
+        let actors = acting.iter().map(actor).collect();
+        Driven::new(self.model.interface(), own, plant, actors, job)
     }
 }
 
@@ -84,13 +92,15 @@ pub(super) struct Driven<'a, S> {
     scratch: RefCell<Scratch<S>>,
     /// For each force the sign with which a positive one acts forward.
     forward: Vec<f64>,
+    /// Forces from outside; none but where the equations are looked at.
+    further: Vec<S>,
 }
 
-/// Inputs, forces and rates of the moment.
-#[derive(Debug, Default)]
+/// Inputs and forces of the moment.
 struct Scratch<S> {
     u: Vec<S>,
     w: Vec<S>,
+    dx: Vec<S>,
 }
 
 impl<'a, S: Opening> Driven<'a, S> {
@@ -123,8 +133,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             breaks,
             longest_step: longest,
             started: false,
-            scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new() }),
+            scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
+            further: Vec::new(),
         }
     }
 
@@ -221,6 +232,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     /// Forces of the effects but those in proportion to the acceleration, and but friction that holds a joint.
     fn forces(&self, t: f64, x: &[S], u: &[S], w: &mut Vec<S>) {
         w.clear();
+        w.extend_from_slice(&self.further);
         w.resize(self.forces, S::from(0.0));
         for (index, actor) in self.actors.iter().enumerate() {
             let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = actor.place.site else { continue };
@@ -236,6 +248,42 @@ impl<'a, S: Opening> Driven<'a, S> {
                 w[k] -= against * (direction * self.forward[k]);
             }
         }
+    }
+
+    /// Number of states, those of the effects included.
+    pub(super) fn size(&self) -> usize {
+        self.actors.last().map_or(self.own, |actor| actor.z.0 + actor.z.1)
+    }
+
+    /// The inputs as they are commanded, delays included.
+    pub(super) fn commanded(&self, t: f64) -> Vec<S> {
+        self.commands.iter().map(|command| command.at(t)).collect()
+    }
+
+    /// Takes the contacts and memories of another simulation.
+    pub(super) fn take(&mut self, contacts: &Contacts, memories: &[Vec<f64>]) {
+        self.contacts = contacts.clone();
+        for (actor, memory) in self.actors.iter_mut().zip(memories) {
+            actor.memory = memory.iter().map(|&m| S::from(m)).collect();
+        }
+    }
+
+    /// Holds the commands.
+    pub(super) fn command(&mut self, drives: impl Iterator<Item = Drive<'a, S>>) {
+        self.commands = drives.map(|drive| Command { drive, delay: None }).collect();
+    }
+
+    /// Rates of all states and values of signals, with `further` forces at the ports.
+    pub(super) fn look(&mut self, t: f64, x: &[S], further: &[S], signals: &[usize]) -> (Vec<S>, Vec<S>) {
+        self.further = further.to_vec();
+        let x = x.to_vec();
+        let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); x.len()]);
+        self.balance(t, &x, &mut u, &mut w, &mut dx[..self.own]);
+        self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+        self.derivative(t, &x, &mut dx);
+        let outputs = signals.iter().map(|&signal| self.signal(signal, t, &x)).collect();
+        self.further.clear();
+        (dx, outputs)
     }
 
     /// The sign with which a force acts forward.
@@ -283,19 +331,28 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// The value of a signal as it is measured; what is remembered comes in later.
     pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
-        let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
-        let mut dx = vec![S::from(0.0); self.own];
-        // Outputs may contain rates: the forces count.
-        self.balance(t, x, u, w, &mut dx);
-        let mut value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        for actor in &self.actors {
-            if matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty() {
-                let at = self.at(actor, t, x, u, value);
-                value = actor.acting.value(&at, self.states(actor, x));
+        let here = |actor: &&Actor<S>| {
+            matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
+        };
+        let simple = |actor: &Actor<S>| actor.place.companion.is_none();
+        if let Some(state) = self.plant.shows(signal) {
+            if self.actors.iter().filter(here).all(simple) {
+                let see = |value: S, actor: &Actor<S>| {
+                    actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
+                };
+                return self.actors.iter().filter(here).fold(x[state], see);
             }
         }
-        value
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w, dx, .. } = &mut *scratch;
+        dx.resize(self.own, S::from(0.0));
+        // Outputs may contain rates: the forces count.
+        self.balance(t, x, u, w, dx);
+        let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
+        self.actors
+            .iter()
+            .filter(here)
+            .fold(value, |value, actor| actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x)))
     }
 
     /// Moves what actuators remember to the command of the moment.
@@ -345,7 +402,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn derivative(&self, t: f64, x: &Vec<S>, dx: &mut Vec<S>) {
         let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
+        let Scratch { u, w, .. } = &mut *scratch;
         let (own, further) = dx.split_at_mut(self.own);
         self.balance(t, x, u, w, own);
         for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
@@ -366,13 +423,13 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> S {
         let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w } = &mut *scratch;
+        let Scratch { u, w, dx } = &mut *scratch;
         let own = self.plant.guards();
         if index >= own {
             return self.contact_guard(index - own, t, x, u, w);
         }
-        let mut dx = vec![S::from(0.0); self.own];
-        self.balance(t, x, u, w, &mut dx);
+        dx.resize(self.own, S::from(0.0));
+        self.balance(t, x, u, w, dx);
         self.plant.guard(index, &Instant { t, x: &x[..self.own], u, w })
     }
 
@@ -401,6 +458,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+        // What is remembered is moved up to the break, and across it.
+        if self.started {
+            self.remember(t, x);
+        }
         self.pass(t, x);
         self.remember(t, x);
         let (mut u, mut w) = (Vec::new(), Vec::new());

@@ -1,5 +1,6 @@
 //! A model with effects at its ports: itself a model, whose parameters are those of the model and the strengths.
 
+mod along;
 mod contacts;
 mod dynamics;
 mod own;
@@ -13,6 +14,7 @@ use mops_core::{
 };
 
 use crate::kernel::{self, Recording, Tolerance, record, wanted};
+pub use along::Moment;
 use dynamics::Driven;
 pub use own::{Own, OwnModel};
 
@@ -72,7 +74,7 @@ impl WithEffects {
             for strength in effect.strengths() {
                 let variable = Variable {
                     name: format!("{name}.{}", strength.name),
-                    unit: unit(strength.dimension, &placement.port, of),
+                    unit: unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
                     about: strength.about.to_owned(),
                 };
                 if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
@@ -133,9 +135,7 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let own = self.model.equation_states().len();
-        let actors = self.actors(&acting, own, parameters);
-        let mut dynamics = Driven::new(self.model.interface(), own, plant, actors, job);
+        let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
@@ -225,16 +225,26 @@ impl Site {
 }
 
 /// The unit of a strength at a port, where the model tells it.
-fn unit(dimension: Dimension, port: &Port, interface: &Interface) -> Unit {
+fn unit(dimension: Dimension, port: &Port, companion: Option<&Port>, interface: &Interface) -> Unit {
     let of = |name: &str| {
         let all = interface.signals.iter().chain(&interface.inputs);
         all.into_iter().find(|v| v.name == name).map_or_else(Unit::one, |v| v.unit.clone())
     };
-    let (output, position, speed, value) = match port {
-        Port::Joint { position, velocity, unit, .. } => (unit.clone(), of(position), of(velocity), Unit::one()),
-        Port::Process { state, unit, .. } => (unit.clone(), of(state), of(state).power(1, -1), Unit::one()),
-        Port::Actuator { input } => (Some(of(input)), of(input), of(input).power(1, -1), of(input)),
-        Port::Sensor { output } => (Some(of(output)), of(output), of(output).power(1, -1), of(output)),
+    let position_and_speed = |port: &Port| match port {
+        Port::Joint { position, velocity, .. } => (of(position), of(velocity)),
+        Port::Process { state: name, .. } | Port::Actuator { input: name } | Port::Sensor { output: name } => {
+            (of(name), of(name).power(1, -1))
+        }
+    };
+    let (output, place) = match port {
+        Port::Joint { unit, .. } | Port::Process { unit, .. } => (unit.clone(), port),
+        Port::Actuator { input: name } | Port::Sensor { output: name } => (Some(of(name)), companion.unwrap_or(port)),
+    };
+    let (position, speed) = position_and_speed(place);
+    let value = match (port, companion) {
+        (Port::Joint { .. } | Port::Process { .. }, None) => Unit::one(),
+        (Port::Joint { .. } | Port::Process { .. }, Some(companion)) => position_and_speed(companion).0,
+        _ => position_and_speed(port).0,
     };
     let output = output.unwrap_or_else(Unit::one);
     let powers = [

@@ -5,6 +5,7 @@ mod effects;
 mod entries;
 mod experiment;
 mod frequency;
+mod parts;
 mod schema;
 mod sections;
 mod shape;
@@ -16,6 +17,7 @@ use std::io;
 use std::sync::Arc;
 
 pub use entries::{Entries, Short};
+pub use parts::{case, criterion, experiment, model};
 pub use schema::{describe, schema_of, study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
@@ -25,7 +27,7 @@ use crate::experiment::Input;
 use crate::expression::Expression;
 use crate::linearised::Linearised;
 use crate::model::{AnalysisKind, Interface};
-use crate::study::{CaseDraft, CriterionDraft, Draft, ModelDraft, Study, TunerDraft};
+use crate::study::{CaseDraft, CriterionDraft, Draft, Mistake, ModelDraft, Study, TunerDraft};
 use crate::unit::{Quantity, Unit};
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
@@ -52,6 +54,17 @@ pub struct StudyFile {
     pub max_evaluations: Option<usize>,
     /// Its text, with the settings of the command line at the end.
     pub source: Arc<Source>,
+}
+
+impl StudyFile {
+    /// Leads a mistake that showed only when the study was run back to its place in the text.
+    pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
+        let text = Text::new(&self.source.name, &self.source.text, &[]);
+        match text.parse() {
+            Ok(root) => root.locate(mistake),
+            Err(_) => Diagnostic { help: mistake.help.clone(), ..Diagnostic::new(mistake.message.clone()) },
+        }
+    }
 }
 
 /// Reads a study file; `settings` are `key=value` pairs that go over it.
@@ -103,7 +116,7 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
     for (name, node) in root.table("criteria")? {
         draft.criteria.push((name, read_criterion(catalogue, &node)?));
     }
-    draft.tasks = tasks::read(&root)?;
+    draft.tasks = tasks::read(&root, catalogue)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()) })
@@ -249,7 +262,7 @@ impl crate::criterion::CriterionSpec for Located {
         self.inner.reads()
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn crate::criterion::Criterion>, crate::study::Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn crate::criterion::Criterion>, Mistake> {
         self.inner.bind(model).map_err(|mistake| mistake.within(self.kind))
     }
 

@@ -1,11 +1,15 @@
-//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`.
+//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`, `[diagnosis]`.
 
 use schemars::JsonSchema;
 
 use super::entries::{Entries, Short};
 use super::tree::Node;
 use super::{Diagnostic, read_seconds};
-use crate::study::{AxisDraft, ExcitationDraft, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft};
+use crate::catalogue::Catalogue;
+use crate::diagnostic::suggestion;
+use crate::study::{
+    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft,
+};
 use crate::unit::Quantity;
 
 /// What is asked of the inputs by `task = "excitation"`, and in the report of every calibration.
@@ -91,11 +95,26 @@ impl From<String> for AxisTable {
     }
 }
 
+/// How `task = "diagnosis"`, and `mops diagnose`, search for what the model lacks.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct DiagnosisSection {
+    /// Largest number of effects that are added; 3 where absent.
+    pub max_effects: Option<usize>,
+    /// Probability with which something counts as missing where nothing is; 0.01 where absent.
+    pub level: Option<f64>,
+    /// Kinds of effect that are tried; all of the catalogue (`mops list`) where absent.
+    pub effects: Option<Vec<String>>,
+    /// Kinds of effect that are not tried.
+    #[serde(default)]
+    pub without: Vec<String>,
+}
+
 /// Names of the tables, as they stand at the top of a study file.
-pub(super) const TABLES: [&str; 3] = ["excitation", "sensitivity", "sweep"];
+pub(super) const TABLES: [&str; 4] = ["excitation", "sensitivity", "sweep", "diagnosis"];
 
 /// Reads the tables of all tasks; what is absent has its defaults.
-pub(super) fn read(root: &Node<'_>) -> Result<TasksDraft, Diagnostic> {
+pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {
     let mut tasks = TasksDraft::default();
     if let Some(node) = root.child("excitation") {
         let section: ExcitationSection = node.read()?;
@@ -127,5 +146,25 @@ pub(super) fn read(root: &Node<'_>) -> Result<TasksDraft, Diagnostic> {
         };
         tasks.sweep = Some(SweepDraft { x: axis(section.x), y: section.y.map(axis), at: section.at });
     }
+    if let Some(node) = root.child("diagnosis") {
+        let DiagnosisSection { max_effects, level, effects, without } = node.read()?;
+        for (key, names) in [("effects", effects.as_deref().unwrap_or_default()), ("without", &without)] {
+            check_effects(catalogue, names).map_err(|m| root.locate(&m.within(key).within("diagnosis")))?;
+        }
+        let usual = DiagnosisTask::default();
+        let (max_effects, level) = (max_effects.unwrap_or(usual.max_effects), level.unwrap_or(usual.level));
+        tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without };
+    }
     Ok(tasks)
+}
+
+/// Refuses names that are those of no effect.
+fn check_effects(catalogue: &Catalogue, names: &[String]) -> Result<(), Mistake> {
+    let known = || catalogue.effects.iter().map(|effect| effect.name());
+    match names.iter().find(|name| !known().any(|effect| effect == **name)) {
+        None => Ok(()),
+        Some(name) => {
+            Err(Mistake::new(name, format!("there is no effect `{name}`")).with_help(suggestion(name, known())))
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! A study: models, cases, tuners and criteria that belong together. Once built, it is valid.
 
 mod build;
+mod diagnosis;
 mod draft;
 mod tasks;
 
@@ -9,6 +10,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use diagnosis::DiagnosisTask;
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
 pub use tasks::{
     Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
@@ -37,6 +39,8 @@ pub enum Task {
     Sensitivity,
     /// Draw the objective over one tuner or two.
     Sweep,
+    /// Find the physical effect that the model lacks.
+    Diagnosis,
 }
 
 /// How the scaled values become one number to minimise.

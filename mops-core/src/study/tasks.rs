@@ -1,5 +1,6 @@
 //! What tasks other than design and calibration are asked: as it is written down, and checked.
 
+use super::diagnosis::{self, DiagnosisTask};
 use super::draft::Mistake;
 use super::{Study, Task};
 use crate::diagnostic::suggestion;
@@ -28,6 +29,8 @@ pub struct TasksDraft {
     pub sensitivity: SensitivityTask,
     /// Of `sweep`, if it is there.
     pub sweep: Option<SweepDraft>,
+    /// Of `diagnosis`.
+    pub diagnosis: DiagnosisTask,
 }
 
 /// What the tasks of a study are asked.
@@ -39,6 +42,8 @@ pub struct Tasks {
     pub sensitivity: SensitivityTask,
     /// Of `sweep`, if it is there.
     pub sweep: Option<SweepTask>,
+    /// Of `diagnosis`.
+    pub diagnosis: DiagnosisTask,
 }
 
 /// Which inputs are looked at, as it is written down.
@@ -186,7 +191,8 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
             .with_help("give one `inputs`, such as inputs = { u = { step = { after = 1.0 } } }")
             .within("study"));
     }
-    Ok(Tasks { excitation, sensitivity: draft.sensitivity, sweep })
+    let diagnosis = diagnosis::check(draft.diagnosis, study)?;
+    Ok(Tasks { excitation, sensitivity: draft.sensitivity, sweep, diagnosis })
 }
 
 fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, Mistake> {

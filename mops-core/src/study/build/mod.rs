@@ -12,10 +12,10 @@ use crate::case::Case;
 use crate::criterion::Usage;
 use crate::model::{Interface, Model};
 use crate::study::draft::{CaseDraft, Draft, Mistake};
-use crate::study::{JobPlan, Objective, Study, Task, Tasks, tasks};
+use crate::study::{JobPlan, Objective, Study, Task, Tasks, diagnosis, tasks};
 use cases::{assumed_units, build_case};
 use criteria::add_rows;
-use jobs::complete;
+use jobs::{complete, job};
 use tuners::{build_tuner, check_use, free_start, tie_tuners};
 use values::{check_horizon, fixed_values, section};
 
@@ -63,7 +63,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     let objective =
         draft.objective.unwrap_or(match draft.task {
             Task::Design => Objective::Max,
-            Task::Calibration => Objective::Sum,
+            Task::Calibration | Task::Diagnosis => Objective::Sum,
             // As the study of which they tell would be solved.
             Task::Excitation | Task::Sensitivity | Task::Sweep => {
                 if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
@@ -84,14 +84,20 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         notes,
         warnings,
     };
-    // How rich an input is can be told without a criterion.
-    if draft.criteria.is_empty() && study.task != Task::Excitation {
+    // How rich an input is can be told without a criterion, and in a diagnosis every channel counts with its noise.
+    if draft.criteria.is_empty() && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
         return Err(Mistake::new("criteria", "the study has no criterion").with_help(
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
         ));
     }
     for (name, criterion) in draft.criteria {
         add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
+    }
+    if study.task == Task::Diagnosis {
+        for (model, case, measured) in diagnosis::measured(&study) {
+            let signals = study.models[model].1.interface().signals.clone();
+            job(&mut study, model, case, &measured, &signals)?;
+        }
     }
     for index in 0..study.jobs.len() {
         let JobPlan { model, case, .. } = study.jobs[index];

@@ -1,0 +1,141 @@
+//! Candidates: every effect of the catalogue at every place that it fits, and the strengths that are tried first.
+
+use std::sync::Arc;
+
+use mops_core::{Dimension, Effect, Interface, Placement, Port, PortKind, Trials};
+
+/// An effect at a place.
+#[derive(Clone)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: Arc<dyn Effect>,
+    /// Its place.
+    pub port: Port,
+    /// Its second place, if it needs one.
+    pub companion: Option<Port>,
+    /// The only experiment in which it acts, for what happens once.
+    pub only: Option<usize>,
+}
+
+impl Candidate {
+    /// The effect in a model, under a name of its own.
+    pub fn placed(&self, name: String) -> Placement {
+        let (effect, port, companion) = (Arc::clone(&self.effect), self.port.clone(), self.companion.clone());
+        Placement { name, effect, port, companion }
+    }
+
+    /// Whether two candidates are the same effect at the same place.
+    pub fn is(&self, other: &Self) -> bool {
+        self.effect.name() == other.effect.name()
+            && self.port == other.port
+            && self.companion == other.companion
+            && self.only == other.only
+    }
+
+    /// Its place as results spell it. What an equation of its own gains is a process only where it is no joint.
+    pub fn place(&self) -> String {
+        self.port.to_string()
+    }
+}
+
+/// All candidates; `measured` are the signals with data, `calibration` the experiments that parameters come from.
+pub fn candidates(
+    effects: &[Arc<dyn Effect>],
+    interface: &Interface,
+    measured: &[String],
+    calibration: &[usize],
+) -> Vec<Candidate> {
+    let seen = |port: &Port| match port {
+        Port::Sensor { output } => measured.contains(output),
+        _ => true,
+    };
+    let ports: Vec<(&Port, PortKind)> = interface
+        .ports
+        .iter()
+        .filter(|port| seen(port))
+        .filter_map(|port| port.kind(&interface.ports).map(|kind| (port, kind)))
+        .collect();
+    let mut all = Vec::new();
+    for effect in effects {
+        for (port, kind) in ports.iter().filter(|(_, kind)| effect.ports().contains(kind)) {
+            let companions: Vec<Option<Port>> = match effect.companion() {
+                None => vec![None],
+                Some(wanted) => {
+                    let other = |(p, k): &&(&Port, PortKind)| *k == wanted && !(p == port && k == kind);
+                    ports.iter().filter(other).map(|(p, _)| Some((*p).clone())).collect()
+                }
+            };
+            for companion in companions {
+                let candidate = Candidate { effect: Arc::clone(effect), port: (*port).clone(), companion, only: None };
+                if effect.is_one_off() {
+                    all.extend(calibration.iter().map(|&only| Candidate { only: Some(only), ..candidate.clone() }));
+                } else {
+                    all.push(candidate);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// What the trajectories show at a place: typical sizes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    /// Of what an effect adds.
+    pub output: f64,
+    /// Of the position about its middle.
+    pub position: f64,
+    /// Of the speed.
+    pub speed: f64,
+    /// Of the value that passes.
+    pub value: f64,
+    /// Of the time in which it moves, s.
+    pub time: f64,
+    /// Smallest and largest position (at actuators and sensors: value).
+    pub range: [f64; 2],
+    /// Length of the longest record, s.
+    pub record: f64,
+    /// Time between samples, s.
+    pub sample: f64,
+}
+
+impl Sizes {
+    /// The typical size of a strength.
+    pub fn of(&self, dimension: Dimension) -> f64 {
+        let power = |size: f64, n: i8| size.powi(n.into());
+        power(self.output, dimension.output)
+            * power(self.position, dimension.position)
+            * power(self.speed, dimension.speed)
+            * power(self.value, dimension.value)
+            * power(self.time, dimension.time)
+    }
+
+    /// The values of a strength that are tried.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn values(&self, dimension: Dimension, trials: Trials, bounds: [f64; 2]) -> Vec<f64> {
+        let values: Vec<f64> = match trials {
+            Trials::Linear => vec![self.of(dimension)],
+            Trials::Scaled(multiples) => multiples.iter().map(|m| m * self.of(dimension)).collect(),
+            Trials::Within(shares) => {
+                shares.iter().map(|s| self.range[0] + s * (self.range[1] - self.range[0])).collect()
+            }
+            Trials::Plain(values) => values.to_vec(),
+            Trials::Frequencies => {
+                let step = std::f64::consts::TAU / (1.5 * self.record);
+                let highest = (0.5 * std::f64::consts::PI / self.sample).min(120.0 * step);
+                (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
+            }
+            Trials::Moments(shares) => shares.iter().map(|s| s * self.record).collect(),
+        };
+        let inside = |v: &f64| v.is_finite() && *v >= bounds[0] && *v <= bounds[1];
+        values.into_iter().filter(inside).collect()
+    }
+
+    /// All combinations of the values tried of an effect's strengths.
+    pub fn combinations(&self, effect: &dyn Effect) -> Vec<Vec<f64>> {
+        effect.strengths().iter().fold(vec![Vec::new()], |all, strength| {
+            let values = self.values(strength.dimension, strength.trials, strength.bounds);
+            all.iter().flat_map(|start| values.iter().map(move |&v| [start.as_slice(), &[v]].concat())).collect()
+        })
+    }
+}

@@ -1,0 +1,1 @@
+//! The whole way from a study to a diagnosis.

@@ -1,0 +1,386 @@
+//! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start values of
+//! each piece.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use mops_core::{Case, Job, Model};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::subject::{Local, Series, Subject};
+
+/// An unknown of all pieces.
+#[derive(Debug, Clone, Copy)]
+pub struct Global {
+    /// What it sets.
+    pub sets: Sets,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+    /// Whether it is looked for in its logarithm.
+    pub log: bool,
+    /// Typical size of a change.
+    pub scale: f64,
+}
+
+/// What an unknown of all pieces sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sets {
+    /// One of [`Subject::globals`].
+    Tuner(usize),
+    /// A parameter of the model.
+    Parameter(usize),
+}
+
+/// A part of an experiment that is simulated by itself.
+#[derive(Debug, Clone)]
+pub struct Piece {
+    /// The experiment, by index.
+    pub measurement: usize,
+    /// Inputs, from the start of the piece.
+    pub case: Case,
+    /// Samples, from the start of the piece.
+    pub series: Vec<Series>,
+    /// Its length, s.
+    pub horizon: f64,
+    /// Its unknowns.
+    pub locals: Vec<Local>,
+    /// Parameters of the model that are fixed in it, by index.
+    pub fixed: Vec<(usize, f64)>,
+}
+
+/// Unknowns and their values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Of all pieces.
+    pub globals: Vec<f64>,
+    /// Of each piece.
+    pub locals: Vec<Vec<f64>>,
+}
+
+/// A least-squares problem.
+pub struct Fit<'a> {
+    /// What is diagnosed.
+    pub subject: &'a Subject,
+    /// The model, with effects or without.
+    pub model: Arc<dyn Model>,
+    /// Unknowns of all pieces.
+    pub globals: Vec<Global>,
+    /// The pieces.
+    pub pieces: Vec<Piece>,
+    /// Counts simulations.
+    pub simulations: &'a AtomicUsize,
+}
+
+/// Residuals of a piece, channel by channel, and their slopes.
+#[derive(Debug, Clone)]
+pub struct Residuals {
+    /// `(model - measured)/noise`.
+    pub r: Vec<f64>,
+    /// Slopes: one column per global, then per local of the piece; no columns where none were asked for.
+    pub j: Vec<Vec<f64>>,
+}
+
+/// A fitted point.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// The unknowns.
+    pub point: Point,
+    /// Sum of the squares of the residuals.
+    pub chi2: f64,
+    /// Number of residuals.
+    pub count: usize,
+    /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1.
+    pub covariance: DMatrix<f64>,
+    /// Which globals ended at a bound.
+    pub at_bound: Vec<bool>,
+}
+
+impl Fitted {
+    /// Root mean square of the residuals.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn normalised(&self) -> f64 {
+        (self.chi2 / self.count.max(1) as f64).sqrt()
+    }
+}
+
+/// Normal equations at a point.
+struct Normal {
+    chi2: f64,
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Fit<'_> {
+    /// Values of the model's parameters in a piece.
+    pub fn parameters(&self, piece: usize, point: &Point) -> Vec<f64> {
+        let p = &self.pieces[piece];
+        let mut tuners = self.subject.start();
+        for (global, &value) in self.globals.iter().zip(&point.globals) {
+            if let Sets::Tuner(k) = global.sets {
+                tuners[k] = value;
+            }
+        }
+        let mut values = self.subject.parameters(p.measurement, &tuners);
+        let declared = &self.model.interface().parameters;
+        let further = declared[values.len()..].iter().map(|p| p.default.unwrap_or(1.0));
+        values.extend(further);
+        for (global, &value) in self.globals.iter().zip(&point.globals) {
+            if let Sets::Parameter(k) = global.sets {
+                values[k] = value;
+            }
+        }
+        p.fixed.iter().for_each(|&(k, value)| values[k] = value);
+        p.locals.iter().zip(&point.locals[piece]).for_each(|(local, &value)| values[local.parameter] = value);
+        values
+    }
+
+    fn seeds(&self, piece: usize, point: &Point, count: usize) -> Vec<Vec<f64>> {
+        let p = &self.pieces[piece];
+        let mut tuners = self.subject.start();
+        for (global, &value) in self.globals.iter().zip(&point.globals) {
+            if let Sets::Tuner(k) = global.sets {
+                tuners[k] = value;
+            }
+        }
+        let overridden = |k: usize| p.fixed.iter().any(|f| f.0 == k) || p.locals.iter().any(|l| l.parameter == k);
+        let global = |global: &Global| {
+            let mut seed = match global.sets {
+                Sets::Tuner(k) => self.subject.slopes(p.measurement, &tuners, k),
+                Sets::Parameter(_) => Vec::new(),
+            };
+            seed.resize(count, 0.0);
+            if let Sets::Parameter(k) = global.sets {
+                seed[k] = 1.0;
+            }
+            (0..count).filter(|&k| overridden(k)).for_each(|k| seed[k] = 0.0);
+            seed
+        };
+        let local = |local: &Local| {
+            let mut seed = vec![0.0; count];
+            seed[local.parameter] = 1.0;
+            seed
+        };
+        self.globals.iter().map(global).chain(p.locals.iter().map(local)).collect()
+    }
+
+    /// Residuals of a piece; `None` where the simulation fails.
+    pub fn residuals(&self, piece: usize, point: &Point, slopes: bool) -> Option<Residuals> {
+        let p = &self.pieces[piece];
+        let parameters = self.parameters(piece, point);
+        let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
+        signals.sort_unstable();
+        signals.dedup();
+        let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
+        self.simulations.fetch_add(1, Ordering::Relaxed);
+        let (analysis, tangents) = if slopes {
+            self.model.tangents(&job, &self.seeds(piece, point, parameters.len()))?.ok()?
+        } else {
+            (self.model.analyse(&job).ok()?, Vec::new())
+        };
+        let mut r = Vec::new();
+        let mut j = vec![Vec::new(); tangents.len()];
+        for s in &p.series {
+            let name = &self.model.interface().signals[s.signal].name;
+            let predicted = analysis.trace(name).sample(&s.times);
+            r.extend(predicted.iter().zip(&s.values).map(|(p, y)| (p - y) / s.noise));
+            for (column, tangent) in j.iter_mut().zip(&tangents) {
+                column.extend(tangent.trace(name).sample(&s.times).iter().map(|t| t / s.noise));
+            }
+        }
+        let finite = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
+        (finite(&r) && j.iter().all(finite)).then_some(Residuals { r, j })
+    }
+
+    /// Residuals of all pieces.
+    pub fn all(&self, point: &Point, slopes: bool) -> Option<Vec<Residuals>> {
+        (0..self.pieces.len()).into_par_iter().map(|piece| self.residuals(piece, point, slopes)).collect()
+    }
+
+    /// Sum of squares; infinite where a simulation fails.
+    pub fn chi2(&self, point: &Point) -> f64 {
+        self.all(point, false)
+            .map_or(f64::INFINITY, |all| all.iter().map(|p| p.r.iter().map(|r| r * r).sum::<f64>()).sum())
+    }
+
+    fn unknowns(&self) -> usize {
+        self.globals.len() + self.pieces.iter().map(|p| p.locals.len()).sum::<usize>()
+    }
+
+    /// Normal equations in the coordinates of the search.
+    fn normal(&self, point: &Point) -> Option<Normal> {
+        let all = self.all(point, true)?;
+        let (n, g) = (self.unknowns(), self.globals.len());
+        let mut matrix = DMatrix::zeros(n, n);
+        let mut gradient = DVector::zeros(n);
+        let (mut chi2, mut offset) = (0.0, g);
+        for (piece, residuals) in all.iter().enumerate() {
+            let locals = self.pieces[piece].locals.len();
+            let at: Vec<usize> = (0..g).chain(offset..offset + locals).collect();
+            let factor = |k: usize| {
+                if k < g { self.stretch(k, point.globals[k]) } else { self.pieces[piece].locals[k - g].scale }
+            };
+            chi2 += residuals.r.iter().map(|r| r * r).sum::<f64>();
+            for a in 0..at.len() {
+                let (ja, fa) = (&residuals.j[a], factor(a));
+                gradient[at[a]] += fa * dot(ja, &residuals.r);
+                for b in a..at.len() {
+                    let value = fa * factor(b) * dot(ja, &residuals.j[b]);
+                    matrix[(at[a], at[b])] += value;
+                    if a != b {
+                        matrix[(at[b], at[a])] += value;
+                    }
+                }
+            }
+            offset += locals;
+        }
+        Some(Normal { chi2, matrix, gradient })
+    }
+
+    /// Change of a global per unit of its coordinate.
+    fn stretch(&self, k: usize, value: f64) -> f64 {
+        if self.globals[k].log { value } else { self.globals[k].scale }
+    }
+
+    /// The point moved by a step in the coordinates of the search, within bounds.
+    fn moved(&self, point: &Point, step: &DVector<f64>) -> Point {
+        let mut moved = point.clone();
+        for (k, global) in self.globals.iter().enumerate() {
+            let value = point.globals[k];
+            let to = if global.log { value * step[k].clamp(-3.0, 3.0).exp() } else { value + step[k] * global.scale };
+            moved.globals[k] = to.clamp(global.bounds[0], global.bounds[1]);
+        }
+        let mut offset = self.globals.len();
+        for (piece, locals) in self.pieces.iter().zip(&mut moved.locals) {
+            for (local, value) in piece.locals.iter().zip(locals) {
+                *value = (*value + step[offset] * local.scale).clamp(local.bounds[0], local.bounds[1]);
+                offset += 1;
+            }
+        }
+        moved
+    }
+
+    /// Which unknowns stand at a bound towards which the sum of squares falls.
+    fn held(&self, point: &Point, gradient: &DVector<f64>) -> Vec<bool> {
+        let at = |value: f64, bounds: [f64; 2], slope: f64| {
+            (value <= bounds[0] && slope > 0.0) || (value >= bounds[1] && slope < 0.0)
+        };
+        let g = self.globals.len();
+        let mut held: Vec<bool> = (0..g).map(|k| at(point.globals[k], self.globals[k].bounds, gradient[k])).collect();
+        for (piece, locals) in self.pieces.iter().zip(&point.locals) {
+            for (local, &value) in piece.locals.iter().zip(locals) {
+                held.push(at(value, local.bounds, gradient[held.len()]));
+            }
+        }
+        held
+    }
+
+    /// Levenberg and Marquardt's method within bounds, from a point; `None` where that cannot be simulated.
+    ///
+    /// Source: J. More, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630
+    /// (1978); unknowns at a bound that the gradient presses against are left out of a step (D. Bertsekas, Projected Newton
+    /// methods, SIAM J. Control Optim. 20 (1982)).
+    #[allow(clippy::cast_precision_loss)]
+    pub fn solve(&self, start: Point, iterations: usize) -> Option<Fitted> {
+        let mut point = start;
+        let mut normal = self.normal(&point)?;
+        let mut damping = 1e-3;
+        let count: usize = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
+        for _ in 0..iterations {
+            let held = self.held(&point, &normal.gradient);
+            let mut improved = None;
+            for _ in 0..8 {
+                let Some(step) = damped_step(&normal, &held, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let trial = self.moved(&point, &step);
+                let chi2 = self.chi2(&trial);
+                if chi2 < normal.chi2 {
+                    improved = Some((trial, chi2));
+                    break;
+                }
+                if step.amax() < 1e-9 {
+                    break;
+                }
+                damping *= if chi2.is_finite() { 6.0 } else { 20.0 };
+            }
+            let Some((trial, chi2)) = improved else { break };
+            let gain = normal.chi2 - chi2;
+            damping = (damping * 0.15).max(1e-9);
+            let Some(next) = self.normal(&trial) else { break };
+            point = trial;
+            normal = next;
+            if gain < 1e-3 + 1e-6 * normal.chi2 {
+                break;
+            }
+        }
+        let held = self.held(&point, &normal.gradient);
+        let covariance = self.covariance(&point, &normal, &held);
+        let at_bound =
+            (0..self.globals.len()).map(|k| held[k] || self.globals[k].bounds.contains(&point.globals[k])).collect();
+        Some(Fitted { chi2: normal.chi2, count, covariance, at_bound, point })
+    }
+
+    /// Covariance of the globals for residuals of size 1, the locals eliminated.
+    fn covariance(&self, point: &Point, normal: &Normal, held: &[bool]) -> DMatrix<f64> {
+        let g = self.globals.len();
+        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
+        let inverse = pseudo_inverse(&matrix);
+        let mut covariance = DMatrix::zeros(g, g);
+        for (i, &a) in free.iter().enumerate().filter(|(_, a)| **a < g) {
+            for (j, &b) in free.iter().enumerate().filter(|(_, b)| **b < g) {
+                covariance[(a, b)] =
+                    inverse[(i, j)] * self.stretch(a, point.globals[a]) * self.stretch(b, point.globals[b]);
+            }
+        }
+        covariance
+    }
+}
+
+/// `-(M + damping diag M)^-1 g` over the unknowns that are not held.
+fn damped_step(normal: &Normal, held: &[bool], damping: f64) -> Option<DVector<f64>> {
+    let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k] && normal.matrix[(k, k)] > 0.0).collect();
+    let mut step = DVector::zeros(held.len());
+    if free.is_empty() {
+        return Some(step);
+    }
+    let scale: Vec<f64> = free.iter().map(|&k| normal.matrix[(k, k)].sqrt()).collect();
+    let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        let value = normal.matrix[(free[i], free[j])] / (scale[i] * scale[j]);
+        if i == j { value + damping } else { value }
+    });
+    let right = DVector::from_fn(free.len(), |i, _| -normal.gradient[free[i]] / scale[i]);
+    let solved = matrix.cholesky()?.solve(&right);
+    for (i, &k) in free.iter().enumerate() {
+        step[k] = solved[i] / scale[i];
+    }
+    Some(step)
+}
+
+/// Inverse of a symmetric matrix without the directions whose eigenvalue, scaled to a unit diagonal, is below 1e-12.
+pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let scale: Vec<f64> = (0..n).map(|k| matrix[(k, k)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
+    let eigen = scaled.symmetric_eigen();
+    let largest = eigen.eigenvalues.amax();
+    let mut inverse = DMatrix::zeros(n, n);
+    for k in 0..n {
+        let value = eigen.eigenvalues[k];
+        if value > 1e-12 * largest {
+            let v = eigen.eigenvectors.column(k);
+            inverse += (v * v.transpose()) / value;
+        }
+    }
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]))
+}
+
+/// Scalar product.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

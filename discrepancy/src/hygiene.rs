@@ -1,0 +1,105 @@
+//! What the samples of a channel tell before any model is looked at: their noise, and samples that stand alone.
+
+/// Standard deviation of the noise of a channel, without a model: from what local parabolas over seven samples leave, by the
+/// median absolute deviation, so that a few jumps do not count.
+///
+/// Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression,
+/// Biometrika 73 (1986) 625; P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4 (1.4826).
+#[allow(clippy::cast_precision_loss)]
+pub fn noise_of(times: &[f64], values: &[f64]) -> f64 {
+    let mut left: Vec<f64> = (3..values.len().saturating_sub(3))
+        .filter_map(|i| {
+            let x: Vec<f64> = (i - 3..=i + 3).map(|k| times[k] - times[i]).collect();
+            let others: Vec<usize> = (0..7).filter(|&k| k != 3).collect();
+            let (predicted, leverage) = parabola(&others, &x, &values[i - 3..=i + 3])?;
+            Some((values[i] - predicted).abs() / (1.0 + leverage).sqrt())
+        })
+        .collect();
+    if left.is_empty() {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let power = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64;
+        return power.sqrt().max(f64::MIN_POSITIVE);
+    }
+    left.sort_by(f64::total_cmp);
+    let median = left[left.len() / 2];
+    // Coarse quantisation leaves many exact zeros: then the root mean square says more.
+    let rms = (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt();
+    let robust = 1.4826 * median;
+    if robust > 0.1 * rms { robust } else { rms.max(f64::MIN_POSITIVE) }
+}
+
+/// The value at 0 of the parabola through the chosen samples, and the sum of the squares of the weights that give it.
+fn parabola(chosen: &[usize], x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
+    let scale = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let mut m = nalgebra::Matrix3::zeros();
+    for &k in chosen {
+        let row = nalgebra::Vector3::new(1.0, x[k] / scale, (x[k] / scale).powi(2));
+        m += row * row.transpose();
+    }
+    let inverse = m.try_inverse()?;
+    let (mut value, mut leverage) = (0.0, 0.0);
+    for &k in chosen {
+        let row = nalgebra::Vector3::new(1.0, x[k] / scale, (x[k] / scale).powi(2));
+        let weight = (inverse * row)[0];
+        value += weight * y[k];
+        leverage += weight * weight;
+    }
+    Some((value, leverage))
+}
+
+/// The samples without those that stand alone, more than ten times the noise from what their neighbours on both sides lead
+/// to, and how many those were.
+pub fn without_spikes(times: &[f64], values: &[f64], noise: f64) -> (Vec<f64>, Vec<f64>, usize) {
+    let n = values.len();
+    let alone = |i: usize| {
+        if n < 8 {
+            return false;
+        }
+        let from = i.saturating_sub(3).min(n - 7);
+        let x: Vec<f64> = (from..from + 7).map(|k| times[k] - times[i]).collect();
+        let others: Vec<usize> = (0..7).filter(|&k| from + k != i).collect();
+        let Some((predicted, leverage)) = parabola(&others, &x, &values[from..from + 7]) else { return false };
+        let spread = others.iter().map(|&k| {
+            let rest: Vec<usize> = others.iter().copied().filter(|&o| o != k).collect();
+            let moved: Vec<f64> = x.iter().map(|v| v - x[k]).collect();
+            parabola(&rest, &moved, &values[from..from + 7]).map_or(0.0, |(p, _)| (values[from + k] - p).abs())
+        });
+        let spread = spread.fold(0.0, f64::max);
+        let off = (values[i] - predicted).abs() / (1.0 + leverage).sqrt();
+        off > 10.0 * noise && off > 4.0 * spread
+    };
+    let kept: Vec<usize> = (0..n).filter(|&i| !alone(i)).collect();
+    let dropped = n - kept.len();
+    (kept.iter().map(|&i| times[i]).collect(), kept.iter().map(|&i| values[i]).collect(), dropped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(noise: f64) -> (Vec<f64>, Vec<f64>) {
+        let times: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.01).collect();
+        // A fixed sequence that is as good as white: the fractional parts of multiples of the golden ratio, uniform.
+        let white = |k: usize| ((k as f64 * 0.618_033_988_749_894_9).fract() - 0.5) * 12.0_f64.sqrt();
+        let values = times.iter().enumerate().map(|(k, t)| (3.0 * t).sin() + noise * white(k * k + 7 * k)).collect();
+        (times, values)
+    }
+
+    #[test]
+    fn the_noise_on_a_sine_is_found() {
+        let (times, values) = samples(0.02);
+        let noise = noise_of(&times, &values);
+        assert!((noise - 0.02).abs() < 0.005, "{noise}");
+    }
+
+    #[test]
+    fn a_sample_far_from_its_neighbours_is_left_out_and_a_step_is_kept() {
+        let (times, mut values) = samples(0.001);
+        values[200] += 0.5;
+        let (_, kept, dropped) = without_spikes(&times, &values, 0.001);
+        assert_eq!((dropped, kept.len()), (1, 399));
+        values[200] -= 0.5;
+        values[300..].iter_mut().for_each(|v| *v += 0.5);
+        assert_eq!(without_spikes(&times, &values, 0.001).2, 0);
+    }
+}

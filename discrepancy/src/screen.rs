@@ -1,0 +1,197 @@
+//! Screening: the trace of every candidate in the residuals, what the unknowns absorb taken out, against the residuals.
+//!
+//! A score (Lagrange multiplier) test: source: C. R. Rao, Linear Statistical Inference and its Applications, 2nd edition
+//! (1973), section 6e.3.
+
+use mops_core::Scope;
+use mops_models::WithEffects;
+use rayon::prelude::*;
+
+use crate::candidate::{Candidate, Sizes};
+use crate::fit::{Fit, Fitted, Residuals, dot};
+use crate::trace_of::{sizes, trace};
+use crate::trajectory::Trajectory;
+use crate::variant::Added;
+
+/// A fitted model as a screening sees it.
+pub struct Scene {
+    /// The motion in each piece.
+    pub trajectories: Vec<Trajectory>,
+    /// Residuals of each piece one after the other.
+    pub residuals: Vec<f64>,
+    /// Where the residuals of each piece begin.
+    pub begins: Vec<usize>,
+    /// Orthonormal directions that the unknowns can absorb.
+    pub basis: Vec<Vec<f64>>,
+}
+
+/// A screened candidate.
+#[derive(Clone)]
+pub struct Screened {
+    /// The candidate with the best strengths tried.
+    pub added: Added,
+    /// By how much the sum of squares falls, to first order.
+    pub gain: f64,
+    /// Share of its trace that the unknowns absorb.
+    pub absorbed: f64,
+    /// Its trace with that taken out, of length 1.
+    pub direction: Vec<f64>,
+}
+
+impl Scene {
+    /// The scene of a fit; `None` where a simulation fails.
+    pub fn new(fit: &Fit<'_>, model: &WithEffects, fitted: &Fitted) -> Option<Self> {
+        let all = fit.all(&fitted.point, true)?;
+        let pieces: Vec<usize> = (0..fit.pieces.len()).collect();
+        let trajectories: Option<Vec<Trajectory>> =
+            pieces.par_iter().map(|&piece| Trajectory::new(fit, model, piece, &fitted.point).ok()).collect();
+        let mut begins = vec![0];
+        for piece in &all {
+            begins.push(begins[begins.len() - 1] + piece.r.len());
+        }
+        let residuals = all.iter().flat_map(|piece| piece.r.iter().copied()).collect();
+        Some(Self { trajectories: trajectories?, residuals, basis: basis(&all, &begins, fit.globals.len()), begins })
+    }
+
+    /// A trace without what the unknowns absorb.
+    pub fn project(&self, trace: &[f64]) -> Vec<f64> {
+        let mut left = trace.to_vec();
+        for q in &self.basis {
+            let along = dot(q, &left);
+            left.iter_mut().zip(q).for_each(|(l, q)| *l -= along * q);
+        }
+        left
+    }
+}
+
+/// An orthonormal basis of the slopes, by the modified Gram-Schmidt method with a second pass; what is left of a column
+/// that depends on others is dropped.
+fn basis(all: &[Residuals], begins: &[usize], globals: usize) -> Vec<Vec<f64>> {
+    let total = begins[begins.len() - 1];
+    let mut columns = Vec::new();
+    for g in 0..globals {
+        columns.push(all.iter().flat_map(|piece| piece.j[g].iter().copied()).collect::<Vec<f64>>());
+    }
+    for (piece, &begin) in all.iter().zip(begins) {
+        for local in &piece.j[globals..] {
+            let mut column = vec![0.0; total];
+            column[begin..begin + local.len()].copy_from_slice(local);
+            columns.push(column);
+        }
+    }
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut column in columns {
+        let before = dot(&column, &column).sqrt();
+        if before == 0.0 {
+            continue;
+        }
+        for _ in 0..2 {
+            for q in &basis {
+                let along = dot(q, &column);
+                column.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
+            }
+        }
+        let left = dot(&column, &column).sqrt();
+        if left > 1e-7 * before {
+            column.iter_mut().for_each(|c| *c /= left);
+            basis.push(column);
+        }
+    }
+    basis
+}
+
+/// Screens candidates; the best first.
+pub fn screen(candidates: &[Candidate], fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Vec<Screened> {
+    let mut screened: Vec<Screened> = candidates
+        .par_iter()
+        .filter_map(|candidate| {
+            let sizes = sizes(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
+            best_of(candidate, &sizes, fit, model, scene)
+        })
+        .collect();
+    screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    screened
+}
+
+/// The best of the strengths tried of a candidate.
+fn best_of(
+    candidate: &Candidate,
+    sizes: &Sizes,
+    fit: &Fit<'_>,
+    model: &WithEffects,
+    scene: &Scene,
+) -> Option<Screened> {
+    let effect = candidate.effect.as_ref();
+    let own: Vec<usize> =
+        (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
+    let mut best: Option<Screened> = None;
+    let combinations = sizes.combinations(effect);
+    // Combinations that differ in what each experiment has of its own come together.
+    let shared = |c: &[f64]| -> Vec<u64> {
+        c.iter().enumerate().filter(|(k, _)| !own.contains(k)).map(|(_, v)| v.to_bits()).collect()
+    };
+    let mut start = 0;
+    while start < combinations.len() {
+        let end = if own.is_empty() {
+            start + 1
+        } else {
+            let key = shared(&combinations[start]);
+            (start..combinations.len()).find(|&k| shared(&combinations[k]) != key).unwrap_or(combinations.len())
+        };
+        let group = &combinations[start..end];
+        start = end;
+        let mut total = Vec::with_capacity(scene.residuals.len());
+        let mut chosen = Vec::new();
+        let mut fits = true;
+        for (index, piece) in fit.pieces.iter().enumerate() {
+            let r = &scene.residuals[scene.begins[index]..scene.begins[index + 1]];
+            let along = &scene.trajectories[index];
+            let traces = group.iter().filter_map(|s| Some((s, trace(candidate, s, model, piece, along)?)));
+            let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
+            let found = traces.max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)));
+            let Some((strengths, trace)) = found else {
+                fits = false;
+                break;
+            };
+            chosen.extend(own.iter().map(|&k| (piece.measurement, k, strengths[k])));
+            total.extend(trace);
+        }
+        if !fits {
+            continue;
+        }
+        let strengths = &group[0];
+        let left = scene.project(&total);
+        let (size, rest) = (dot(&total, &total), dot(&left, &left));
+        if !(size.is_finite() && rest > 1e-10 * size && rest > 1e-6) {
+            continue;
+        }
+        let along = -dot(&left, &scene.residuals);
+        let first = &effect.strengths()[0];
+        let linear = matches!(first.trials, mops_core::Trials::Linear);
+        let mut factor = along / rest;
+        if linear {
+            let allowed = |f: f64| f * strengths[0] >= first.bounds[0] && f * strengths[0] <= first.bounds[1];
+            if !allowed(factor) {
+                continue;
+            }
+        } else {
+            factor = factor.clamp(0.0, 1.5);
+        }
+        let gain = 2.0 * factor * along - factor * factor * rest;
+        if gain <= 0.0 || best.as_ref().is_some_and(|best| best.gain >= gain) {
+            continue;
+        }
+        let mut strengths = strengths.clone();
+        if linear {
+            strengths[0] *= factor;
+        }
+        let length = rest.sqrt();
+        best = Some(Screened {
+            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
+            gain,
+            absorbed: 1.0 - rest / size,
+            direction: left.iter().map(|l| l / length).collect(),
+        });
+    }
+    best
+}

@@ -1,0 +1,229 @@
+//! The search: which effects, one after the other, bring the residuals down to the noise.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{Effect, Role};
+use rayon::prelude::*;
+
+use crate::base;
+use crate::candidate::{Candidate, candidates};
+use crate::fit::{Fit, Fitted, Piece, Point};
+use crate::screen::{Scene, Screened, screen};
+use crate::subject::Subject;
+use crate::variant::{Added, Variant, problem};
+
+/// A model that was fitted to calibration and selection data together.
+pub struct Trial<'a> {
+    /// Effects, with the strengths fitted.
+    pub added: Vec<Added>,
+    /// The problem.
+    pub fit: Fit<'a>,
+    /// Its model.
+    pub variant: Variant,
+    /// The solution.
+    pub fitted: Fitted,
+}
+
+/// What the search is asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Largest number of effects added.
+    pub effects: usize,
+    /// Candidates that are fitted in each round.
+    pub refits: usize,
+    /// Those of them that are fitted to the end.
+    pub finalists: usize,
+    /// Fall of the sum of squares, per the dispersion of the residuals, below which nothing is added.
+    pub least_gain: f64,
+}
+
+/// The search in a subject.
+pub struct Search<'a> {
+    /// The subject.
+    pub subject: &'a Subject,
+    /// The catalogue.
+    pub effects: &'a [Arc<dyn Effect>],
+    /// Limits.
+    pub limits: Limits,
+    /// Counts simulations.
+    pub simulations: &'a AtomicUsize,
+}
+
+/// Candidates of one round: as screened, and the best of them as fitted.
+pub struct Round<'a> {
+    /// As screened, best first.
+    pub screened: Vec<Screened>,
+    /// As fitted, best first.
+    pub trials: Vec<Trial<'a>>,
+}
+
+impl<'a> Search<'a> {
+    /// Pieces that choose between models: calibration and selection data.
+    fn pieces(&self) -> Vec<Piece> {
+        base::pieces(self.subject, |role| role != Role::Validation)
+    }
+
+    /// Fits start values alone, with the globals held: the experiments that parameters do not come from.
+    pub fn starts(&self, added: &[Added], tuners: &[f64], pieces: Vec<Piece>) -> Option<(Fit<'a>, Fitted, Variant)> {
+        let locals = base::first_locals(&pieces);
+        let held: Vec<usize> = (0..tuners.len()).collect();
+        let (mut fit, point, variant) = problem(self.subject, added, pieces, tuners, locals, &held, self.simulations);
+        for (global, &value) in fit.globals.iter_mut().zip(&point.globals) {
+            global.bounds = [value; 2];
+        }
+        let fitted = fit.solve(point, 40)?;
+        Some((fit, fitted, variant))
+    }
+
+    /// The declared model, fitted to all data that may choose; `tuners` come from calibration data, with the `locals` of
+    /// these experiments.
+    pub fn declared(&self, calibrated: &Fitted) -> Option<Trial<'a>> {
+        let pieces = self.pieces();
+        let mut locals = base::first_locals(&pieces);
+        let mut calibration = calibrated.point.locals.iter();
+        let tuners = &calibrated.point.globals;
+        for (piece, locals) in pieces.iter().zip(&mut locals) {
+            if self.subject.measurements[piece.measurement].role == Role::Calibration {
+                locals.clone_from(calibration.next().expect("one for every calibration experiment"));
+            } else if let Some((_, fitted, _)) = self.starts(&[], tuners, vec![piece.clone()]) {
+                locals.clone_from(&fitted.point.locals[0]);
+            }
+        }
+        self.trial(&[], tuners, locals, &[], 40)
+    }
+
+    /// Fits a variant to all data that may choose.
+    pub fn trial(
+        &self,
+        added: &[Added],
+        tuners: &[f64],
+        locals: Vec<Vec<f64>>,
+        held: &[usize],
+        iterations: usize,
+    ) -> Option<Trial<'a>> {
+        let (fit, point, variant) = problem(self.subject, added, self.pieces(), tuners, locals, held, self.simulations);
+        let fitted = fit.solve(point, iterations)?;
+        Some(Trial { added: added.to_vec(), fit, variant, fitted }.read())
+    }
+
+    /// Screens the whole catalogue against what a trial leaves, and fits the best.
+    pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
+        let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
+        let screened = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene);
+        let mut chosen: Vec<usize> = (0..screened.len().min(self.limits.refits)).collect();
+        // Of every place the best, so that no place is lost for a bad linearisation.
+        for (i, s) in screened.iter().enumerate() {
+            let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
+            if chosen.len() < 2 * self.limits.refits
+                && chosen.iter().filter(|k| same(k)).count() < 2
+                && !chosen.contains(&i)
+            {
+                chosen.push(i);
+            }
+        }
+        let started: Vec<Trial<'a>> = chosen
+            .into_par_iter()
+            .filter_map(|i| {
+                let added: Vec<Added> = from.added.iter().cloned().chain([screened[i].added.clone()]).collect();
+                self.from(from, &added, 4)
+            })
+            .collect();
+        // Those that lead after a few steps go on to the end.
+        let mut order: Vec<usize> = (0..started.len()).collect();
+        order.sort_by(|&a, &b| started[a].score().total_cmp(&started[b].score()));
+        let leading = &order[..order.len().min(self.limits.finalists)];
+        let mut trials: Vec<Trial<'a>> = started
+            .into_iter()
+            .enumerate()
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
+            .collect();
+        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        Some(Round { screened, trials })
+    }
+
+    /// Fits a variant from where another ended.
+    pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
+        let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
+        let own = |piece: &Piece| self.subject.measurements[piece.measurement].locals.len();
+        let locals = from.fit.pieces.iter().zip(&from.fitted.point.locals);
+        let locals = locals.map(|(piece, values)| values[..own(piece)].to_vec()).collect();
+        self.trial(added, tuners, locals, &[], iterations)
+    }
+
+    fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
+        let interface = self.subject.model.interface();
+        let of = &self.subject.measurements;
+        let mut measured: Vec<String> = of.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();
+        measured.sort();
+        measured.dedup();
+        let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
+        let dry =
+            |c: &Candidate| c.effect.act(&first_values(c)).friction(&still(), &vec![0.0; c.effect.states()]).is_some();
+        let taken = |c: &Candidate| {
+            added.iter().any(|a| a.candidate.is(c) || (a.candidate.port == c.port && dry(&a.candidate) && dry(c)))
+        };
+        let all = candidates(self.effects, interface, &measured, &calibration);
+        all.into_iter().filter(|c| !taken(c)).collect()
+    }
+}
+
+/// Any strengths: to ask an effect what it is.
+fn first_values(c: &Candidate) -> Vec<f64> {
+    c.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect()
+}
+
+fn still() -> mops_core::At<'static, f64> {
+    mops_core::At { t: 0.0, value: 0.0, q: 0.0, v: 1.0, a: 0.0, mobility: 1.0, other: 0.0, other_speed: 0.0, u: &[] }
+}
+
+impl<'a> Trial<'a> {
+    /// Takes the strengths from the solution.
+    fn read(mut self) -> Self {
+        for (index, a) in self.added.iter_mut().enumerate() {
+            let count = a.candidate.effect.strengths().len();
+            let in_piece = |m: usize| self.fit.pieces.iter().position(|p| p.measurement == m);
+            let (variant, fit, point) = (&self.variant, &self.fit, &self.fitted.point);
+            let piece = a.candidate.only.and_then(in_piece).unwrap_or(0);
+            a.strengths = variant.strengths(fit, point, index, count, piece);
+            for own in &mut a.own {
+                if let Some(piece) = in_piece(own.0) {
+                    own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
+                }
+            }
+        }
+        self
+    }
+
+    /// Fitted to the end.
+    fn continued(self, _: &Search<'a>) -> Option<Self> {
+        let fitted = self.fit.solve(self.fitted.point.clone(), 40)?;
+        Some(Self { fitted, ..self }.read())
+    }
+
+    /// Number of unknowns that its effects bring in.
+    pub fn unknowns(&self) -> usize {
+        let shared = self.fitted.point.globals.len() - self.fit.subject.globals.len();
+        shared
+    }
+
+    /// The Bayesian information criterion up to a constant: lower is better; rarer effects pay a little more.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn score(&self) -> f64 {
+        let rarity: f64 = self.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
+        self.fitted.chi2 + self.unknowns() as f64 * (self.fitted.count as f64).ln() + 2.0 * rarity
+    }
+
+    /// Its effects in short.
+    pub fn name(&self) -> String {
+        let names = self.added.iter().map(|a| format!("{} at {}", a.candidate.effect.name(), a.candidate.place()));
+        names.collect::<Vec<_>>().join(" + ")
+    }
+}
+
+/// The point of a fit with other globals.
+pub fn with_globals(point: &Point, globals: Vec<f64>) -> Point {
+    Point { globals, locals: point.locals.clone() }
+}

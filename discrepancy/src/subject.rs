@@ -1,0 +1,196 @@
+//! What is diagnosed: the model, its unknowns, and the experiments, taken from a study.
+
+use std::sync::Arc;
+
+use mops_core::{Case, Dual, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
+
+use crate::hygiene::{noise_of, without_spikes};
+
+/// A measured signal.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// The signal, by its index in the interface of the model.
+    pub signal: usize,
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Samples, in the unit of the signal.
+    pub values: Vec<f64>,
+    /// Standard deviation of the noise.
+    pub noise: f64,
+}
+
+/// An unknown of one experiment: a parameter of the model.
+#[derive(Debug, Clone, Copy)]
+pub struct Local {
+    /// Its index among the parameters of the model.
+    pub parameter: usize,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+    /// First guess.
+    pub start: f64,
+    /// Typical size of a change.
+    pub scale: f64,
+}
+
+/// An experiment.
+#[derive(Debug, Clone)]
+pub struct Measurement {
+    /// Name.
+    pub name: String,
+    /// Role.
+    pub role: Role,
+    /// Inputs.
+    pub case: Case,
+    /// Index into the jobs of the study.
+    pub job: usize,
+    /// What is unknown of it: start values.
+    pub locals: Vec<Local>,
+    /// What was measured.
+    pub series: Vec<Series>,
+    /// Its end, s.
+    pub horizon: f64,
+}
+
+/// What is diagnosed.
+pub struct Subject {
+    /// The study.
+    pub study: Arc<Study>,
+    /// The model as declared.
+    pub model: Arc<dyn Model>,
+    /// Unknown tuners of the whole study, by index.
+    pub globals: Vec<usize>,
+    /// The experiments.
+    pub measurements: Vec<Measurement>,
+    /// What a reader should know of the data.
+    pub notes: Vec<String>,
+}
+
+impl Subject {
+    /// Takes it from a study.
+    ///
+    /// # Errors
+    /// No experiment for calibration, no channels, several models, or a model that does not open its equations.
+    pub fn new(study: &Study) -> Result<Self, Mistake> {
+        let measured = |job: &usize| {
+            let case = &study.cases[study.jobs[*job].case];
+            case.experiment.as_ref().is_some_and(|e| !e.channels.is_empty())
+        };
+        let jobs: Vec<usize> = (0..study.jobs.len()).filter(measured).collect();
+        let Some(&first) = jobs.first() else {
+            return Err(Mistake::new("experiments", "a diagnosis needs measured channels")
+                .with_help("add an experiment with `channels`"));
+        };
+        let index = study.jobs[first].model;
+        if jobs.iter().any(|&job| study.jobs[job].model != index) {
+            return Err(Mistake::new(
+                "models",
+                "a diagnosis looks at one model, and the experiments belong to several",
+            )
+            .with_help("keep one model in the study"));
+        }
+        let (name, model) = &study.models[index];
+        if model.ported().is_none() && model.augmented().is_none() {
+            let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
+            return Err(
+                Mistake::new("models", fact).with_help("`mops check` tells which places the models of a study have")
+            );
+        }
+        let globals: Vec<usize> = (0..study.tuners.len())
+            .filter(|&i| study.tuners[i].case.is_none() && study.tuners[i].active && study.tuners[i].tie.is_none())
+            .collect();
+        let mut notes = Vec::new();
+        let mut measurements = Vec::new();
+        for job in jobs {
+            let plan = &study.jobs[job];
+            let case = &study.cases[plan.case];
+            let experiment = case.experiment.as_ref().expect("it was looked for");
+            let mut series = Vec::new();
+            for channel in &experiment.channels {
+                let signals = &model.interface().signals;
+                let signal = signals.iter().position(|s| s.name == channel.signal).expect("checked by the study");
+                let estimate = noise_of(&channel.times, &channel.values);
+                let noise = channel.noise.unwrap_or(estimate);
+                let (times, values, dropped) = without_spikes(&channel.times, &channel.values, noise.max(estimate));
+                if dropped > 0 {
+                    notes.push(format!(
+                        "{dropped} samples of `{}` in `{}` stand alone, far from their neighbours, and are left out",
+                        channel.signal, case.name
+                    ));
+                }
+                if channel.noise.is_none() {
+                    notes.push(format!(
+                        "the noise of `{}` in `{}` was estimated from neighbouring samples: {noise:.3e} {}",
+                        channel.signal, case.name, signals[signal].unit
+                    ));
+                }
+                let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
+                series.push(Series { signal, name, unit, times, values, noise });
+            }
+            let horizon = series.iter().filter_map(|s| s.times.last().copied()).fold(0.0, f64::max);
+            let mut locals = Vec::new();
+            for (parameter, source) in plan.parameters.iter().enumerate() {
+                let ParameterSource::Tuner { tuner, factor } = *source else { continue };
+                let t = &study.tuners[tuner];
+                if t.case == Some(plan.case) && t.active && t.tie.is_none() {
+                    let bounds = t.bounds.map(|b| b * factor);
+                    let scale = ((bounds[1] - bounds[0]) / 20.0).abs();
+                    locals.push(Local { parameter, bounds, start: t.start * factor, scale });
+                }
+            }
+            let case = case.clone();
+            measurements.push(Measurement {
+                name: case.name.clone(),
+                role: experiment.role,
+                case,
+                job,
+                locals,
+                series,
+                horizon,
+            });
+        }
+        if !measurements.iter().any(|m| m.role == Role::Calibration) {
+            return Err(Mistake::new("experiments", "no experiment is for calibration")
+                .with_help("give one the role \"calibration\""));
+        }
+        Ok(Self { study: Arc::new(study.clone()), model: Arc::clone(model), globals, measurements, notes })
+    }
+
+    /// Start values of the global unknowns.
+    pub fn start(&self) -> Vec<f64> {
+        self.globals.iter().map(|&g| self.study.tuners[g].start).collect()
+    }
+
+    /// Whether an unknown is looked for in its logarithm.
+    pub fn is_log(&self, global: usize) -> bool {
+        self.study.tuners[self.globals[global]].scale == Scale::Log
+    }
+
+    /// Values of all tuners for given globals; those of cases at their start.
+    fn tuners(&self, globals: &[f64]) -> Vec<f64> {
+        let mut tuners: Vec<f64> = self.study.tuners.iter().map(|t| t.start).collect();
+        self.globals.iter().zip(globals).for_each(|(&g, &value)| tuners[g] = value);
+        self.study.apply_ties(&mut tuners);
+        tuners
+    }
+
+    /// The parameters of the declared model in an experiment, its locals at their start.
+    pub fn parameters(&self, measurement: usize, globals: &[f64]) -> Vec<f64> {
+        self.study.parameters(&self.study.jobs[self.measurements[measurement].job], &self.tuners(globals))
+    }
+
+    /// The derivative of these by one of the globals.
+    pub fn slopes(&self, measurement: usize, globals: &[f64], global: usize) -> Vec<f64> {
+        let mut tuners: Vec<Dual<1>> = self.study.tuners.iter().map(|t| Dual::from(t.start)).collect();
+        for (i, (&g, &value)) in self.globals.iter().zip(globals).enumerate() {
+            tuners[g] = if i == global { Dual::variable(value, 0) } else { Dual::from(value) };
+        }
+        self.study.apply_ties(&mut tuners);
+        let job = &self.study.jobs[self.measurements[measurement].job];
+        let tangents: Vec<f64> = tuners.iter().map(|t| t.tangents()[0]).collect();
+        self.study.parameter_slopes(job, &tangents)
+    }
+}

@@ -1,0 +1,347 @@
+//! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
+
+use mops_core::{Acting, At, Effect, Port, PortKind};
+
+use crate::candidate::{Candidate, Sizes};
+use crate::fit::Piece;
+use crate::trajectory::Trajectory;
+use mops_models::WithEffects;
+
+/// Indices of a candidate's places in a model.
+#[derive(Debug, Clone, Copy)]
+pub enum Spot {
+    /// Force of an equation, position, speed.
+    Joint(usize, usize, usize),
+    /// Force of an equation, state.
+    Process(usize, usize),
+    /// Input.
+    Actuator(usize),
+    /// Series of the piece.
+    Sensor(usize),
+}
+
+/// Finds a port in a model and a piece; `None` for a sensor without data.
+pub fn spot(port: &Port, model: &WithEffects, piece: &Piece) -> Option<Spot> {
+    let interface = model.model().interface();
+    let states = model.model().equation_states();
+    let state = |name: &str| states.iter().position(|s| s.name == name);
+    let force = |name: &str| {
+        let mut processes = interface.ports.iter().filter_map(|p| match p {
+            Port::Process { state, .. } => Some(state),
+            _ => None,
+        });
+        processes.position(|s| s == name)
+    };
+    Some(match port {
+        Port::Joint { position, velocity, .. } => Spot::Joint(force(velocity)?, state(position)?, state(velocity)?),
+        Port::Process { state: name, .. } => Spot::Process(force(name)?, state(name)?),
+        Port::Actuator { input } => Spot::Actuator(interface.inputs.iter().position(|i| i.name == *input)?),
+        Port::Sensor { output } => Spot::Sensor(piece.series.iter().position(|s| s.name == *output)?),
+    })
+}
+
+/// Root mean square about the middle, doubled: the amplitude of a sine is 0.7 of it.
+#[allow(clippy::cast_precision_loss)]
+fn amplitude(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    (values.map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt() * 2.0_f64.sqrt()
+}
+
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
+/// Typical sizes at a place, over the pieces in which it is measured.
+pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: &[Trajectory]) -> Option<Sizes> {
+    let spots: Vec<(usize, Spot)> =
+        pieces.iter().enumerate().filter_map(|(i, piece)| Some((i, spot(place, model, piece)?))).collect();
+    let record = pieces.iter().map(|p| p.horizon).fold(0.0, f64::max);
+    let samples = pieces.iter().flat_map(|p| &p.series);
+    let sample = samples.map(|s| record.min(s.times[s.times.len() - 1] / (s.times.len() - 1).max(1) as f64));
+    let sample = sample.fold(f64::INFINITY, f64::min);
+    let moments = || spots.iter().flat_map(|(i, _)| trajectories[*i].moments.iter());
+    let positive = |x: f64| if x.is_finite() && x > 1e-300 { x } else { 1.0 };
+    let sizes = match spots.first()?.1 {
+        Spot::Joint(w, q, v) => {
+            let inputs = trajectories[0].inputs();
+            let accelerations = moments().map(|m| m.rates[v]);
+            let mobility = moments().map(|m| m.b[(v, inputs + w)].abs()).fold(0.0, f64::max);
+            let output = amplitude(accelerations) / positive(mobility);
+            let speed = positive(amplitude(moments().map(|m| m.x[v])));
+            let position = positive(amplitude(moments().map(|m| m.x[q])));
+            Sizes {
+                output,
+                position,
+                speed,
+                value: 1.0,
+                time: position / speed,
+                range: range(moments().map(|m| m.x[q])),
+                record,
+                sample,
+            }
+        }
+        Spot::Process(w, s) => {
+            let inputs = trajectories[0].inputs();
+            let mobility = moments().map(|m| m.b[(s, inputs + w)].abs()).fold(0.0, f64::max);
+            let rate = amplitude(moments().map(|m| m.rates[s]));
+            let position = positive(amplitude(moments().map(|m| m.x[s])));
+            let speed = positive(rate);
+            Sizes {
+                output: rate / positive(mobility),
+                position,
+                speed,
+                value: 1.0,
+                time: position / speed,
+                range: range(moments().map(|m| m.x[s])),
+                record,
+                sample,
+            }
+        }
+        Spot::Actuator(input) => {
+            let value = positive(amplitude(moments().map(|m| m.u[input])));
+            let fastest =
+                moments().map(|m| amplitude(m.rates.iter().copied()) / positive(amplitude(m.x.iter().copied())));
+            let time = 1.0 / positive(fastest.fold(0.0, f64::max)).clamp(1.0 / record, 1.0 / sample);
+            Sizes {
+                output: value,
+                position: value,
+                speed: value / time,
+                value,
+                time,
+                range: range(moments().map(|m| m.u[input])),
+                record,
+                sample,
+            }
+        }
+        Spot::Sensor(_) => {
+            let of = |i: usize, s: Spot| match s {
+                Spot::Sensor(series) => trajectories[i].predicted[series].as_slice(),
+                _ => &[],
+            };
+            let values = || spots.iter().flat_map(|&(i, s)| of(i, s).iter().copied());
+            let rates = spots.iter().flat_map(|&(i, s)| of(i, s).windows(2).map(|w| (w[1] - w[0]) / sample));
+            let value = positive(amplitude(values()));
+            let speed = positive(amplitude(rates.collect::<Vec<_>>().into_iter()));
+            Sizes {
+                output: value,
+                position: value,
+                speed,
+                value,
+                time: value / speed,
+                range: range(values()),
+                record,
+                sample,
+            }
+        }
+    };
+    Some(Sizes { output: positive(sizes.output), ..sizes })
+}
+
+/// What a candidate at these strengths adds to the residuals of a piece; `None` where it cannot act there.
+pub fn trace(
+    candidate: &Candidate,
+    strengths: &[f64],
+    model: &WithEffects,
+    piece: &Piece,
+    along: &Trajectory,
+) -> Option<Vec<f64>> {
+    let total: usize = piece.series.iter().map(|s| s.times.len()).sum();
+    if candidate.only.is_some_and(|only| only != piece.measurement) {
+        return Some(vec![0.0; total]);
+    }
+    let effect = candidate.effect.as_ref();
+    let acting = effect.act(strengths);
+    let here = spot(&candidate.port, model, piece)?;
+    let companion = match &candidate.companion {
+        Some(port) => Some(spot(port, model, piece)?),
+        None => None,
+    };
+    match here {
+        Spot::Sensor(series) => {
+            let mut all = vec![0.0; total];
+            let offset: usize = piece.series[..series].iter().map(|s| s.times.len()).sum();
+            let change = measured(acting.as_ref(), effect, series, companion, piece, along);
+            all[offset..offset + change.len()].copy_from_slice(&change);
+            Some(all)
+        }
+        _ => {
+            let (column, signal) = signal(acting.as_ref(), effect, here, companion, piece, along, model)?;
+            Some(along.response(column, &signal))
+        }
+    }
+}
+
+/// The signal that an effect adds at the nodes of a motion, and its column.
+fn signal(
+    acting: &dyn Acting<f64>,
+    effect: &dyn Effect,
+    here: Spot,
+    companion: Option<Spot>,
+    piece: &Piece,
+    along: &Trajectory,
+    model: &WithEffects,
+) -> Option<(usize, Vec<f64>)> {
+    let inputs = along.inputs();
+    let mut z = vec![0.0; effect.states()];
+    let mut memory = vec![f64::NAN; effect.memory()];
+    let mut signal = Vec::with_capacity(along.moments.len());
+    let command = |t: f64| match here {
+        Spot::Actuator(input) => {
+            let name = &model.model().interface().inputs[input].name;
+            piece.case.input(name).map_or(0.0, |input| input.at(t.max(0.0)))
+        }
+        _ => 0.0,
+    };
+    let look = |k: usize| {
+        let m = &along.moments[k];
+        let (other, other_speed) = match companion {
+            Some(Spot::Joint(_, q, v)) => (m.x[q], m.x[v]),
+            Some(Spot::Process(_, s)) => (m.x[s], 0.0),
+            Some(Spot::Actuator(i)) => (m.u[i], 0.0),
+            Some(Spot::Sensor(_)) | None => (0.0, 0.0),
+        };
+        let (value, q, v, a, mobility) = match here {
+            Spot::Joint(w, q, v) => {
+                let gain = m.b[(v, inputs + w)] * along.forward[w];
+                (0.0, m.x[q], m.x[v], if effect.is_inertial() { m.rates[v] } else { 0.0 }, gain)
+            }
+            Spot::Process(_, s) => (0.0, m.x[s], 0.0, 0.0, 0.0),
+            Spot::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
+            Spot::Sensor(_) => (0.0, 0.0, 0.0, 0.0, 0.0),
+        };
+        At { t: m.t, value, q, v, a, mobility, other, other_speed, u: &m.u }
+    };
+    let delay = acting.delay();
+    for k in 0..along.moments.len() {
+        let at = look(k);
+        if k == 0 {
+            acting.start(&at, &mut z);
+        } else if !z.is_empty() {
+            advance(acting, &look(k - 1), &at, &mut z);
+        }
+        let value = if let Some(delay) = delay {
+            command(at.t - delay)
+        } else if memory.is_empty() {
+            acting.value(&at, &z)
+        } else {
+            acting.remember(&at, &mut memory);
+            acting.recall(&at, &memory)
+        };
+        let change = match here {
+            Spot::Actuator(_) => value - at.value,
+            _ => {
+                let friction = acting.friction(&at, &z).map_or(0.0, |f| match at.v {
+                    v if v > 0.0 => -f.sliding[0],
+                    v if v < 0.0 => f.sliding[1],
+                    _ => 0.0,
+                });
+                value + friction
+            }
+        };
+        if !change.is_finite() {
+            return None;
+        }
+        signal.push(change);
+    }
+    let column = match here {
+        Spot::Joint(w, ..) | Spot::Process(w, _) => {
+            signal.iter_mut().for_each(|s| *s *= along.forward[w]);
+            inputs + w
+        }
+        Spot::Actuator(input) => input,
+        Spot::Sensor(_) => return None,
+    };
+    Some((column, signal))
+}
+
+/// Moves the states of an effect from one node to the next, in four steps of the classical Runge-Kutta method.
+fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &mut [f64]) {
+    const PARTS: u32 = 4;
+    let between = |s: f64| {
+        let mix = |a: f64, b: f64| a + s * (b - a);
+        At {
+            t: mix(from.t, to.t),
+            value: mix(from.value, to.value),
+            q: mix(from.q, to.q),
+            v: mix(from.v, to.v),
+            a: mix(from.a, to.a),
+            mobility: mix(from.mobility, to.mobility),
+            other: mix(from.other, to.other),
+            other_speed: mix(from.other_speed, to.other_speed),
+            u: from.u,
+        }
+    };
+    let h = (to.t - from.t) / f64::from(PARTS);
+    let n = z.len();
+    let mut k = vec![vec![0.0; n]; 4];
+    for part in 0..PARTS {
+        let s = |c: f64| (f64::from(part) + c) / f64::from(PARTS);
+        for (stage, c) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
+            let moved: Vec<f64> =
+                (0..n).map(|i| if stage == 0 { z[i] } else { z[i] + c * h * k[stage - 1][i] }).collect();
+            let mut dz = vec![0.0; n];
+            acting.rates(&between(s(c)), &moved, &mut dz);
+            k[stage] = dz;
+        }
+        for i in 0..n {
+            z[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
+        }
+    }
+}
+
+/// What an effect changes at a sensor, in units of the noise.
+fn measured(
+    acting: &dyn Acting<f64>,
+    effect: &dyn Effect,
+    series: usize,
+    companion: Option<Spot>,
+    piece: &Piece,
+    along: &Trajectory,
+) -> Vec<f64> {
+    let s = &piece.series[series];
+    let y = &along.predicted[series];
+    let interpolate = |t: f64| {
+        let k = s.times.partition_point(|&x| x <= t).clamp(1, s.times.len() - 1);
+        let share = ((t - s.times[k - 1]) / (s.times[k] - s.times[k - 1])).clamp(0.0, 1.0);
+        y[k - 1] + share * (y[k] - y[k - 1])
+    };
+    let mut z = vec![0.0; effect.states()];
+    let mut memory = vec![f64::NAN; effect.memory()];
+    let look = |k: usize| {
+        let other = match companion {
+            Some(Spot::Sensor(other)) => along.predicted[other].get(k).copied().unwrap_or(0.0),
+            _ => 0.0,
+        };
+        At { t: s.times[k], value: y[k], q: y[k], v: 0.0, a: 0.0, mobility: 0.0, other, other_speed: 0.0, u: &[] }
+    };
+    (0..y.len())
+        .map(|k| {
+            let at = look(k);
+            if k == 0 {
+                acting.start(&at, &mut z);
+            } else if !z.is_empty() {
+                advance(acting, &look(k - 1), &at, &mut z);
+            }
+            let value = if let Some(delay) = acting.delay() {
+                interpolate(s.times[k] - delay)
+            } else if memory.is_empty() {
+                acting.value(&at, &z)
+            } else {
+                acting.remember(&at, &mut memory);
+                acting.recall(&at, &memory)
+            };
+            (value - y[k]) / s.noise
+        })
+        .collect()
+}
+
+/// Whether a place is a sensor.
+pub fn is_sensor(port: &Port) -> bool {
+    matches!(port, Port::Sensor { .. })
+}
+
+/// The sort of a port, for ranking by place.
+pub fn kind(port: &Port, ports: &[Port]) -> Option<PortKind> {
+    port.kind(ports)
+}

@@ -1,0 +1,122 @@
+//! Variants: the declared model with effects at chosen strengths, as a least-squares problem.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{Model, Scope, Strength};
+use mops_models::WithEffects;
+
+use crate::base::globals;
+use crate::candidate::{Candidate, Sizes};
+use crate::fit::{Fit, Global, Piece, Point, Sets};
+use crate::subject::{Local, Subject};
+
+/// A candidate with strengths to start from.
+#[derive(Clone)]
+pub struct Added {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Its strengths.
+    pub strengths: Vec<f64>,
+    /// Strengths that differ from experiment to experiment: experiment, index of the strength, value.
+    pub own: Vec<(usize, usize, f64)>,
+    /// Typical sizes at its place.
+    pub sizes: Sizes,
+}
+
+/// Where the strengths of an added effect stand among the parameters of the model.
+pub struct Variant {
+    /// The model.
+    pub model: Arc<WithEffects>,
+    /// For each effect added the first of its parameters.
+    pub first: Vec<usize>,
+}
+
+impl Variant {
+    /// The declared model with these effects.
+    ///
+    /// # Panics
+    /// If an effect does not fit its place: candidates do.
+    pub fn new(subject: &Subject, added: &[Added]) -> Self {
+        let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
+        let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
+        let mut next = subject.model.interface().parameters.len();
+        let mut first = Vec::new();
+        for a in added {
+            first.push(next);
+            let effect = &a.candidate.effect;
+            next += effect.strengths().len() + if effect.free_start() { effect.states() } else { 0 };
+        }
+        Self { model: Arc::new(model), first }
+    }
+
+    /// Strengths as the experiment `measurement` has them at a point.
+    pub fn strengths(&self, fit: &Fit<'_>, point: &Point, index: usize, count: usize, piece: usize) -> Vec<f64> {
+        let parameters = fit.parameters(piece, point);
+        parameters[self.first[index]..self.first[index] + count].to_vec()
+    }
+}
+
+/// Whether a strength is looked for in its logarithm: shapes that cannot be 0.
+fn is_log(strength: &Strength, value: f64) -> bool {
+    strength.neutral != Some(0.0) && strength.bounds[0] >= 0.0 && value > 0.0
+}
+
+/// The problem of fitting a variant to pieces of experiments; `tuners` are the globals of the study and `locals` the start
+/// values of the pieces to begin with; those in `held` stay where they are.
+pub fn problem<'a>(
+    subject: &'a Subject,
+    added: &[Added],
+    mut pieces: Vec<Piece>,
+    tuners: &[f64],
+    mut locals: Vec<Vec<f64>>,
+    held: &[usize],
+    simulations: &'a AtomicUsize,
+) -> (Fit<'a>, Point, Variant) {
+    let variant = Variant::new(subject, added);
+    let mut all = globals(subject);
+    for &k in held {
+        all[k].bounds = [tuners[k]; 2];
+    }
+    let mut values = tuners.to_vec();
+    for (a, &first) in added.iter().zip(&variant.first) {
+        let effect = a.candidate.effect.as_ref();
+        for (k, strength) in effect.strengths().iter().enumerate() {
+            let (parameter, value) = (first + k, a.strengths[k]);
+            let typical = a.sizes.of(strength.dimension);
+            let scale = if value != 0.0 { value.abs() } else { 0.1 * typical };
+            if strength.fixed {
+                pieces.iter_mut().for_each(|piece| piece.fixed.push((parameter, value)));
+            } else if strength.scope == Scope::Experiment {
+                for (piece, locals) in pieces.iter_mut().zip(&mut locals) {
+                    let own = a.own.iter().find(|(m, s, _)| *m == piece.measurement && *s == k);
+                    let value = own.map_or(value, |own| own.2);
+                    piece.locals.push(Local { parameter, bounds: strength.bounds, start: value, scale: 1.0 });
+                    locals.push(value);
+                }
+            } else {
+                let log = is_log(strength, value);
+                all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale });
+                values.push(value);
+            }
+        }
+        if let Some(only) = a.candidate.only {
+            let neutral = effect.strengths()[0].neutral.unwrap_or(0.0);
+            pieces.iter_mut().filter(|p| p.measurement != only).for_each(|p| p.fixed.push((first, neutral)));
+        }
+        if effect.free_start() {
+            for (piece, locals) in pieces.iter_mut().zip(&mut locals) {
+                for state in 0..effect.states() {
+                    let parameter = first + effect.strengths().len() + state;
+                    let scale = if state == 0 { a.sizes.position } else { a.sizes.speed };
+                    let bounds = [-10.0 * scale, 10.0 * scale];
+                    piece.locals.push(Local { parameter, bounds, start: 0.0, scale: 0.1 * scale });
+                    locals.push(0.0);
+                }
+            }
+        }
+    }
+    let model: Arc<dyn Model> = Arc::clone(&variant.model) as Arc<dyn Model>;
+    let fit = Fit { subject, model, globals: all, pieces, simulations };
+    (fit, Point { globals: values, locals }, variant)
+}

@@ -1,0 +1,38 @@
+//! Mass that moves along.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `added-mass`.
+pub struct AddedMass;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    m: S,
+}
+
+impl Definition for AddedMass {
+    const NAME: &'static str = "added-mass";
+    const ABOUT: &'static str = "Mass or inertia that moves along: a load, the water around a body.";
+    const FORMULA: &'static str = "-m q''";
+    const SOURCE: &'static str = "H. Lamb, Hydrodynamics, 6th edition (Cambridge 1932), chapter VI";
+    const CLASS: EffectClass = EffectClass::Inertial;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[Strength::positive(
+        "m",
+        "mass or inertia",
+        Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME),
+    )];
+    const IS_INERTIAL: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { m: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.m * at.a / (self.m * at.mobility + 1.0)
+    }
+}

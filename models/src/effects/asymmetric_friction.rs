@@ -1,0 +1,51 @@
+//! Dry friction of different size forward and backward.
+
+use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `asymmetric-friction`.
+pub struct AsymmetricFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    skew: S,
+}
+
+impl Definition for AsymmetricFriction {
+    const NAME: &'static str = "asymmetric-friction";
+    const ABOUT: &'static str = "Dry friction that differs between forward and backward motion.";
+    const FORMULA: &'static str =
+        "-c (1 + skew) forward, c (1 - skew) backward; at rest whatever holds it, up to these";
+    const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
+                                  tools and compensation methods for the control of machines with friction, Automatica \
+                                  30 (1994), section 2.1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "mean of both friction forces", Dimension::OUTPUT),
+        Strength::shape(
+            "skew",
+            "difference of both over their sum, positive where forward motion is harder",
+            Dimension::ONE,
+            [-1.0, 1.0],
+            Trials::Plain(&[-0.4, 0.4]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], skew: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+        S::from(0.0)
+    }
+
+    fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+        let sliding = [self.c * (self.skew + 1.0), self.c * (-self.skew + 1.0)];
+        Some(DryFriction { sliding, limit: sliding })
+    }
+}

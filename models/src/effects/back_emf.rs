@@ -1,0 +1,35 @@
+//! An actuator that a motion weakens.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `back-emf`.
+pub struct BackEmf;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+}
+
+impl Definition for BackEmf {
+    const NAME: &'static str = "back-emf";
+    const ABOUT: &'static str = "The motion of a joint induces a voltage against the command.";
+    const FORMULA: &'static str = "u - k v, v the speed of the companion joint";
+    const SOURCE: &'static str = "R. Isermann, Mechatronic Systems: Fundamentals (Springer 2005), section 5.3";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("k", "command lost per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value - self.k * at.other_speed
+    }
+}

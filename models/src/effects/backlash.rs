@@ -1,0 +1,50 @@
+//! Play.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::clamp;
+
+/// `backlash`.
+pub struct Backlash;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    gap: S,
+}
+
+impl Definition for Backlash {
+    const NAME: &'static str = "backlash";
+    const ABOUT: &'static str = "Play of a gear: the output follows only after the gap is crossed.";
+    const FORMULA: &'static str = "the output moves as little as keeps it within u - gap/2 and u + gap/2";
+    const SOURCE: &'static str = "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, \
+                                  Automatica 38 (2002), section 2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("gap", "width of the gap", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.15, 0.4]))];
+    const MEMORY: usize = 1;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { gap: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value
+    }
+
+    fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
+        let first = memory[0].value().is_nan();
+        memory[0] = if first { at.value } else { self.recall(at, memory) };
+    }
+
+    fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {
+        if self.gap.value() > 0.0 {
+            clamp(memory[0], at.value - self.gap * 0.5, at.value + self.gap * 0.5)
+        } else {
+            at.value
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! A force with hysteresis.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{power, sign};
+
+/// `bouc-wen`.
+pub struct BoucWen;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    y: S,
+    sigma: S,
+    n: S,
+}
+
+impl Definition for BoucWen {
+    const NAME: &'static str = "bouc-wen";
+    const ABOUT: &'static str = "A force with hysteresis, elastic at first and yielding towards a limit.";
+    const FORMULA: &'static str = "-c z, z' = (v - sigma |v| |z|^(n-1) z + (sigma - 1) v |z|^n)/y";
+    const SOURCE: &'static str = "R. Bouc, Forced vibration of mechanical systems with hysteresis, Proc. 4th Conf. on \
+                                  Nonlinear Oscillation, Prague (1967); Y.-K. Wen, Method for random vibration of \
+                                  hysteretic systems, Journal of the Engineering Mechanics Division 102 (1976); \
+                                  normalised as in M. Ismail, F. Ikhouane, J. Rodellar, The hysteresis Bouc-Wen model, \
+                                  a survey, Archives of Computational Methods in Engineering 16 (2009)";
+    const CLASS: EffectClass = EffectClass::Elastic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "force at which it yields", Dimension::OUTPUT),
+        Strength::shape(
+            "y",
+            "displacement over which the force builds up",
+            Dimension::POSITION,
+            [1e-4, f64::INFINITY],
+            Trials::Scaled(&[0.05, 0.2, 0.7, 2.0]),
+        ),
+        Strength::shape(
+            "sigma",
+            "1/2: unloads like a spring, more: takes energy at once",
+            Dimension::ONE,
+            [0.5, 10.0],
+            Trials::Plain(&[0.5, 1.0]),
+        ),
+        Strength::shape("n", "sharpness of the yielding", Dimension::ONE, [1.0, 10.0], Trials::Plain(&[1.0, 2.0])),
+    ];
+    const STATES: usize = 1;
+    const FREE_START: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], y: s[1], sigma: s[2], n: s[3] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        let full = power(z[0].abs(), self.n);
+        let against = self.sigma * at.v.abs() * full * sign(z[0].value());
+        dz[0] = (at.v - against + (self.sigma - 1.0) * at.v * full) / self.y;
+    }
+
+    fn value(&self, _: &At<'_, S>, z: &[S]) -> S {
+        -self.c * z[0]
+    }
+}

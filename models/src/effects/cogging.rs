@@ -1,0 +1,48 @@
+//! A force that repeats with the teeth or magnets.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, phase};
+
+/// `cogging`.
+pub struct Cogging;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    n: S,
+    phase: S,
+}
+
+impl Definition for Cogging {
+    const NAME: &'static str = "cogging";
+    const ABOUT: &'static str = "A force that repeats a whole number of times in a turn, from magnets or teeth.";
+    const FORMULA: &'static str = "a sin(n q + phase)";
+    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
+                                  Collective 2003), chapter 4";
+    const CLASS: EffectClass = EffectClass::Periodic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("a", "amplitude", Dimension::OUTPUT),
+        Strength::shape(
+            "n",
+            "periods in a turn",
+            Dimension::ONE.over(Dimension::POSITION),
+            NOT_NEGATIVE,
+            Trials::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0]),
+        )
+        .kept(),
+        phase(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        self.a * (self.n * at.q + self.phase).sin()
+    }
+}

@@ -1,0 +1,34 @@
+//! A load that does not change.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `constant-force`.
+pub struct ConstantForce;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    f: S,
+}
+
+impl Definition for ConstantForce {
+    const NAME: &'static str = "constant-force";
+    const ABOUT: &'static str = "A constant force, torque, flow or gain of heat: an unknown load, a slope, the sun.";
+    const FORMULA: &'static str = "f";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 3-2";
+    const CLASS: EffectClass = EffectClass::Bias;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed("f", "what is added", Dimension::OUTPUT)];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { f: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+        self.f
+    }
+}

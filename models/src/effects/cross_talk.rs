@@ -1,0 +1,35 @@
+//! A sensor that another one disturbs.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `cross-talk`.
+pub struct CrossTalk;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+}
+
+impl Definition for CrossTalk {
+    const NAME: &'static str = "cross-talk";
+    const ABOUT: &'static str = "What another sensor measures is seen in this one too.";
+    const FORMULA: &'static str = "y + k y2, y2 the signal of the companion sensor";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const COMPANION: Option<PortKind> = Some(PortKind::Sensor);
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::signed("k", "share of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value + self.k * at.other
+    }
+}

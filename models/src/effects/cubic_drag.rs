@@ -1,0 +1,37 @@
+//! Damping with the third power of the speed.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `cubic-drag`.
+pub struct CubicDrag;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+}
+
+impl Definition for CubicDrag {
+    const NAME: &'static str = "cubic-drag";
+    const ABOUT: &'static str = "A force against the motion in proportion to the third power of the speed.";
+    const FORMULA: &'static str = "-k v^3";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 3.3.2";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[Strength::positive(
+        "k",
+        "force per speed to the third power",
+        Dimension::OUTPUT.over(Dimension::SPEED.power(3)),
+    )];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * at.v * at.v * at.v
+    }
+}

@@ -1,0 +1,45 @@
+//! A spring that hardens or softens.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::ANY;
+
+/// `cubic-stiffness`.
+pub struct CubicStiffness;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    rest: S,
+}
+
+impl Definition for CubicStiffness {
+    const NAME: &'static str = "cubic-stiffness";
+    const ABOUT: &'static str = "A spring whose force has a share with the third power of the displacement: hardening, \
+                                 or softening where it is negative.";
+    const FORMULA: &'static str = "-k (q - rest)^3";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 4.1 (Duffing)";
+    const CLASS: EffectClass = EffectClass::Elastic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::signed(
+            "k",
+            "force per displacement to the third power",
+            Dimension::OUTPUT.over(Dimension::POSITION.power(3)),
+        ),
+        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Within(&[0.2, 0.5, 0.8])),
+    ];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], rest: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        let d = at.q - self.rest;
+        -self.k * d * d * d
+    }
+}

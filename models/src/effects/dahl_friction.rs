@@ -1,0 +1,50 @@
+//! Dry friction with elastic asperities.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `dahl-friction`.
+pub struct DahlFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    y: S,
+}
+
+impl Definition for DahlFriction {
+    const NAME: &'static str = "dahl-friction";
+    const ABOUT: &'static str = "Dry friction that builds up over a small displacement, like a spring that yields.";
+    const FORMULA: &'static str = "-c z, z' = (v/y) (1 - z sgn(v))";
+    const SOURCE: &'static str =
+        "P. R. Dahl, A solid friction model, report TOR-0158(3107-18)-1, The Aerospace Corporation (1968)";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "friction force", Dimension::OUTPUT),
+        Strength::shape(
+            "y",
+            "displacement over which the force builds up",
+            Dimension::POSITION,
+            [1e-4, f64::INFINITY],
+            Trials::Scaled(&[0.01, 0.05, 0.2]),
+        ),
+    ];
+    const STATES: usize = 1;
+    const RARITY: u8 = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], y: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
+    }
+
+    fn value(&self, _: &At<'_, S>, z: &[S]) -> S {
+        -self.c * z[0]
+    }
+}

@@ -1,0 +1,68 @@
+//! A mass on a spring that hangs on a joint.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `flexible-mode`.
+pub struct FlexibleMode;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    m: S,
+    w: S,
+    d: S,
+}
+
+impl Definition for FlexibleMode {
+    const NAME: &'static str = "flexible-mode";
+    const ABOUT: &'static str =
+        "A second mass, attached to the joint through a spring and a damper, with a resonance of its own.";
+    const FORMULA: &'static str = "m (w^2 (z - q) + 2 d w (z' - v)), z'' = -w^2 (z - q) - 2 d w (z' - v)";
+    const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), section 3.2";
+    const CLASS: EffectClass = EffectClass::Inertial;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive(
+            "m",
+            "attached mass or inertia",
+            Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME),
+        ),
+        Strength::shape(
+            "w",
+            "frequency of the attached mass with the joint held, rad/s",
+            Dimension::PER_TIME,
+            NOT_NEGATIVE,
+            Trials::Frequencies,
+        ),
+        Strength::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], Trials::Plain(&[0.02, 0.2])),
+    ];
+    const STATES: usize = 2;
+    const FREE_START: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { m: s[0], w: s[1], d: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+        z.copy_from_slice(&[at.q, at.v]);
+    }
+
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz.copy_from_slice(&[z[1], -self.pull(at, z)]);
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        self.m * self.pull(at, z)
+    }
+}
+
+impl<S: Scalar> AtStrengths<S> {
+    /// Force on the joint per attached mass.
+    fn pull(&self, at: &At<'_, S>, z: &[S]) -> S {
+        self.w * self.w * (z[0] - at.q) + self.d * self.w * (z[1] - at.v) * 2.0
+    }
+}

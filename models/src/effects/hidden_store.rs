@@ -1,0 +1,55 @@
+//! A store that nobody drew.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `hidden-store`.
+pub struct HiddenStore;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    tau: S,
+}
+
+impl Definition for HiddenStore {
+    const NAME: &'static str = "hidden-store";
+    const ABOUT: &'static str = "A second store of heat or matter that exchanges with this one: walls, a dead volume.";
+    const FORMULA: &'static str = "k (z - x), z' = (x - z)/tau";
+    const SOURCE: &'static str = "P. Bacher, H. Madsen, Identifying suitable models for the heat dynamics of \
+                                  buildings, Energy and Buildings 43 (2011), section 3";
+    const CLASS: EffectClass = EffectClass::Flow;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "exchange per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::shape(
+            "tau",
+            "time constant of the hidden store",
+            Dimension::TIME,
+            NOT_NEGATIVE,
+            Trials::Scaled(&[0.3, 1.0, 3.0, 10.0]),
+        ),
+    ];
+    const STATES: usize = 1;
+    const FREE_START: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], tau: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+        z[0] = at.q;
+    }
+
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz[0] = if self.tau.value() > 0.0 { (at.q - z[0]) / self.tau } else { S::from(0.0) };
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        self.k * (z[0] - at.q)
+    }
+}

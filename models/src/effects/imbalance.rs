@@ -1,0 +1,36 @@
+//! A mass off the axis.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+use super::terms::phase;
+
+/// `imbalance`.
+pub struct Imbalance;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    phase: S,
+}
+
+impl Definition for Imbalance {
+    const NAME: &'static str = "imbalance";
+    const ABOUT: &'static str = "The weight of a mass off the axis of a turning joint.";
+    const FORMULA: &'static str = "-a sin(q - phase)";
+    const SOURCE: &'static str = "R. Isermann, Mechatronic Systems: Fundamentals (Springer 2005), section 4.3";
+    const CLASS: EffectClass = EffectClass::Gravity;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("a", "largest torque of the weight", Dimension::OUTPUT), phase()];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], phase: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.a * (at.q - self.phase).sin()
+    }
+}

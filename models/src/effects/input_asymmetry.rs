@@ -1,0 +1,36 @@
+//! An actuator that is stronger one way.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `input-asymmetry`.
+pub struct InputAsymmetry;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+}
+
+impl Definition for InputAsymmetry {
+    const NAME: &'static str = "input-asymmetry";
+    const ABOUT: &'static str = "The command acts stronger one way than the other.";
+    const FORMULA: &'static str = "u + a |u|";
+    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
+                                  Nonlinearities (Wiley 1996), chapter 2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::signed("a", "how much stronger forward and weaker backward, as a share", Dimension::ONE)
+            .within(-1.0, 1.0)];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value + self.a * at.value.abs()
+    }
+}

@@ -1,0 +1,38 @@
+//! A command that must be large enough.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::clamp;
+
+/// `input-dead-zone`.
+pub struct InputDeadZone;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    width: S,
+}
+
+impl Definition for InputDeadZone {
+    const NAME: &'static str = "input-dead-zone";
+    const ABOUT: &'static str = "Small commands do nothing, and larger ones act less by as much.";
+    const FORMULA: &'static str = "u - clamp(u, -width, width)";
+    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
+                                  Nonlinearities (Wiley 1996), chapter 2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("width", "largest command without an effect", Dimension::VALUE)
+            .tried(Trials::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { width: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value - clamp(at.value, -self.width, self.width)
+    }
+}

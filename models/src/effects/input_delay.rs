@@ -1,0 +1,40 @@
+//! An input that acts late.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `input-delay`.
+pub struct InputDelay;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    delay: S,
+}
+
+impl Definition for InputDelay {
+    const NAME: &'static str = "input-delay";
+    const ABOUT: &'static str = "The command acts late by a constant time.";
+    const FORMULA: &'static str = "u(t - delay)";
+    const SOURCE: &'static str =
+        "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
+    const CLASS: EffectClass = EffectClass::DelayLike;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("delay", "delay", Dimension::TIME).tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { delay: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value
+    }
+
+    fn delay(&self) -> Option<S> {
+        Some(self.delay)
+    }
+}

@@ -1,0 +1,34 @@
+//! A factor on an input.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `input-gain`.
+pub struct InputGain;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    g: S,
+}
+
+impl Definition for InputGain {
+    const NAME: &'static str = "input-gain";
+    const ABOUT: &'static str = "The command acts stronger or weaker than declared.";
+    const FORMULA: &'static str = "u (1 + g)";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 2-2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::signed("g", "error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { g: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value * (self.g + 1.0)
+    }
+}

@@ -1,0 +1,50 @@
+//! An actuator of limited speed.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::clamp;
+
+/// `input-rate-limit`.
+pub struct InputRateLimit;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    rate: S,
+}
+
+impl Definition for InputRateLimit {
+    const NAME: &'static str = "input-rate-limit";
+    const ABOUT: &'static str = "The actuator follows the command no faster than a rate.";
+    const FORMULA: &'static str = "u' between -rate and rate";
+    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
+                                  Nonlinearities (Wiley 1996), chapter 2";
+    const CLASS: EffectClass = EffectClass::DelayLike;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("rate", "largest rate", Dimension::VALUE.over(Dimension::TIME))
+            .neutral_at(f64::INFINITY)
+            .tried(Trials::Scaled(&[0.3, 1.0, 3.0, 10.0]))];
+    const MEMORY: usize = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { rate: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value
+    }
+
+    fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
+        let first = memory[0].value().is_nan();
+        memory[0] = if first { at.value } else { self.recall(at, memory) };
+        memory[1] = S::from(at.t);
+    }
+
+    fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {
+        let way = self.rate * (at.t - memory[1].value());
+        if way.value().is_nan() { at.value } else { clamp(at.value, memory[0] - way, memory[0] + way) }
+    }
+}

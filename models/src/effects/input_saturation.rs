@@ -1,0 +1,38 @@
+//! An input with a limit.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::clamp;
+
+/// `input-saturation`.
+pub struct InputSaturation;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    limit: S,
+}
+
+impl Definition for InputSaturation {
+    const NAME: &'static str = "input-saturation";
+    const ABOUT: &'static str = "The actuator gives no more than a limit, either way.";
+    const FORMULA: &'static str = "clamp(u, -limit, limit)";
+    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
+                                  Nonlinearities (Wiley 1996), chapter 2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] = &[Strength::positive("limit", "limit", Dimension::VALUE)
+        .neutral_at(f64::INFINITY)
+        .tried(Trials::Within(&[0.6, 0.7, 0.8, 0.9, 0.96]))];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { limit: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        clamp(at.value, -self.limit, self.limit)
+    }
+}

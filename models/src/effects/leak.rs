@@ -1,0 +1,46 @@
+//! A hole in a store.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `leak`.
+pub struct Leak;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    hole: S,
+}
+
+impl Definition for Leak {
+    const NAME: &'static str = "leak";
+    const ABOUT: &'static str = "Outflow through a hole, with the square root of the level above it.";
+    const FORMULA: &'static str = "-k sqrt(max(x - hole, 0))";
+    const SOURCE: &'static str =
+        "G. K. Batchelor, An Introduction to Fluid Dynamics (Cambridge 1967), section 5.1 (Torricelli)";
+    const CLASS: EffectClass = EffectClass::Flow;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "outflow at a level of 1 above the hole", Dimension::OUTPUT),
+        Strength::shape(
+            "hole",
+            "level of the hole",
+            Dimension::POSITION,
+            NOT_NEGATIVE,
+            Trials::Within(&[-0.3, 0.0, 0.3, 0.6]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], hole: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        let head = at.q - self.hole;
+        if head.value() > 0.0 { -self.k * head.sqrt() } else { S::from(0.0) }
+    }
+}

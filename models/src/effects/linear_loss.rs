@@ -1,0 +1,45 @@
+//! A loss in proportion.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::ANY;
+
+/// `linear-loss`.
+pub struct LinearLoss;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    around: S,
+}
+
+impl Definition for LinearLoss {
+    const NAME: &'static str = "linear-loss";
+    const ABOUT: &'static str = "A loss or exchange in proportion to the difference from the surroundings.";
+    const FORMULA: &'static str = "-k (x - around)";
+    const SOURCE: &'static str = "F. P. Incropera, D. P. DeWitt, T. L. Bergman, A. S. Lavine, Fundamentals of Heat and \
+                                  Mass Transfer, 6th edition (Wiley 2007), section 5.1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "loss per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::shape(
+            "around",
+            "value of the surroundings",
+            Dimension::POSITION,
+            ANY,
+            Trials::Within(&[-0.5, 0.0, 0.5]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], around: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * (at.q - self.around)
+    }
+}

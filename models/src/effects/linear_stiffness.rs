@@ -1,0 +1,39 @@
+//! A spring.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::ANY;
+
+/// `linear-stiffness`.
+pub struct LinearStiffness;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    rest: S,
+}
+
+impl Definition for LinearStiffness {
+    const NAME: &'static str = "linear-stiffness";
+    const ABOUT: &'static str = "A spring or cable that pulls back to a position of rest.";
+    const FORMULA: &'static str = "-k (q - rest)";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 1.1";
+    const CLASS: EffectClass = EffectClass::Elastic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "force per displacement", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Within(&[0.2, 0.5, 0.8])),
+    ];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], rest: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * (at.q - self.rest)
+    }
+}

@@ -1,0 +1,44 @@
+//! Dry friction that grows with the force that is transmitted.
+
+use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `load-dependent-friction`.
+pub struct LoadDependentFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    mu: S,
+}
+
+impl Definition for LoadDependentFriction {
+    const NAME: &'static str = "load-dependent-friction";
+    const ABOUT: &'static str =
+        "Dry friction of a gear or bearing in proportion to the force that an actuator loads it with.";
+    const FORMULA: &'static str =
+        "-mu |u| sgn(v), u the input of the companion actuator; at rest whatever holds it, up to mu |u|";
+    const SOURCE: &'static str = "A. C. Bittencourt, S. Gunnarsson, Static friction in a robot joint: modeling and \
+                                  identification of load and temperature effects, Journal of Dynamic Systems, \
+                                  Measurement, and Control 134 (2012)";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const COMPANION: Option<PortKind> = Some(PortKind::Actuator);
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("mu", "friction force over the input", Dimension::OUTPUT.over(Dimension::VALUE))];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { mu: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+        S::from(0.0)
+    }
+
+    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+        let sliding = [self.mu * at.other.abs(); 2];
+        Some(DryFriction { sliding, limit: sliding })
+    }
+}

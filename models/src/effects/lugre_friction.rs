@@ -1,0 +1,89 @@
+//! Dry friction of bristles that bend and slip.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `lugre-friction`.
+pub struct LugreFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    rise: S,
+    vs: S,
+    y: S,
+    tau: S,
+}
+
+impl Definition for LugreFriction {
+    const NAME: &'static str = "lugre-friction";
+    const ABOUT: &'static str =
+        "Dry friction as the bending of bristles, with a force that falls as the joint moves faster.";
+    const FORMULA: &'static str = "-c (z + tau z'), z' = (v - |v| z/(1 + rise exp(-(v/vs)^2)))/y";
+    const SOURCE: &'static str = "C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control \
+                                  of systems with friction, IEEE Transactions on Automatic Control 40 (1995), section \
+                                  II";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "friction force at high speed", Dimension::OUTPUT),
+        Strength::shape(
+            "rise",
+            "friction force at break-away over that at high speed, less 1",
+            Dimension::ONE,
+            NOT_NEGATIVE,
+            Trials::Plain(&[0.5]),
+        ),
+        Strength::shape(
+            "vs",
+            "speed at which the rise has fallen to 1/e",
+            Dimension::SPEED,
+            NOT_NEGATIVE,
+            Trials::Scaled(&[0.05, 0.2]),
+        ),
+        Strength::shape(
+            "y",
+            "deflection of the bristles at high speed",
+            Dimension::POSITION,
+            [1e-4, f64::INFINITY],
+            Trials::Scaled(&[0.01, 0.05, 0.2]),
+        ),
+        Strength::shape(
+            "tau",
+            "damping of the bristles over their stiffness",
+            Dimension::TIME,
+            NOT_NEGATIVE,
+            Trials::Scaled(&[0.01]),
+        ),
+    ];
+    const STATES: usize = 1;
+    const RARITY: u8 = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], rise: s[1], vs: s[2], y: s[3], tau: s[4] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz[0] = self.slip(at, z[0]);
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        -self.c * (z[0] + self.tau * self.slip(at, z[0]))
+    }
+}
+
+impl<S: Scalar> AtStrengths<S> {
+    /// Rate of the deflection.
+    fn slip(&self, at: &At<'_, S>, z: S) -> S {
+        let mut steady = S::from(1.0);
+        if self.vs.value() > 0.0 {
+            let ratio = at.v / self.vs;
+            steady += self.rise * (-(ratio * ratio)).exp();
+        }
+        (at.v - at.v.abs() * z / steady) / self.y
+    }
+}

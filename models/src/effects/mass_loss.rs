@@ -1,0 +1,39 @@
+//! Mass that becomes less.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `mass-loss`.
+pub struct MassLoss;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    r: S,
+}
+
+impl Definition for MassLoss {
+    const NAME: &'static str = "mass-loss";
+    const ABOUT: &'static str =
+        "Mass or inertia that falls with time, such as fuel or water that runs out without a thrust of its own.";
+    const FORMULA: &'static str = "r t q''; at most 95 % of what moves";
+    const SOURCE: &'static str = "F. O. Eke, Dynamics of variable mass systems, NASA/CR-1998-208246 (1998)";
+    const CLASS: EffectClass = EffectClass::TimeVarying;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("r", "mass or inertia lost per time", Dimension::OUTPUT.over(Dimension::SPEED))];
+    const IS_INERTIAL: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { r: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        // The share of what moves that is gone, not more than leaves something to move.
+        let gone = self.r * at.t;
+        let left = -gone * at.mobility + 1.0;
+        if left.value() > 0.05 { gone * at.a / left } else { at.a / at.mobility * 19.0 }
+    }
+}

@@ -1,0 +1,38 @@
+//! An outflow with another power.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::power;
+
+/// `orifice-exponent`.
+pub struct OrificeExponent;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    n: S,
+}
+
+impl Definition for OrificeExponent {
+    const NAME: &'static str = "orifice-exponent";
+    const ABOUT: &'static str = "An outflow with a power of the level other than the square root.";
+    const FORMULA: &'static str = "-k max(x, 0)^n";
+    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
+    const CLASS: EffectClass = EffectClass::Flow;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "outflow at a level of 1", Dimension::OUTPUT),
+        Strength::shape("n", "power", Dimension::ONE, [0.2, 3.0], Trials::Plain(&[0.3, 0.75, 1.5])),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], n: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * power(at.q, self.n)
+    }
+}

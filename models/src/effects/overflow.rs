@@ -1,0 +1,53 @@
+//! Spilling above a level.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{ANY, power};
+
+/// `overflow`.
+pub struct Overflow;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    level: S,
+    n: S,
+}
+
+impl Definition for Overflow {
+    const NAME: &'static str = "overflow";
+    const ABOUT: &'static str = "Outflow over an edge above a level.";
+    const FORMULA: &'static str = "-k max(x - level, 0)^n";
+    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14 (weirs)";
+    const CLASS: EffectClass = EffectClass::Flow;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT),
+        Strength::shape(
+            "level",
+            "level of the edge",
+            Dimension::POSITION,
+            ANY,
+            Trials::Within(&[0.5, 0.7, 0.85, 0.95]),
+        ),
+        Strength::shape(
+            "n",
+            "power: 1 a plain edge, 3/2 a rectangular weir",
+            Dimension::ONE,
+            [1.0, 2.5],
+            Trials::Plain(&[1.0, 1.5]),
+        )
+        .kept(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], level: s[1], n: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * power(at.q - self.level, self.n)
+    }
+}

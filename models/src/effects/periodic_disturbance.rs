@@ -1,0 +1,44 @@
+//! A vibration.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, phase};
+
+/// `periodic-disturbance`.
+pub struct PeriodicDisturbance;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    w: S,
+    phase: S,
+}
+
+impl Definition for PeriodicDisturbance {
+    const NAME: &'static str = "periodic-disturbance";
+    const ABOUT: &'static str = "A force, torque or flow that changes like a sine over time.";
+    const FORMULA: &'static str = "a sin(w t + phase)";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 7-1";
+    const CLASS: EffectClass = EffectClass::Periodic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("a", "amplitude", Dimension::OUTPUT),
+        Strength::shape("w", "angular frequency, rad/s", Dimension::PER_TIME, NOT_NEGATIVE, Trials::Frequencies),
+        phase().per_experiment(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], w: s[1], phase: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn longest_step(&self) -> f64 {
+        std::f64::consts::TAU / (16.0 * self.w.value().abs())
+    }
+
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        self.a * (self.w * at.t + self.phase).sin()
+    }
+}

@@ -1,0 +1,57 @@
+//! Dry friction that changes with the position.
+
+use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, phase};
+
+/// `position-dependent-friction`.
+pub struct PositionDependentFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    a: S,
+    n: S,
+    phase: S,
+}
+
+impl Definition for PositionDependentFriction {
+    const NAME: &'static str = "position-dependent-friction";
+    const ABOUT: &'static str = "Dry friction that grows and falls over a turn, as with a bent shaft.";
+    const FORMULA: &'static str = "-c (1 + a cos(n q + phase)) sgn(v); at rest whatever holds it, up to that";
+    const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
+                                  tools and compensation methods for the control of machines with friction, Automatica \
+                                  30 (1994), section 2.1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "mean friction force", Dimension::OUTPUT),
+        Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
+        Strength::shape(
+            "n",
+            "periods in a turn",
+            Dimension::ONE.over(Dimension::POSITION),
+            NOT_NEGATIVE,
+            Trials::Plain(&[1.0, 2.0, 4.0]),
+        )
+        .kept(),
+        phase(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], a: s[1], n: s[2], phase: s[3] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+        S::from(0.0)
+    }
+
+    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+        let share = self.a * (self.n * at.q + self.phase).cos();
+        let sliding = [self.c * (share + 1.0); 2];
+        Some(DryFriction { sliding, limit: sliding })
+    }
+}

@@ -1,0 +1,48 @@
+//! A force that repeats along the way.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, phase};
+
+/// `position-ripple`.
+pub struct PositionRipple;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    n: S,
+    phase: S,
+}
+
+impl Definition for PositionRipple {
+    const NAME: &'static str = "position-ripple";
+    const ABOUT: &'static str = "A force that repeats along the position with a period of its own: the magnets of a \
+                                 linear motor, the pitch of a screw.";
+    const FORMULA: &'static str = "a sin(n q + phase)";
+    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
+                                  Collective 2003), chapter 4";
+    const CLASS: EffectClass = EffectClass::Periodic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("a", "amplitude", Dimension::OUTPUT),
+        Strength::shape(
+            "n",
+            "wave number, rad over the period",
+            Dimension::ONE.over(Dimension::POSITION),
+            NOT_NEGATIVE,
+            Trials::Scaled(&[2.0, 3.5, 5.0, 7.0, 9.0, 12.0, 16.0, 21.0, 28.0, 36.0]),
+        ),
+        phase(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        self.a * (self.n * at.q + self.phase).sin()
+    }
+}

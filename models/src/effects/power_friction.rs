@@ -1,0 +1,40 @@
+//! Friction with a power of the speed.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{power, sign};
+
+/// `power-friction`.
+pub struct PowerFriction;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    c: S,
+    p: S,
+}
+
+impl Definition for PowerFriction {
+    const NAME: &'static str = "power-friction";
+    const ABOUT: &'static str =
+        "A force against the motion with any power of the speed, between dry friction and steep drag.";
+    const FORMULA: &'static str = "-c |v|^p sgn(v)";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 3.3";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("c", "force at a speed of 1", Dimension::OUTPUT),
+        Strength::shape("p", "power", Dimension::ONE, [0.5, 4.0], Trials::Plain(&[0.5, 1.5, 2.5])),
+    ];
+    const RARITY: u8 = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { c: s[0], p: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.c * power(at.v.abs(), self.p) * sign(at.v.value())
+    }
+}

@@ -1,0 +1,35 @@
+//! Drag of a fluid.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `quadratic-drag`.
+pub struct QuadraticDrag;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+}
+
+impl Definition for QuadraticDrag {
+    const NAME: &'static str = "quadratic-drag";
+    const ABOUT: &'static str = "A force against the motion in proportion to the square of the speed.";
+    const FORMULA: &'static str = "-k v |v|";
+    const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965), chapter 1";
+    const CLASS: EffectClass = EffectClass::Dissipative;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("k", "force per squared speed", Dimension::OUTPUT.over(Dimension::SPEED.power(2)))];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * at.v * at.v.abs()
+    }
+}

@@ -1,0 +1,53 @@
+//! An actuator or sensor of second order.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `second-order-lag`.
+pub struct SecondOrderLag;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    tau: S,
+    d: S,
+}
+
+impl Definition for SecondOrderLag {
+    const NAME: &'static str = "second-order-lag";
+    const ABOUT: &'static str = "The actuator or sensor follows with a lag of second order.";
+    const FORMULA: &'static str = "z, tau^2 z'' + 2 d tau z' + z = u";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-3";
+    const CLASS: EffectClass = EffectClass::DelayLike;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("tau", "1 over the natural frequency", Dimension::TIME)
+            .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3])),
+        Strength::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], Trials::Plain(&[0.3, 0.8, 1.5])),
+    ];
+    const STATES: usize = 2;
+    const FREE_START: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { tau: s[0], d: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+        z.copy_from_slice(&[at.value, S::from(0.0)]);
+    }
+
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        let bend = if self.tau.value() > 0.0 {
+            ((at.value - z[0]) / self.tau - self.d * z[1] * 2.0) / self.tau
+        } else {
+            S::from(0.0)
+        };
+        dz.copy_from_slice(&[z[1], bend]);
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        if self.tau.value() > 0.0 { z[0] } else { at.value }
+    }
+}

@@ -1,0 +1,34 @@
+//! A constant on a measurement.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `sensor-bias`.
+pub struct SensorBias;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    b: S,
+}
+
+impl Definition for SensorBias {
+    const NAME: &'static str = "sensor-bias";
+    const ABOUT: &'static str = "A constant is added to what is measured.";
+    const FORMULA: &'static str = "y + b";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const CLASS: EffectClass = EffectClass::Bias;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed("b", "what is added", Dimension::OUTPUT)];
+    const RARITY: u8 = 0;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { b: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value + self.b
+    }
+}

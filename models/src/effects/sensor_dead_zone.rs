@@ -1,0 +1,46 @@
+//! A measurement that is blind to small changes.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{ANY, clamp};
+
+/// `sensor-dead-zone`.
+pub struct SensorDeadZone;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    width: S,
+    centre: S,
+}
+
+impl Definition for SensorDeadZone {
+    const NAME: &'static str = "sensor-dead-zone";
+    const ABOUT: &'static str = "Changes about a value are not seen, and larger ones less by as much.";
+    const FORMULA: &'static str = "y - clamp(y - centre, -width, width)";
+    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
+                                  Nonlinearities (Wiley 1996), chapter 2";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("width", "largest change that is not seen", Dimension::VALUE)
+            .tried(Trials::Scaled(&[0.05, 0.2, 0.5])),
+        Strength::shape(
+            "centre",
+            "middle of the dead zone",
+            Dimension::VALUE,
+            ANY,
+            Trials::Within(&[0.2, 0.35, 0.5, 0.65, 0.8]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { width: s[0], centre: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value - clamp(at.value - self.centre, -self.width, self.width)
+    }
+}

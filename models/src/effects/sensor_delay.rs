@@ -1,0 +1,39 @@
+//! A measurement that comes late.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `sensor-delay`.
+pub struct SensorDelay;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    delay: S,
+}
+
+impl Definition for SensorDelay {
+    const NAME: &'static str = "sensor-delay";
+    const ABOUT: &'static str = "What is measured comes late by a constant time.";
+    const FORMULA: &'static str = "y(t - delay)";
+    const SOURCE: &'static str =
+        "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
+    const CLASS: EffectClass = EffectClass::DelayLike;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("delay", "delay", Dimension::TIME).tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { delay: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value
+    }
+
+    fn delay(&self) -> Option<S> {
+        Some(self.delay)
+    }
+}

@@ -1,0 +1,45 @@
+//! A sensor of first order.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `sensor-lag`.
+pub struct SensorLag;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    tau: S,
+}
+
+impl Definition for SensorLag {
+    const NAME: &'static str = "sensor-lag";
+    const ABOUT: &'static str = "The sensor follows the signal with a first-order lag.";
+    const FORMULA: &'static str = "z, z' = (y - z)/tau";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-2";
+    const CLASS: EffectClass = EffectClass::DelayLike;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("tau", "time constant", Dimension::TIME)
+            .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
+    const STATES: usize = 1;
+    const FREE_START: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { tau: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+        z[0] = at.value;
+    }
+
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz[0] = if self.tau.value() > 0.0 { (at.value - z[0]) / self.tau } else { S::from(0.0) };
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        if self.tau.value() > 0.0 { z[0] } else { at.value }
+    }
+}

@@ -1,0 +1,35 @@
+//! A measurement in steps.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+
+/// `sensor-quantisation`.
+pub struct SensorQuantisation;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    step: S,
+}
+
+impl Definition for SensorQuantisation {
+    const NAME: &'static str = "sensor-quantisation";
+    const ABOUT: &'static str = "What is measured comes in steps.";
+    const FORMULA: &'static str = "step round(y/step)";
+    const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008), chapter 1";
+    const CLASS: EffectClass = EffectClass::Gain;
+    const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("step", "step", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.1, 0.2, 0.5]))];
+    const RARITY: u8 = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { step: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        if self.step.value() > 0.0 { self.step * (at.value.value() / self.step.value()).round() } else { at.value }
+    }
+}

@@ -1,0 +1,45 @@
+//! Terms that several effects are made of.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use mops_core::{Dimension, Scalar, Strength, Trials};
+
+/// Bounds of a shape that may be any number.
+pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// Bounds of a shape that is not negative.
+pub(super) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
+
+/// The phase of a sine, rad, from quarter to quarter of a turn.
+pub(super) const fn phase() -> Strength {
+    let quarters = Trials::Plain(&[-FRAC_PI_2, 0.0, FRAC_PI_2, PI]);
+    Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-PI, PI], quarters)
+}
+
+/// -1, 0 or 1.
+pub(super) fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// `x`, not below `low` and not above `high`; where these cross, the middle between them.
+pub(super) fn clamp<S: Scalar>(x: S, low: S, high: S) -> S {
+    if low.value() > high.value() {
+        (low + high) / 2.0
+    } else if x.value() < low.value() {
+        low
+    } else if x.value() > high.value() {
+        high
+    } else {
+        x
+    }
+}
+
+/// `max(x, 0)`.
+pub(super) fn above<S: Scalar>(x: S) -> S {
+    if x.value() > 0.0 { x } else { S::from(0.0) }
+}
+
+/// `x^exponent` for `x > 0`, else 0.
+pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
+    if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
+}

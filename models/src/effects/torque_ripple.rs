@@ -1,0 +1,49 @@
+//! A torque that depends on the position of the rotor.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, phase};
+
+/// `torque-ripple`.
+pub struct TorqueRipple;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    n: S,
+    phase: S,
+}
+
+impl Definition for TorqueRipple {
+    const NAME: &'static str = "torque-ripple";
+    const ABOUT: &'static str = "The command acts stronger and weaker over a turn of a joint.";
+    const FORMULA: &'static str = "u (1 + a sin(n q + phase)), q the position of the companion joint";
+    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
+                                  Collective 2003), chapter 9";
+    const CLASS: EffectClass = EffectClass::Periodic;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
+        Strength::shape(
+            "n",
+            "periods in a turn",
+            Dimension::ONE.over(Dimension::POSITION),
+            NOT_NEGATIVE,
+            Trials::Plain(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]),
+        )
+        .kept(),
+        phase(),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value * (self.a * (self.n * at.other + self.phase).sin() + 1.0)
+    }
+}

@@ -1,0 +1,60 @@
+//! A spring with a loop.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `torsional-hysteresis`.
+pub struct TorsionalHysteresis;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    h: S,
+    y: S,
+}
+
+impl Definition for TorsionalHysteresis {
+    const NAME: &'static str = "torsional-hysteresis";
+    const ABOUT: &'static str =
+        "A spring, such as a flexible gear, whose force depends on where the motion turned around.";
+    const FORMULA: &'static str = "-k (q + h y z), z' = (v/y) (1 - z sgn(v))";
+    const SOURCE: &'static str = "P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14 (1976)";
+    const CLASS: EffectClass = EffectClass::Elastic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "stiffness along the loop", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::shape(
+            "h",
+            "stiffness behind a turn over that along the loop, less 1",
+            Dimension::ONE,
+            NOT_NEGATIVE,
+            Trials::Plain(&[0.3, 2.0]),
+        ),
+        Strength::shape(
+            "y",
+            "displacement over which a turn is forgotten",
+            Dimension::POSITION,
+            [1e-4, f64::INFINITY],
+            Trials::Scaled(&[0.05, 0.3]),
+        ),
+    ];
+    const STATES: usize = 1;
+    const FREE_START: bool = true;
+    const RARITY: u8 = 2;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], h: s[1], y: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+        dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
+    }
+
+    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+        -self.k * (at.q + self.h * self.y * z[0])
+    }
+}

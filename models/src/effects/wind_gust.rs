@@ -1,0 +1,56 @@
+//! A push that comes once.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::NOT_NEGATIVE;
+
+/// `wind-gust`.
+pub struct WindGust;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    a: S,
+    from: S,
+    length: S,
+}
+
+impl Definition for WindGust {
+    const NAME: &'static str = "wind-gust";
+    const ABOUT: &'static str = "A force, torque or flow that swells and fades once.";
+    const FORMULA: &'static str = "a/2 (1 - cos(2 pi (t - from)/length)) for from < t < from + length";
+    const SOURCE: &'static str =
+        "Certification Specifications for Large Aeroplanes CS-25 (EASA), section 25.341 (discrete gust)";
+    const CLASS: EffectClass = EffectClass::TimeVarying;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::signed("a", "largest value", Dimension::OUTPUT),
+        Strength::shape(
+            "from",
+            "start",
+            Dimension::TIME,
+            NOT_NEGATIVE,
+            Trials::Moments(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
+        ),
+        Strength::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(&[0.06, 0.15, 0.4])),
+    ];
+    const IS_ONE_OFF: bool = true;
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { a: s[0], from: s[1], length: s[2] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn breaks(&self) -> Vec<f64> {
+        vec![self.from.value(), self.from.value() + self.length.value()]
+    }
+
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        let since = -self.from + at.t;
+        if since.value() <= 0.0 || since.value() >= self.length.value() {
+            return S::from(0.0);
+        }
+        self.a * 0.5 * (-(since / self.length * std::f64::consts::TAU).cos() + 1.0)
+    }
+}

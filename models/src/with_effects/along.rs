@@ -1,0 +1,131 @@
+//! The linear system along a simulation: how small forces at the ports move the states and signals of a model with effects.
+
+use mops_core::{Along, DIRECTIONS, Dual, Failure, Job, Opening, Port, Scalar};
+use nalgebra::DMatrix;
+
+use super::WithEffects;
+use super::dynamics::Driven;
+use crate::kernel::drive::Drive;
+use crate::kernel::{Sink, Step, integrate};
+
+/// A moment of a simulation with its linear system `dx' = A dx + B db`, `dy = C dx + D db`; `b` are the inputs as they are
+/// commanded, then the forces.
+#[derive(Debug, Clone)]
+pub struct Moment {
+    /// Time, s.
+    pub t: f64,
+    /// States of the plant, then of the effects.
+    pub x: Vec<f64>,
+    /// Their rates.
+    pub rates: Vec<f64>,
+    /// The inputs as they are commanded.
+    pub u: Vec<f64>,
+    /// The signals that were asked for.
+    pub y: Vec<f64>,
+    /// `A`.
+    pub a: DMatrix<f64>,
+    /// `B`.
+    pub b: DMatrix<f64>,
+    /// `C`.
+    pub c: DMatrix<f64>,
+    /// `D`.
+    pub d: DMatrix<f64>,
+}
+
+/// The state at chosen times, the mode of the step included.
+struct Looks<'t> {
+    times: &'t [f64],
+    next: usize,
+    found: Vec<Look>,
+}
+
+struct Look {
+    t: f64,
+    x: Vec<f64>,
+    u: Vec<f64>,
+    contacts: super::contacts::Contacts,
+    memories: Vec<Vec<f64>>,
+}
+
+impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
+    fn step(&mut self, step: &Step<Vec<f64>>, dynamics: &Driven<'a, f64>) {
+        let end = step.start + step.taken;
+        let mut x = vec![0.0; dynamics.size()];
+        while self.next < self.times.len() && self.times[self.next] <= end + 1e-9 * (1.0 + end.abs()) {
+            let t = self.times[self.next];
+            let s = if step.taken > 0.0 { ((t - step.start) / step.taken).clamp(0.0, 1.0) } else { 1.0 };
+            step.state(s, &mut x);
+            self.found.push(Look {
+                t,
+                x: x.clone(),
+                u: dynamics.commanded(t.clamp(step.start, end)),
+                contacts: dynamics.contacts.clone(),
+                memories: dynamics.actors.iter().map(|actor| actor.memory.clone()).collect(),
+            });
+            self.next += 1;
+        }
+    }
+}
+
+impl WithEffects {
+    /// The linear system at increasing times along a simulation, for the signals of the job.
+    ///
+    /// # Errors
+    /// The failure of the simulation.
+    pub fn along(&self, job: &Job<'_>, times: &[f64]) -> Result<Vec<Moment>, Failure> {
+        let open = self.model.ported().expect("looked at when it was made");
+        let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
+        let plant = f64::open(open, &job.parameters[..self.own()])?;
+        let mut dynamics = self.driven(plant, &acting, job, job.parameters);
+        let start = dynamics.start(job.parameters)?;
+        let mut looks = Looks { times, next: 0, found: Vec::with_capacity(times.len()) };
+        let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
+        integrate(&mut dynamics, 0.0, end, start, &open.tolerance(), &mut looks)?;
+
+        let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
+        let plant = Along::open(open, &parameters[..self.own()])?;
+        let mut tangent = self.driven(plant, &acting, job, &parameters);
+        tangent.start(&parameters)?;
+        let ports = self.model.interface().ports.iter();
+        let forces = ports.filter(|port| matches!(port, Port::Process { .. })).count();
+        Ok(looks.found.iter().map(|look| moment(&mut tangent, look, forces, job.signals)).collect())
+    }
+}
+
+fn moment(tangent: &mut Driven<'_, Along>, look: &Look, forces: usize, signals: &[usize]) -> Moment {
+    let (n, inputs) = (look.x.len(), look.u.len());
+    let columns = n + inputs + forces;
+    let mut slopes = DMatrix::zeros(n + signals.len(), columns);
+    let (mut rates, mut y) = (vec![0.0; n], vec![0.0; signals.len()]);
+    tangent.take(&look.contacts, &look.memories);
+    for first in (0..columns).step_by(DIRECTIONS) {
+        let seeded = |(j, &value): (usize, &f64)| {
+            let direction = j.wrapping_sub(first);
+            if direction < DIRECTIONS { Dual::variable(value, direction) } else { Dual::from(value) }
+        };
+        let zeros = vec![0.0; forces];
+        let all: Vec<Along> = look.x.iter().chain(&look.u).chain(&zeros).enumerate().map(seeded).collect();
+        let (x, rest) = all.split_at(n);
+        let (u, w) = rest.split_at(inputs);
+        tangent.command(u.iter().map(|&u| Drive::held(u)));
+        let (dx, outputs) = tangent.look(look.t, x, w, signals);
+        for (i, row) in dx.iter().chain(&outputs).enumerate() {
+            for j in first..columns.min(first + DIRECTIONS) {
+                slopes[(i, j)] = row.tangents()[j - first];
+            }
+        }
+        rates.iter_mut().zip(&dx).for_each(|(r, d)| *r = d.value());
+        y.iter_mut().zip(&outputs).for_each(|(y, o)| *y = o.value());
+    }
+    Moment {
+        t: look.t,
+        x: look.x.clone(),
+        rates,
+        u: look.u.clone(),
+        y,
+        a: slopes.view((0, 0), (n, n)).into_owned(),
+        b: slopes.view((0, n), (n, inputs + forces)).into_owned(),
+        c: slopes.view((n, 0), (signals.len(), n)).into_owned(),
+        d: slopes.view((n, n), (signals.len(), inputs + forces)).into_owned(),
+    }
+}

@@ -1,0 +1,20 @@
+//! `mops diagnose`: finds what the model of a study lacks, whatever the study is for.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::Catalogue;
+
+use super::Trouble;
+use super::run::{Common, Search, go};
+
+/// What can be said to a diagnosis.
+#[derive(Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn diagnose(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    go(catalogue, &arguments.common, &Search::Diagnosis)
+}

@@ -1,0 +1,182 @@
+//! A diagnosis on the terminal: the verdict, what was found, errors before and after, what cannot be told apart.
+
+use mops_core::Role;
+use mops_discrepancy::{Diagnosis, Verdict};
+
+use super::tables::{number, table};
+use crate::diagnosis::words;
+use crate::report::significant;
+
+/// Effects of the ranking that are printed.
+const SHOWN: usize = 6;
+
+/// Everything worth a line after a diagnosis.
+pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
+    let mut text = format!("\n{}\n", plain(&words::verdict(diagnosis)));
+    if !diagnosis.found.is_empty() {
+        text += &format!("\n{}", found(diagnosis));
+    }
+    for removed in &diagnosis.removed {
+        text += &plain(&format!("\ndeclared term taken away: `{}` {}\n", removed.term, words::at(&removed.place)));
+    }
+    if !diagnosis.before.is_empty() {
+        text += &format!("\n{}", errors(diagnosis));
+    }
+    let told = diagnosis.found.iter().filter_map(words::confusable);
+    let sentences: String = told.map(|sentence| format!("- {}\n", plain(&sentence))).collect();
+    if !sentences.is_empty() {
+        text += &format!("\n{sentences}");
+    }
+    if diagnosis.verdict != Verdict::None && !diagnosis.ranked.is_empty() {
+        text += &format!("\n{}", ranking(diagnosis));
+    }
+    if !diagnosis.parameters.is_empty() && diagnosis.verdict != Verdict::None {
+        text += &format!("\n{}", parameters(diagnosis));
+    }
+    if !diagnosis.noticeable.is_empty() {
+        text += &format!("\n{}", noticeable(diagnosis));
+    }
+    if let Some(next) = &diagnosis.next_experiment {
+        text += &format!("\nto measure next: {}\n", plain(next));
+    }
+    for note in &diagnosis.notes {
+        text += &format!("\nnote: {}", plain(note));
+    }
+    if !diagnosis.notes.is_empty() {
+        text += "\n";
+    }
+    let [probability, chance] = [words::probability(diagnosis.probability), significant(diagnosis.p_value, 2)];
+    text += &format!(
+        "\nprobability of the verdict {probability}; p-value of nothing missing {chance}; {} simulations, {seconds:.2} s\n",
+        diagnosis.simulations
+    );
+    text
+}
+
+/// Without the marks of names.
+fn plain(text: &str) -> String {
+    text.replace('`', "")
+}
+
+fn found(diagnosis: &Diagnosis) -> String {
+    let mut rows = Vec::new();
+    for found in &diagnosis.found {
+        for (i, strength) in found.strengths.iter().enumerate() {
+            // What is the same in every row stands in the first.
+            let once = |text: String| if i == 0 { text } else { String::new() };
+            let [low, high] = strength.interval95.map_or([f64::NAN; 2], |ends| ends).map(|end| significant(end, 3));
+            let known = strength.interval95.is_some();
+            rows.push(vec![
+                once(found.effect.clone()),
+                once(found.place.clone()),
+                strength.name.clone(),
+                significant(strength.value, 4),
+                if known { low } else { String::new() },
+                if known { high } else { String::new() },
+                strength.unit.clone(),
+                once(words::probability(found.probability)),
+                once(significant(found.bic_gain, 4)),
+            ]);
+        }
+    }
+    let header = ["effect found", "place", "strength", "value", "95 % from", "to", "unit", "probability", "BIC gain"];
+    table(&header, &[3, 4, 5, 7, 8], rows)
+}
+
+fn role(role: Role) -> String {
+    format!("{role:?}").to_lowercase()
+}
+
+fn errors(diagnosis: &Diagnosis) -> String {
+    let mut rows = Vec::new();
+    for before in &diagnosis.before {
+        let after = diagnosis.after.iter().find(|after| after.name == before.name).unwrap_or(before);
+        for (channel, error) in &before.channels {
+            let later = after.channels.iter().find(|(name, _)| name == channel).map_or(*error, |(_, error)| *error);
+            let prediction = diagnosis.predictions.iter().find(|p| p.experiment == before.name && p.signal == *channel);
+            let (noise, unit) = prediction.map_or((f64::NAN, ""), |p| (p.noise, p.unit.as_str()));
+            let raw = [*error, later, noise].map(|value| significant(value, 4));
+            let [now, then, noise_text] = raw;
+            rows.push(vec![
+                before.name.clone(),
+                role(before.role),
+                channel.clone(),
+                now,
+                then,
+                noise_text,
+                unit.to_owned(),
+                words::times(error / noise),
+                words::times(later / noise),
+            ]);
+        }
+        let mut row = vec![before.name.clone(), role(before.role), "together".to_owned()];
+        row.resize(7, String::new());
+        row.extend([words::times(before.normalised), words::times(after.normalised)]);
+        rows.push(row);
+    }
+    let header = ["experiment", "role", "channel", "before", "after", "noise", "unit", "before/noise", "after/noise"];
+    table(&header, &[3, 4, 5, 7, 8], rows)
+}
+
+fn ranking(diagnosis: &Diagnosis) -> String {
+    let rows = diagnosis.ranked.iter().take(SHOWN).map(|ranked| {
+        let strengths: Vec<String> = ranked.strengths.iter().map(words::strength).collect();
+        vec![
+            ranked.effect.clone(),
+            ranked.place.clone(),
+            if ranked.probability.is_finite() { words::probability(ranked.probability) } else { "screened".to_owned() },
+            if ranked.bic_gain.is_finite() { significant(ranked.bic_gain, 4) } else { String::new() },
+            words::share(ranked.absorbed),
+            strengths.join(", "),
+        ]
+    });
+    let mut text = table(
+        &["tried alone", "place", "probability", "BIC gain", "absorbed", "strengths"],
+        &[2, 3, 4],
+        rows.collect(),
+    );
+    if diagnosis.ranked.len() > SHOWN {
+        text += &format!("... and {} more, in the report\n", diagnosis.ranked.len() - SHOWN);
+    }
+    text
+}
+
+fn parameters(diagnosis: &Diagnosis) -> String {
+    let rows = diagnosis.parameters.iter().map(|p| {
+        let error = p.std_error.map_or_else(String::new, |error| significant(error, 3));
+        let change =
+            if p.before == 0.0 { String::new() } else { format!("{:+.1} %", 100.0 * (p.after / p.before - 1.0)) };
+        vec![p.name.clone(), number(p.before), number(p.after), error, p.unit.clone(), change]
+    });
+    table(&["parameter", "before", "after", "std. error", "unit", "change"], &[1, 2, 3, 5], rows.collect())
+}
+
+fn noticeable(diagnosis: &Diagnosis) -> String {
+    let rows = diagnosis.noticeable.iter().map(|n| {
+        let strength = &n.strength;
+        vec![
+            n.effect.clone(),
+            n.place.clone(),
+            strength.name.clone(),
+            significant(strength.value, 3),
+            strength.unit.clone(),
+        ]
+    });
+    table(&["would have been noticed", "place", "strength", "from", "unit"], &[3], rows.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::made_up;
+
+    #[test]
+    fn a_found_effect_stands_with_its_strength_and_the_errors_beside_the_noise() {
+        insta::assert_snapshot!(text(&made_up::coulomb(), 4.2));
+    }
+
+    #[test]
+    fn nothing_missing_says_from_where_on_it_would_have_been_noticed() {
+        insta::assert_snapshot!(text(&made_up::nothing(), 4.2));
+    }
+}

@@ -1,0 +1,143 @@
+//! The block `diagnosis` of `result.json`. Numbers are in the units of the study; those that are not finite are null.
+
+use mops_discrepancy::{Diagnosis, ExperimentError, Found, Noticeable, Ranked, StrengthValue};
+use serde_json::{Map, Value, json};
+
+/// The block.
+pub(crate) fn block(diagnosis: &Diagnosis) -> Value {
+    let moved = diagnosis.parameters.iter().map(
+        |p| json!({ "name": p.name, "unit": p.unit, "before": p.before, "after": p.after, "std_error": p.std_error }),
+    );
+    let unexplained = diagnosis
+        .unexplained
+        .as_ref()
+        .map(|u| json!({ "place": u.place, "share": u.share, "over": u.over, "table": u.table }));
+    let evidence = diagnosis.evidence.iter().map(
+        |e| json!({ "place": e.place, "evidence": e.evidence, "share": e.share, "freedom": e.freedom, "unit": e.unit }),
+    );
+    let starts = diagnosis.starts.iter().map(
+        |(experiment, parameter, value)| json!({ "experiment": experiment, "parameter": parameter, "value": value }),
+    );
+    json!({
+        "verdict": diagnosis.verdict,
+        "probability": diagnosis.probability,
+        "p_value": diagnosis.p_value,
+        "found": diagnosis.found.iter().map(found).collect::<Value>(),
+        "removed": diagnosis.removed,
+        "ranked": diagnosis.ranked.iter().map(ranked).collect::<Value>(),
+        "unexplained": unexplained,
+        "next_experiment": diagnosis.next_experiment,
+        "before": errors(&diagnosis.before),
+        "after": errors(&diagnosis.after),
+        "noise": noise(diagnosis),
+        "parameters": moved.collect::<Value>(),
+        "starts": starts.collect::<Value>(),
+        "noticeable": diagnosis.noticeable.iter().map(noticeable).collect::<Value>(),
+        "evidence": evidence.collect::<Value>(),
+        "notes": diagnosis.notes,
+        "simulations": diagnosis.simulations,
+    })
+}
+
+fn found(found: &Found) -> Value {
+    let mut value = json!({
+        "effect": found.effect,
+        "place": found.place,
+        "name": found.name,
+        "class": found.class,
+        "formula": found.formula,
+        "strengths": strengths(&found.strengths),
+        "details": found.strengths,
+        "probability": found.probability,
+        "bic_gain": found.bic_gain,
+        "indistinguishable": found.indistinguishable,
+    });
+    if let Some(companion) = &found.companion {
+        value["companion"] = json!(companion);
+    }
+    value
+}
+
+fn ranked(ranked: &Ranked) -> Value {
+    json!({
+        "effect": ranked.effect,
+        "place": ranked.place,
+        "class": ranked.class,
+        "probability": ranked.probability,
+        "bic_gain": ranked.bic_gain,
+        "strengths": strengths(&ranked.strengths),
+        "absorbed": ranked.absorbed,
+        "normalised": { "calibration": ranked.normalised[0], "selection": ranked.normalised[1] },
+        "fitted": ranked.fitted,
+    })
+}
+
+fn noticeable(noticeable: &Noticeable) -> Value {
+    let StrengthValue { name, value, unit, .. } = &noticeable.strength;
+    json!({ "effect": noticeable.effect, "place": noticeable.place, "strength": name, "value": value, "unit": unit })
+}
+
+/// Values by name.
+fn strengths(strengths: &[StrengthValue]) -> Value {
+    strengths.iter().map(|s| (s.name.clone(), json!(s.value))).collect::<Map<_, _>>().into()
+}
+
+/// Errors by experiment, and in each by channel.
+fn errors(errors: &[ExperimentError]) -> Value {
+    let error = |error: &ExperimentError| {
+        let channels: Map<_, _> = error.channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect();
+        (error.name.clone(), json!({ "role": error.role, "channels": channels, "normalised": error.normalised }))
+    };
+    errors.iter().map(error).collect::<Map<_, _>>().into()
+}
+
+/// Standard deviation of the noise by experiment, and in each by channel.
+fn noise(diagnosis: &Diagnosis) -> Value {
+    let mut noise = json!({});
+    for prediction in &diagnosis.predictions {
+        noise[&prediction.experiment][&prediction.signal] = json!(prediction.noise);
+    }
+    noise
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::made_up;
+    use super::*;
+
+    /// The names that others read, as they were agreed.
+    #[test]
+    fn the_block_has_the_agreed_names_and_meanings() {
+        let block = block(&made_up::coulomb());
+        assert_eq!((&block["verdict"], &block["probability"]), (&json!("effect"), &json!(0.9997)));
+        let found = &block["found"][0];
+        assert_eq!((&found["effect"], &found["place"]), (&json!("coulomb-friction"), &json!("joint:phi")));
+        assert_eq!((&found["strengths"], &found["probability"]), (&json!({ "c": 0.0124 }), &json!(0.97)));
+        assert_eq!((&found["bic_gain"], found["indistinguishable"].as_array().unwrap().len()), (&json!(2400.0), 2));
+        assert_eq!((&block["removed"], &block["unexplained"]), (&json!([]), &Value::Null));
+        assert_eq!(&block["ranked"][1]["effect"], "stribeck-friction");
+        assert_eq!(
+            block["before"]["push"],
+            json!({ "role": "validation", "channels": { "phi": 0.046, "theta": 0.047 }, "normalised": 15.4 })
+        );
+        assert_eq!(block["after"]["swing"]["normalised"], 1.0);
+        let unexplained = super::block(&made_up::unexplained());
+        assert_eq!(
+            (&unexplained["verdict"], &unexplained["unexplained"]["share"]),
+            (&json!("unexplained"), &json!(0.8))
+        );
+        assert_eq!(super::block(&made_up::nothing())["verdict"], "none");
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_null() {
+        let mut diagnosis = made_up::coulomb();
+        (diagnosis.p_value, diagnosis.after[0].normalised) = (f64::NAN, f64::INFINITY);
+        diagnosis.found[0].strengths[0].interval95 = Some([f64::NEG_INFINITY, 1.0]);
+        let block = block(&diagnosis);
+        assert_eq!((&block["p_value"], &block["after"]["swing"]["normalised"]), (&Value::Null, &Value::Null));
+        assert_eq!(block["found"][0]["details"][0]["interval95"], json!([null, 1.0]));
+        assert_eq!(block["ranked"][4]["bic_gain"], Value::Null);
+        assert!(!serde_json::to_string(&block).unwrap().contains("NaN"));
+    }
+}

@@ -1,0 +1,193 @@
+//! Diagnoses by hand, for tests of what is made of them.
+
+use mops_core::Role;
+use mops_discrepancy::{
+    Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival,
+    StrengthValue, Unexplained, Verdict,
+};
+
+/// A value between -1 and 1 that looks like chance.
+fn chance(i: usize) -> f64 {
+    let x = (i as f64 * 12.9898).sin() * 43_758.547;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+fn strength(name: &str, value: f64, unit: &str) -> StrengthValue {
+    StrengthValue {
+        name: name.into(),
+        value,
+        unit: unit.into(),
+        std_error: Some(0.02 * value.abs()),
+        interval95: Some([value - 0.05 * value.abs(), value + 0.05 * value.abs()]),
+    }
+}
+
+/// A channel whose model swings too long before, and rightly after.
+fn prediction(experiment: &str, role: Role, signal: &str, phase: f64) -> Prediction {
+    let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
+    let swing = |t: f64, decay: f64| (-decay * t).exp() * (7.0 * t + phase).cos();
+    let noise = 0.003;
+    Prediction {
+        experiment: experiment.into(),
+        role,
+        signal: signal.into(),
+        unit: "rad".into(),
+        noise,
+        measured: times.iter().enumerate().map(|(i, &t)| swing(t, 0.5) + 1.7 * noise * chance(i)).collect(),
+        before: times.iter().map(|&t| swing(t, 0.5) + 0.012 * t * (7.0 * t + phase).sin()).collect(),
+        after: times.iter().map(|&t| swing(t, 0.5)).collect(),
+        times,
+    }
+}
+
+fn error(name: &str, role: Role, [phi, theta, normalised]: [f64; 3]) -> ExperimentError {
+    ExperimentError {
+        name: name.into(),
+        role,
+        channels: vec![("phi".into(), phi), ("theta".into(), theta)],
+        normalised,
+    }
+}
+
+/// A force over time, over the speed and over the position, that is Coulomb friction of 0.0124 N m where `true_place`.
+fn evidence(place: &str, evidence: f64, share: f64, true_place: bool) -> Evidence {
+    let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
+    let speed: Vec<f64> = times.iter().map(|&t| -7.0 * (-0.5 * t).exp() * (7.0 * t).sin()).collect();
+    let force: Vec<f64> = speed
+        .iter()
+        .enumerate()
+        .map(|(i, v)| if true_place { -0.0124 * (4.0 * v).tanh() } else { 0.004 * chance(i) } + 0.0012 * chance(i + 7))
+        .collect();
+    let found = Curve { x: vec![-7.0, -1e-9, 1e-9, 7.0], y: vec![0.0124, 0.0124, -0.0124, -0.0124] };
+    Evidence {
+        place: place.into(),
+        unit: "N m".into(),
+        evidence,
+        share,
+        freedom: 41.0,
+        over_time: vec![("swing".into(), Curve { x: times.clone(), y: force.clone() })],
+        over: vec![
+            ("speed".into(), "rad/s".into(), Curve { x: speed, y: force.clone() }),
+            ("position".into(), "rad".into(), Curve { x: times.iter().map(|t| (7.0 * t).cos()).collect(), y: force }),
+        ],
+        found: if true_place { vec![("speed".into(), found)] } else { Vec::new() },
+    }
+}
+
+fn ranked(effect: &str, place: &str, probability: f64, bic_gain: f64) -> Ranked {
+    Ranked {
+        effect: effect.into(),
+        place: place.into(),
+        class: "dissipative".into(),
+        probability,
+        bic_gain,
+        strengths: vec![strength("c", 0.0124, "N m")],
+        absorbed: 0.87,
+        normalised: [Some(1.01), Some(f64::NAN)],
+        fitted: bic_gain > 1000.0,
+    }
+}
+
+fn moved(name: &str, before: f64, after: f64) -> ParameterMove {
+    ParameterMove { name: name.into(), unit: "kg m2".into(), before, after, std_error: Some(0.01 * after.abs()) }
+}
+
+/// Coulomb friction at `joint:phi`, in two experiments with two channels.
+pub(crate) fn coulomb() -> Diagnosis {
+    let rival = |effect: &str, bic_behind: f64| Rival {
+        effect: effect.into(),
+        place: "joint:phi".into(),
+        probability: 0.01,
+        bic_behind,
+        likeness: 0.995,
+    };
+    Diagnosis {
+        verdict: Verdict::Effect,
+        probability: 0.9997,
+        p_value: 1e-9,
+        found: vec![Found {
+            effect: "coulomb-friction".into(),
+            place: "joint:phi".into(),
+            name: "phi-coulomb-friction".into(),
+            companion: None,
+            class: "dissipative".into(),
+            formula: "-torque sgn(speed), with a stuck mode".into(),
+            strengths: vec![strength("c", 0.0124, "N m")],
+            probability: 0.97,
+            bic_gain: 2400.0,
+            indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
+        }],
+        removed: Vec::new(),
+        ranked: vec![
+            ranked("coulomb-friction", "joint:phi", 0.97, 2400.0),
+            ranked("stribeck-friction", "joint:phi", 0.02, 2399.3),
+            ranked("quadratic-drag", "joint:phi", 0.01, 2395.9),
+            ranked("quadratic-drag", "joint:theta", 1e-12, 310.0),
+            ranked("delay", "actuator:u", f64::NAN, f64::NAN),
+        ],
+        unexplained: None,
+        next_experiment: Some("Swing slowly, below 0.5 rad/s in the joint `phi`.".into()),
+        before: vec![
+            error("swing", Role::Calibration, [0.0126, 0.0125, 4.2]),
+            error("push", Role::Validation, [0.046, 0.047, 15.4]),
+        ],
+        after: vec![
+            error("swing", Role::Calibration, [0.003, 0.003, 1.0]),
+            error("push", Role::Validation, [0.0031, 0.003, 1.02]),
+        ],
+        parameters: vec![moved("b", 2.1e-3, 1.133e-3), moved("d", 2.6e-2, 2.5267e-2)],
+        noticeable: Vec::new(),
+        evidence: vec![
+            evidence("joint:phi", 812.0, 0.97, true),
+            evidence("joint:theta", 260.0, 0.41, false),
+            evidence("sensor:phi", 90.0, 0.22, false),
+        ],
+        predictions: vec![
+            prediction("swing", Role::Calibration, "phi", 0.0),
+            prediction("swing", Role::Calibration, "theta", 1.0),
+            prediction("push", Role::Validation, "phi", 0.3),
+            prediction("push", Role::Validation, "theta", 1.3),
+        ],
+        notes: vec!["The noise of `phi` was estimated from the data: 0.003 rad.".into()],
+        starts: vec![("swing".into(), "phi0".into(), 0.98), ("swing".into(), "theta0".into(), 0.51)],
+        simulations: 731,
+    }
+}
+
+/// Nothing missing.
+pub(crate) fn nothing() -> Diagnosis {
+    let mut diagnosis = coulomb();
+    for prediction in &mut diagnosis.predictions {
+        prediction.before.clone_from(&prediction.after);
+    }
+    let noticeable = |effect: &str, value: f64| Noticeable {
+        effect: effect.into(),
+        place: "joint:phi".into(),
+        strength: strength("c", value, "N m"),
+    };
+    Diagnosis {
+        verdict: Verdict::None,
+        probability: 0.93,
+        p_value: 0.43,
+        found: Vec::new(),
+        before: diagnosis.after.clone(),
+        noticeable: vec![noticeable("coulomb-friction", 4e-4), noticeable("stribeck-friction", 6e-4)],
+        next_experiment: None,
+        ..diagnosis
+    }
+}
+
+/// Something in a process that no effect explains.
+pub(crate) fn unexplained() -> Diagnosis {
+    let diagnosis = coulomb();
+    let table = (0..9).map(|i| [f64::from(i), (0.7 * f64::from(i)).sin()]).collect();
+    let unexplained = Unexplained { place: "process:x".into(), share: 0.8, over: "position".into(), table };
+    Diagnosis {
+        verdict: Verdict::Unexplained,
+        probability: 0.91,
+        found: Vec::new(),
+        unexplained: Some(unexplained),
+        after: diagnosis.before.clone(),
+        ..diagnosis
+    }
+}

@@ -1,0 +1,15 @@
+//! What a diagnosis leaves behind beside its report: its block of `result.json`, predictions, the repaired model.
+
+mod block;
+#[cfg(test)]
+pub(crate) mod made_up;
+mod predictions;
+mod repaired;
+mod source;
+mod toml_text;
+pub(crate) mod words;
+
+pub(crate) use block::block;
+pub(crate) use predictions::predictions;
+pub(crate) use repaired::{Original, repaired};
+pub(crate) use source::source;

@@ -1,0 +1,298 @@
+//! The repaired model as a study file that runs by itself: the user's file, with the effects found.
+
+use std::sync::Arc;
+
+use mops_core::{AnalysisKind, Effect, Scope, Strength, Study};
+use mops_discrepancy::{Diagnosis, Found, StrengthValue};
+
+use super::toml_text::{TomlText, key, number, quoted};
+use super::words;
+
+/// The study that was diagnosed.
+pub(crate) struct Original<'a> {
+    /// Text of its file.
+    pub(crate) text: &'a str,
+    /// `key=value` pairs that went over it.
+    pub(crate) settings: &'a [String],
+    /// The study.
+    pub(crate) study: &'a Study,
+    /// The effects that were tried.
+    pub(crate) effects: &'a [Arc<dyn Effect>],
+}
+
+/// A strength's range reaches so many times its value where physics does not bound it.
+const REACH: f64 = 10.0;
+
+/// The text of the repaired study: a calibration that starts at the values found. `locate` leads from the path of a data file
+/// to the path as it counts from where the repaired study will stand.
+pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &dyn Fn(&str) -> String) -> String {
+    let mut text = TomlText::new(original.text);
+    for setting in original.settings {
+        for (path, value) in TomlText::new(setting).values() {
+            text.set(&borrowed(&path), &value);
+        }
+    }
+    text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name)));
+    text.set(&["study", "task"], "\"calibration\"");
+    for experiment in text.keys(&["experiments"]) {
+        let place = ["experiments", &experiment, "file"];
+        if let Some(file) = text.words(&place) {
+            text.set(&place, &quoted(&locate(&file)));
+        }
+    }
+    noise_and_criteria(&mut text, diagnosis);
+    parameters(&mut text, original.study, diagnosis);
+    start_values(&mut text, original, diagnosis);
+    for found in &diagnosis.found {
+        effect(&mut text, original, found);
+    }
+    text.head(&words::verdict(diagnosis).replace('`', ""));
+    text.into_text()
+}
+
+fn borrowed(path: &[String]) -> Vec<&str> {
+    path.iter().map(String::as_str).collect()
+}
+
+/// Every channel needs its noise, and a calibration something to minimise; what the user gave stays.
+fn noise_and_criteria(text: &mut TomlText, diagnosis: &Diagnosis) {
+    let without = text.keys(&["criteria"]).is_empty();
+    for p in diagnosis.predictions.iter().filter(|p| p.noise.is_finite() && p.noise > 0.0) {
+        let channel = ["experiments", &p.experiment, "channels", &p.signal];
+        let noise = ["experiments", &p.experiment, "channels", &p.signal, "noise"];
+        if text.has(&noise) || !text.has(&channel) {
+            continue;
+        }
+        match text.words(&channel) {
+            Some(column) => {
+                text.set(&channel, &format!("{{ column = {}, noise = {} }}", quoted(&column), number(p.noise)))
+            }
+            None => text.set(&noise, &number(p.noise)),
+        }
+    }
+    for p in diagnosis.predictions.iter().filter(|_| without) {
+        if !text.has(&["criteria", &p.signal]) {
+            let criterion = format!("{{ normalised-error = {{ signal = {} }} }}", quoted(&p.signal));
+            text.set(&["criteria", &p.signal], &criterion);
+        }
+    }
+}
+
+/// Tuners start at the values found; those of terms that are not needed are taken away.
+fn parameters(text: &mut TomlText, study: &Study, diagnosis: &Diagnosis) {
+    for moved in diagnosis.parameters.iter().filter(|p| p.after.is_finite()) {
+        let tuner = ["tuners", &moved.name];
+        if text.has(&tuner) && !text.has(&["tuners", &moved.name, "tie"]) {
+            text.set(&["tuners", &moved.name, "start"], &number(moved.after));
+        }
+    }
+    for removed in &diagnosis.removed {
+        let term = &removed.term;
+        text.remove(&["tuners", term], &format!("The data show that {term} is not needed."));
+        let takes = |model: &&(String, _)| has_parameter(study, &model.0, term);
+        if let Some((model, _)) = study.models.iter().find(takes) {
+            text.set(&["models", model, "parameters", term], "0.0");
+        }
+    }
+}
+
+fn has_parameter(study: &Study, model: &str, parameter: &str) -> bool {
+    let parameters = study.models.iter().filter(|(name, _)| name == model).flat_map(|(_, m)| &m.interface().parameters);
+    parameters.into_iter().any(|p| p.variable.name == parameter)
+}
+
+/// Free start values begin where they were found; those of effects are new.
+fn start_values(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis) {
+    for experiment in text.keys(&["experiments"]) {
+        let place = ["experiments", &experiment, "free"];
+        let starts = diagnosis.starts.iter().filter(|(name, _, value)| *name == experiment && value.is_finite());
+        let starts: Vec<FreeStart> =
+            starts.filter_map(|(_, p, value)| free_start(original, diagnosis, p, *value)).collect();
+        let listed = text.get(&place).and_then(|list| format!("free = {list}").parse::<toml::Table>().ok());
+        if let (Some(list), false) = (listed.as_ref().and_then(|table| table["free"].as_array()), starts.is_empty()) {
+            let states = list.iter().filter_map(toml::Value::as_str).map(|state| format!("{} = {{}}", key(state)));
+            text.set(&place, &format!("{{ {} }}", states.collect::<Vec<_>>().join(", ")));
+        }
+        for (state, values) in starts {
+            let state_place = ["experiments", &experiment, "free", &state];
+            if !text.has(&state_place) {
+                let entries = values.iter().map(|(bound, value)| format!("{bound} = {}", number(*value)));
+                text.set(&state_place, &format!("{{ {} }}", entries.collect::<Vec<_>>().join(", ")));
+                continue;
+            }
+            for (bound, value) in values {
+                text.set(&["experiments", &experiment, "free", &state, bound], &number(value));
+            }
+        }
+    }
+}
+
+/// A state, with what its entry in `free` says.
+type FreeStart = (String, Vec<(&'static str, f64)>);
+
+/// The state that a parameter is the start value of, where it starts, and for one of an effect where it may.
+fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, value: f64) -> Option<FreeStart> {
+    let states = original.study.models.iter().flat_map(|(_, model)| &model.interface().states);
+    if let Some(state) = states.into_iter().find(|state| state.start == parameter) {
+        return Some((state.name.clone(), vec![("start", value)]));
+    }
+    // States of effects are numbered from 1: `name.start1` is the start value of `name.1`.
+    let (name, start) = parameter.rsplit_once('.')?;
+    let index = start.strip_prefix("start")?;
+    diagnosis.found.iter().find(|found| found.name == name)?;
+    let [low, high] = range(value, [f64::NEG_INFINITY, f64::INFINITY]);
+    Some((format!("{name}.{index}"), vec![("start", value), ("min", low), ("max", high)]))
+}
+
+/// Adds an effect to its model, and its strengths to the tuners.
+fn effect(text: &mut TomlText, original: &Original<'_>, found: &Found) {
+    let model = model_of(original.study, &found.place);
+    let name = found.name.as_str();
+    let companion =
+        found.companion.as_ref().map_or_else(String::new, |other| format!(", companion = {}", quoted(other)));
+    let value = format!("{{ {} = {{ place = {}{companion} }} }}", key(&found.effect), quoted(&found.place));
+    text.set(&["models", model, "effects", name], &value);
+    let known = original.effects.iter().find(|effect| effect.name() == found.effect);
+    for strength in &found.strengths {
+        let is = |known: &&Strength| known.name == strength.name;
+        let known = known.and_then(|effect| effect.strengths().iter().find(is));
+        text.set(&["tuners", &format!("{name}.{}", strength.name)], &tuner(strength, known));
+    }
+}
+
+/// The model that has the place.
+pub(super) fn model_of<'a>(study: &'a Study, place: &str) -> &'a str {
+    let simulated = || study.models.iter().filter(|(_, model)| model.interface().analysis == AnalysisKind::Time);
+    let has = |(_, model): &&(String, _)| ports(model).any(|port| port == place);
+    let found = simulated().find(has).or_else(|| simulated().next()).or_else(|| study.models.first());
+    &found.expect("a study has a model").0
+}
+
+fn ports(model: &Arc<dyn mops_core::Model>) -> impl Iterator<Item = String> {
+    model.interface().ports.iter().map(ToString::to_string)
+}
+
+/// The tuner of a strength: from its value, within what physics allows.
+fn tuner(strength: &StrengthValue, known: Option<&Strength>) -> String {
+    let [low, high] = range(strength.value, known.map_or([f64::NEG_INFINITY, f64::INFINITY], |known| known.bounds));
+    let [start, low, high] = [strength.value.clamp(low, high), low, high].map(number);
+    let mut tuner = format!("{{ start = {start}, min = {low}, max = {high}");
+    if known.is_some_and(|known| known.fixed) {
+        tuner += ", active = false";
+    }
+    if known.is_some_and(|known| known.scope == Scope::Experiment) {
+        tuner += ", per-case = true";
+    }
+    tuner + " }"
+}
+
+/// The range of a strength around its value; bounds that are infinite are drawn in.
+fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
+    let size = if value.is_finite() && value != 0.0 { REACH * value.abs() } else { 1.0 };
+    // Up to the next round number.
+    let decade = 10f64.powf(size.log10().floor());
+    let reach = (size / decade - 1e-9).ceil() * decade;
+    // By way of a text: 3 * 0.1 is not 0.3.
+    let reach: f64 = format!("{reach:.0e}").parse().unwrap_or(reach);
+    let [low, high] = [low, high].map(|bound| if bound.is_finite() { bound } else { bound.signum() * reach });
+    if low < high { [low, high] } else { [low - reach, high + reach] }
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::file::{Files, StudyFile};
+    use mops_discrepancy::Removed;
+
+    use super::super::made_up;
+    use super::*;
+
+    const STUDY: &str = "\
+# A swing of the rig on Tuesday.
+[study]
+name = \"swing\"
+task = \"diagnosis\"
+
+[models.rig.furuta]
+[models.rig.parameters]
+a = 9.035e-4   # weighed
+
+[tuners]
+b  = { start = 2e-3, min = 5e-4, max = 1e-2, scale = \"log\" }   # inertia of the arm
+d  = { start = 2e-2, min = 5e-3, max = 1e-1, scale = \"log\" }
+c  = { start = 4e-4, min = 1e-4, max = 1e-3 }
+bp = { start = 1e-5, min = 0.0,  max = 1e-4 }
+
+[experiments.swing]
+file     = \"swing.csv\"   # 100 Hz
+channels = { phi = \"phi\", theta = { column = \"theta\" } }
+free     = [\"phi\", \"theta\"]
+";
+
+    struct Memory;
+
+    impl Files for Memory {
+        fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
+            assert_eq!(path, "../data/swing.csv");
+            let rows =
+                (0..20).map(|i| format!("{},{},{}\n", f64::from(i) * 0.01, f64::from(i).sin(), f64::from(i).cos()));
+            Ok(format!("t,phi,theta\n{}", rows.collect::<String>()).into_bytes())
+        }
+
+        fn show(&self, path: &str) -> String {
+            path.to_owned()
+        }
+    }
+
+    fn read(text: &str) -> StudyFile {
+        let settings: [String; 0] = [];
+        mops_core::file::read(&crate::catalogue(), "study.toml", text, &settings, &Memory)
+            .unwrap_or_else(|e| panic!("{e}\n{text}"))
+    }
+
+    /// The repaired text, and the same without what the effects add.
+    fn made(diagnosis: &Diagnosis, settings: &[String]) -> String {
+        let study = read(&STUDY.replace("swing.csv", "../data/swing.csv")).study;
+        let original = Original { text: STUDY, settings, study: &study, effects: &crate::catalogue().effects };
+        repaired(&original, diagnosis, &|path| format!("../data/{path}"))
+    }
+
+    #[test]
+    fn the_repaired_study_is_the_users_file_with_the_effect_and_the_values_found() {
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
+        insta::assert_snapshot!(made(&diagnosis, &["tuners.c.max=\"2e-3 kg m2\"".to_owned()]));
+    }
+
+    #[test]
+    fn the_repaired_study_is_read_as_a_calibration_without_criteria_of_the_user() {
+        // Without the effect, which needs nothing that is tested here.
+        let diagnosis = Diagnosis { found: Vec::new(), ..made_up::coulomb() };
+        let study = read(&made(&diagnosis, &[])).study;
+        assert_eq!((study.name.as_str(), study.task), ("swing-repaired", mops_core::Task::Calibration));
+        let start = |name: &str| study.tuners.iter().find(|t| t.name == name).unwrap().start;
+        assert_eq!([start("b"), start("d"), start("c"), start("swing/phi0")], [1.133e-3, 2.5267e-2, 4e-4, 0.98]);
+        let keys: Vec<String> = study.rows.iter().map(|row| study.key(row)).collect();
+        assert_eq!(keys, ["swing/phi", "swing/theta"]);
+        let channels = &study.cases[0].experiment.as_ref().unwrap().channels;
+        assert!(channels.iter().all(|channel| channel.noise == Some(0.003)));
+    }
+
+    #[test]
+    fn a_state_of_an_effect_is_free_in_the_experiments_where_it_was_estimated() {
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.starts.push(("swing".into(), "phi-coulomb-friction.start1".into(), 0.03));
+        let text = made(&diagnosis, &[]);
+        let free = "theta = { start = 0.51 }, \"phi-coulomb-friction.1\" = { start = 0.03, min = -0.3, max = 0.3 } }";
+        assert!(text.contains(free), "{text}");
+    }
+
+    #[test]
+    fn ranges_of_strengths_end_at_round_numbers_and_hold_the_value() {
+        assert_eq!(range(0.0124, [0.0, f64::INFINITY]), [0.0, 0.2]);
+        assert_eq!(range(-3.0, [f64::NEG_INFINITY, f64::INFINITY]), [-30.0, 30.0]);
+        let rounded = range(0.03, [f64::NEG_INFINITY, f64::INFINITY]).map(number);
+        assert_eq!(rounded, ["-0.3", "0.3"]);
+        assert_eq!(range(0.5, [0.0, 1.0]), [0.0, 1.0]);
+        assert_eq!(range(0.0, [0.0, f64::INFINITY]), [0.0, 1.0]);
+    }
+}

@@ -1,0 +1,238 @@
+//! The repaired study as a Rust program: tuners as values, models, experiments and criteria by their tables.
+
+use mops_discrepancy::Diagnosis;
+use toml::{Table, Value};
+
+use super::words;
+
+/// The program that does what the study file `text` says; its data are found from `folder`.
+pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String {
+    let study: Table = text.parse().expect("the repaired study is right TOML");
+    let about = words::verdict(diagnosis).replace('`', "");
+    let name = study.get("study").and_then(|s| s.get("name")).and_then(Value::as_str).unwrap_or_default();
+    let mut imports = vec!["Draft", "Study", "Task", "TunerDraft"];
+    let tuners = entries(&study, "tuners").map(|(name, tuner)| entry(name, &self::tuner(tuner)));
+    let tuners = items(tuners.collect(), 8);
+    imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| tuners.contains(&format!("{name}::"))));
+    imports.sort_unstable();
+
+    let mut constants = String::new();
+    let mut list = |section: &str, make: &dyn Fn(&str, &str) -> String| -> Vec<String> {
+        let mut items = Vec::new();
+        for (name, table) in entries(&study, section) {
+            let constant = constant(section, name);
+            constants += &format!("\n/// `{name}`.\nconst {constant}: &str = {};\n", raw(&written(table)));
+            items.push(make(name, &constant));
+        }
+        items
+    };
+    let models = items(list("models", &|name, text| entry(name, &format!("file::model(&catalogue, {text})?"))), 4);
+    let mut cases = list("cases", &|name, text| format!("file::case({name:?}, {text}, &models)?"));
+    cases.extend(list("experiments", &|name, text| format!("file::experiment({name:?}, {text}, &Data)?")));
+    let cases = items(cases, 8);
+    let criteria = list("criteria", &|name, text| entry(name, &format!("file::criterion(&catalogue, {text})?")));
+    let criteria = items(criteria, 8);
+    let seed = study.get("study").and_then(|s| s.get("seed")).and_then(Value::as_integer);
+    let seed = seed.map_or_else(String::new, |seed| format!("        seed: {seed},\n"));
+
+    format!(
+        "//! {about}
+//!
+//! Written by `mops diagnose --export rust`. It needs the crate `mops`, and the data that its experiments name.
+
+use std::error::Error;
+use std::path::Path;
+
+use mops::file::{{self, Files}};
+use mops::{{{imports}}};
+
+/// The folder that the paths of data count from.
+const FOLDER: &str = {folder:?};
+{constants}
+/// Data files in the folder.
+struct Data;
+
+impl Files for Data {{
+    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {{
+        std::fs::read(Path::new(FOLDER).join(path))
+    }}
+
+    fn show(&self, path: &str) -> String {{
+        Path::new(FOLDER).join(path).display().to_string()
+    }}
+}}
+
+/// The repaired study.
+pub fn study() -> Result<Study, Box<dyn Error>> {{
+    let catalogue = mops::catalogue();
+    let models = {models};
+    let draft = Draft {{
+        name: {name:?}.into(),
+        task: Task::Calibration,
+{seed}        tuners: {tuners},
+        cases: {cases},
+        criteria: {criteria},
+        models,
+        ..Draft::default()
+    }};
+    Ok(draft.build()?)
+}}
+
+#[allow(dead_code)]
+fn main() -> Result<(), Box<dyn Error>> {{
+    let outcome = mops::solve(study()?, &mops::Options::default(), &())?.outcome;
+    for tuner in &outcome.tuners {{
+        println!(\"{{}} = {{:.6e}} {{}}\", tuner.name, tuner.value, tuner.unit);
+    }}
+    for experiment in outcome.calibration.iter().flat_map(|calibration| &calibration.experiments) {{
+        for channel in &experiment.channels {{
+            println!(\"{{}} {{}}: rms {{:.4e}} {{}}\", experiment.name, channel.name, channel.rmse, channel.unit);
+        }}
+    }}
+    Ok(())
+}}
+",
+        imports = imports.join(", "),
+    )
+}
+
+/// The tables of a section, in their order.
+fn entries<'t>(study: &'t Table, section: &str) -> impl Iterator<Item = (&'t str, &'t Value)> {
+    study.get(section).and_then(Value::as_table).into_iter().flatten().map(|(name, value)| (name.as_str(), value))
+}
+
+/// A named item of a list.
+fn entry(name: &str, value: &str) -> String {
+    format!("({name:?}.into(), {value})")
+}
+
+/// A list, on one line if it is short.
+fn items(items: Vec<String>, indent: usize) -> String {
+    let short = format!("vec![{}]", items.join(", "));
+    if short.len() <= 90 {
+        return short;
+    }
+    let [inner, outer] = [" ".repeat(indent + 4), " ".repeat(indent)];
+    format!("vec![\n{}{outer}]", items.iter().map(|item| format!("{inner}{item},\n")).collect::<String>())
+}
+
+/// A table as TOML.
+fn written(table: &Value) -> String {
+    table.as_table().map(|table| toml::to_string(table).expect("it was TOML")).unwrap_or_default()
+}
+
+/// A text as a raw literal of Rust.
+fn raw(text: &str) -> String {
+    let hashes =
+        (1..).map(|n| "#".repeat(n)).find(|hashes| !text.contains(&format!("\"{hashes}"))).expect("one is enough");
+    format!("r{hashes}\"\n{}{}{hashes}", text.trim_start(), '"')
+}
+
+/// The name of a constant: `MODEL_RIG`.
+fn constant(section: &str, name: &str) -> String {
+    let kind = match section {
+        "criteria" => "criterion",
+        plural => plural.trim_end_matches('s'),
+    };
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' };
+    format!("{}_{}", kind.to_uppercase(), name.chars().map(letter).collect::<String>())
+}
+
+/// A tuner as a value of Rust.
+fn tuner(tuner: &Value) -> String {
+    let Some(table) = tuner.as_table() else { return "TunerDraft::default()".to_owned() };
+    let number = |key: &str| match table.get(key) {
+        Some(Value::Float(value)) => Some(*value),
+        #[allow(clippy::cast_precision_loss)]
+        Some(Value::Integer(value)) => Some(*value as f64),
+        _ => None,
+    };
+    let log = table.get("scale").and_then(Value::as_str) == Some("log");
+    let plain = table.keys().all(|key| ["start", "min", "max", "scale"].contains(&key.as_str()));
+    if let (Some(start), Some(min), Some(max), true) = (number("start"), number("min"), number("max"), plain) {
+        return format!("TunerDraft::new({start:?}, {min:?}, {max:?}){}", if log { ".log()" } else { "" });
+    }
+    let quantity = |value: &Value| match value {
+        Value::String(text) => format!("Quantity::parse({text:?})?"),
+        Value::Integer(value) => format!("{value}.0.into()"),
+        Value::Float(value) => format!("{value:?}.into()"),
+        other => other.to_string(),
+    };
+    let mut fields = Vec::new();
+    for (key, value) in table {
+        let text = value.as_str().unwrap_or_default();
+        fields.push(match key.as_str() {
+            "start" | "min" | "max" => format!("{key}: Some({})", quantity(value)),
+            "unit" => format!("unit: Some(Unit::parse({text:?})?)"),
+            "scale" if log => "scale: Scale::Log".to_owned(),
+            "scale" => "scale: Scale::Linear".to_owned(),
+            "integer" => format!("integer: {value}"),
+            "values" => {
+                let values = value.as_array().into_iter().flatten().map(quantity).collect::<Vec<_>>();
+                format!("values: Some(vec![{}])", values.join(", "))
+            }
+            "active" => format!("inactive: {}", !value.as_bool().unwrap_or(true)),
+            "tie" => format!("tie: Some({text:?}.into())"),
+            _ => format!("per_case: {value}"),
+        });
+    }
+    format!("TunerDraft {{ {}, ..TunerDraft::default() }}", fields.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::file::Files;
+    use mops_discrepancy::Removed;
+
+    use super::super::made_up;
+    use super::super::repaired::{Original, repaired};
+    use super::*;
+
+    struct Shipped(mops_core::Shipped);
+
+    impl Files for Shipped {
+        fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
+            Ok(self.0.file(path).unwrap().to_vec())
+        }
+
+        fn show(&self, path: &str) -> String {
+            path.to_owned()
+        }
+    }
+
+    /// N.B.: the example is compiled with the others, and run by `tests/examples.rs`.
+    #[test]
+    fn the_example_is_what_is_written_for_the_swinging_pendulum() {
+        let catalogue = crate::catalogue();
+        let shipped = *catalogue.studies.iter().find(|study| study.name == "furuta-swing").unwrap();
+        let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
+        let settings = ["tuners.ca.max=6e-3".to_owned()];
+        let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, &Shipped(shipped)).unwrap().study;
+        // The pendulum has the effect already, as a term of its own.
+        let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
+        let diagnosis = Diagnosis { found: Vec::new(), removed, ..made_up::coulomb() };
+        let original = Original { text, settings: &settings, study: &study, effects: &catalogue.effects };
+        let program = source(&repaired(&original, &diagnosis, &str::to_owned), &diagnosis, "studies/furuta-swing");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/repaired.rs");
+        if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+            std::fs::write(path, &program).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(path).unwrap(), program);
+    }
+
+    #[test]
+    fn every_key_of_a_tuner_has_its_place_in_the_program() {
+        let of = |text: &str| tuner(&Value::Table(text.parse().unwrap()));
+        assert_eq!(of("start = 1\nmin = 0.5\nmax = 2.0\nscale = \"log\""), "TunerDraft::new(1.0, 0.5, 2.0).log()");
+        assert_eq!(
+            of("start = \"3 cm\"\nmin = 0\nmax = 1.0\nunit = \"m\"\nactive = false\nper-case = true"),
+            "TunerDraft { start: Some(Quantity::parse(\"3 cm\")?), min: Some(0.0.into()), max: Some(1.0.into()), \
+             unit: Some(Unit::parse(\"m\")?), inactive: true, per_case: true, ..TunerDraft::default() }"
+        );
+        assert_eq!(of("tie = \"2*k\""), "TunerDraft { tie: Some(\"2*k\".into()), ..TunerDraft::default() }");
+        assert_eq!(
+            of("start = 2\nvalues = [1, 2]\ninteger = true"),
+            "TunerDraft { start: Some(2.0.into()), values: Some(vec![1.0.into(), 2.0.into()]), integer: true, ..TunerDraft::default() }"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Putting values into a TOML text, and taking entries away.
+
+use super::entries::{Entry, Form, entries, header_of, last_line, own_end};
+use super::{TomlText, keys, owned};
+
+impl TomlText {
+    /// Puts `value`, written as TOML, under these keys: instead of the value that is there, or where it belongs.
+    pub(in crate::diagnosis) fn set(&mut self, path: &[&str], value: &str) {
+        let entries = entries(&self.0);
+        let at = |path: &[&str]| entries.iter().find(|entry| entry.path == path);
+        if let Some(Form::Value(span) | Form::Inline(span)) = at(path).map(|entry| &entry.form) {
+            self.0.replace_range(span.clone(), value);
+            return;
+        }
+        for depth in (1..path.len()).rev() {
+            let (above, below) = path.split_at(depth);
+            let Some(entry) = at(above) else { continue };
+            let last = last_line(&entries, above);
+            match &entry.form {
+                Form::Value(_) => break,
+                Form::Inline(span) => {
+                    let comma = if entry.empty { " " } else { ", " };
+                    let inside = self.0[..span.end - 1].trim_end_matches([' ', '\t', '\n', ',']).len();
+                    let text = format!("{comma}{} = {value} ", keys(below));
+                    self.0.replace_range(inside..span.end - 1, &text);
+                    return;
+                }
+                Form::Header(header) => {
+                    let after = self.end_of_line(own_end(&entries, header));
+                    self.0.insert_str(after, &format!("{} = {value}\n", keys(below)));
+                    return;
+                }
+                // Written with dots in the table above: so is the new one. Else a table of its own follows the last one.
+                Form::Implied
+                    if entries
+                        .iter()
+                        .any(|e| matches!(&e.form, Form::Inline(span) if span.contains(&entry.key.start))) => {}
+                Form::Implied => {
+                    let header =
+                        entries.iter().filter_map(|e| header_of(e, entry.key.start)).max_by_key(|(_, h)| h.start);
+                    let has_headers =
+                        entries.iter().any(|e| e.path.starts_with(&owned(above)) && matches!(e.form, Form::Header(_)));
+                    let after = self.end_of_line(last);
+                    let (start, line) = if has_headers {
+                        let (table, key) = path.split_at(path.len() - 1);
+                        (after, format!("\n[{}]\n{} = {value}\n", keys(table), keys(key)))
+                    } else {
+                        let known = header.map_or(0, |(path, _)| path.len());
+                        (after, format!("{} = {value}\n", keys(&path[known..])))
+                    };
+                    self.0.insert_str(start, &line);
+                    return;
+                }
+            }
+        }
+        let (table, key) = path.split_at(path.len() - 1);
+        self.0.push_str(&format!("\n[{}]\n{} = {value}\n", keys(table), keys(key)));
+    }
+
+    /// Takes an entry away: within braces it is cut out, elsewhere its lines become comments.
+    pub(in crate::diagnosis) fn remove(&mut self, path: &[&str], why: &str) {
+        let entries = entries(&self.0);
+        let path = owned(path);
+        let Some(entry) = entries.iter().find(|entry| entry.path == path) else { return };
+        let within = |e: &&Entry| matches!(&e.form, Form::Inline(span) if span.contains(&entry.key.start));
+        if entries.iter().filter(|e| e.path.len() < path.len()).find(within).is_some() {
+            let (Form::Value(span) | Form::Inline(span)) = &entry.form else { return };
+            let (mut start, mut end) = (entry.key.start, span.end);
+            let rest = self.0[end..].len() - self.0[end..].trim_start().trim_start_matches(',').trim_start().len();
+            if self.0[end..end + rest].contains(',') {
+                end += rest;
+            } else {
+                start = self.0[..start].trim_end().trim_end_matches(',').trim_end().len();
+            }
+            self.0.replace_range(start..end, "");
+            return;
+        }
+        let of_it = entries.iter().filter(|e| e.path.starts_with(&path));
+        let spans = of_it.filter_map(|e| match &e.form {
+            Form::Header(span) => Some(span.clone()),
+            Form::Value(span) | Form::Inline(span) => Some(e.key.start.min(span.start)..span.end),
+            Form::Implied => None,
+        });
+        let mut starts: Vec<usize> = Vec::new();
+        for span in spans {
+            let first = self.0[..span.start].rfind('\n').map_or(0, |at| at + 1);
+            starts.push(first);
+            starts.extend(self.0[first..span.end].match_indices('\n').map(|(at, _)| first + at + 1));
+        }
+        starts.sort_unstable();
+        starts.dedup();
+        for (i, &start) in starts.iter().enumerate().rev() {
+            self.0.insert_str(start, "# ");
+            if i == 0 {
+                self.0.insert_str(start, &format!("# {why}\n"));
+            }
+        }
+    }
+
+    /// The start of the line after a place.
+    fn end_of_line(&self, at: usize) -> usize {
+        self.0[at..].find('\n').map_or(self.0.len(), |end| at + end + 1)
+    }
+}

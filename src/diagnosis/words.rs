@@ -1,0 +1,206 @@
+//! A diagnosis in sentences, for the terminal and for the report; names stand between backticks.
+
+use mops_core::Role;
+use mops_discrepancy::{Diagnosis, ExperimentError, Found, Rival, StrengthValue, Unexplained, Verdict};
+
+use crate::report::significant;
+
+/// Rivals whose BIC lies no farther behind than this cannot be told from an effect. Source: R. E. Kass, A. E. Raftery,
+/// Bayes Factors, JASA 90 (1995), section 3.2: a difference up to 2 is worth no more than a bare mention.
+pub(crate) const BARE_MENTION: f64 = 2.0;
+
+/// The verdict in a sentence or two.
+pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
+    match diagnosis.verdict {
+        Verdict::None => format!(
+            "Nothing is missing that these data could show: {}, and as much structure as there is comes with probability {} where nothing is missing.",
+            left(diagnosis),
+            probability(diagnosis.p_value)
+        ),
+        Verdict::Effect => {
+            let listed = diagnosis.found.iter().map(|found| format!("`{}` {}", found.effect, at(&found.place)));
+            let listed: Vec<String> = listed.collect();
+            let terms: Vec<String> = diagnosis.removed.iter().map(|removed| format!("`{}`", removed.term)).collect();
+            let sure = match diagnosis.found.as_slice() {
+                [only] if !only.probability.is_nan() => format!(" (probability {})", probability(only.probability)),
+                _ => String::new(),
+            };
+            let what = match (listed.as_slice(), terms.as_slice()) {
+                (listed, []) => format!("lacks {}{sure}", list(listed)),
+                ([], terms) => format!("does not need {}", list(terms)),
+                (listed, terms) => format!("lacks {}{sure}, and does not need {}", list(listed), list(terms)),
+            };
+            format!("The model {what}: {}.", changed(diagnosis))
+        }
+        Verdict::Unexplained => {
+            let place = diagnosis.unexplained.as_ref().map_or_else(String::new, |u| format!(" {}", at(&u.place)));
+            let also = match diagnosis.found.iter().map(|f| format!("`{}`", f.effect)).collect::<Vec<_>>() {
+                found if found.is_empty() => String::new(),
+                found => format!(", even with {}", list(&found)),
+            };
+            let free = diagnosis.unexplained.as_ref().map_or_else(String::new, free_signal);
+            format!(
+                "Something is missing{place} that no effect of the catalogue explains{also}: {}{free}.",
+                changed(diagnosis)
+            )
+        }
+    }
+}
+
+fn free_signal(unexplained: &Unexplained) -> String {
+    format!("; a free signal there takes {} of what is above the noise", share(unexplained.share))
+}
+
+/// `the error falls from 2.10 to 1.00 times the noise on calibration data and from 15.40 to 1.00 on validation data`.
+fn changed(diagnosis: &Diagnosis) -> String {
+    let mut last = "";
+    let text = by_role(|role| {
+        let [before, after] = [together(&diagnosis.before, role)?, together(&diagnosis.after, role)?];
+        let [from, to] = [before, after].map(times);
+        let verb = match () {
+            () if from == to => "stays at ",
+            () if after < before => "falls from ",
+            () => "rises from ",
+        };
+        // A verb that was just said is not said again.
+        let again = std::mem::replace(&mut last, verb) == verb;
+        let said = if again { verb.split_once(' ').map_or("", |(_, rest)| rest) } else { verb };
+        let numbers = if from == to { from } else { format!("{from} to {to}") };
+        Some(format!("{said}{numbers}"))
+    });
+    format!("the error {text}")
+}
+
+/// `the model leaves 1.02 times the noise on calibration data`.
+fn left(diagnosis: &Diagnosis) -> String {
+    format!("the model leaves {}", by_role(|role| together(&diagnosis.before, role).map(times)))
+}
+
+/// What there is to say of each role, with the unit after the first.
+fn by_role(mut say: impl FnMut(Role) -> Option<String>) -> String {
+    let mut parts = Vec::new();
+    for (role, name) in ROLES {
+        if let Some(text) = say(role) {
+            let unit = if parts.is_empty() { " times the noise" } else { "" };
+            parts.push(format!("{text}{unit} on {name} data"));
+        }
+    }
+    if parts.is_empty() { "is not known".to_owned() } else { list(&parts) }
+}
+
+const ROLES: [(Role, &str); 3] =
+    [(Role::Calibration, "calibration"), (Role::Selection, "selection"), (Role::Validation, "validation")];
+
+/// Normalised error of the experiments of a role together: the root of their mean square.
+pub(crate) fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// An error in units of the noise.
+pub(crate) fn times(error: f64) -> String {
+    if error.is_finite() && error < 100.0 { format!("{error:.2}") } else { significant(error, 3) }
+}
+
+/// Where a place is: `in the joint `phi``.
+pub(crate) fn at(place: &str) -> String {
+    match place.split_once(':') {
+        Some(("joint", name)) => format!("in the joint `{name}`"),
+        Some(("process", name)) => format!("in the equation of `{name}`"),
+        Some(("extra_state", name)) => format!("in a further state at `{name}`"),
+        Some(("actuator", name)) => format!("at the actuator `{name}`"),
+        Some(("sensor", name)) => format!("at the sensor of `{name}`"),
+        _ => format!("at `{place}`"),
+    }
+}
+
+/// `torque = 0.0124 (0.0118 to 0.0130) N m`.
+pub(crate) fn strength(strength: &StrengthValue) -> String {
+    let StrengthValue { name, value, unit, interval95, .. } = strength;
+    let range = interval95.filter(|ends| ends.iter().all(|v| v.is_finite()));
+    let range =
+        range.map_or_else(String::new, |[low, high]| format!(" ({} to {})", significant(low, 3), significant(high, 3)));
+    let unit = if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") };
+    format!("{name} = {}{range}{unit}", significant(*value, 4))
+}
+
+/// What the data cannot tell from an effect, a sentence; `None` where there is nothing.
+pub(crate) fn confusable(found: &Found) -> Option<String> {
+    let close = |rivals: &mut dyn Iterator<Item = &Rival>| -> Vec<String> {
+        rivals.map(|r| format!("`{}` {} ({})", r.effect, at(&r.place), probability(r.probability))).collect()
+    };
+    let equal = close(&mut found.indistinguishable.iter().filter(|r| r.bic_behind < BARE_MENTION));
+    let behind = close(&mut found.indistinguishable.iter().filter(|r| r.bic_behind >= BARE_MENTION));
+    let about = format!("`{}` {}", found.effect, at(&found.place));
+    match (equal.is_empty(), behind.is_empty()) {
+        (true, true) => None,
+        (false, true) => Some(format!("The data cannot tell {about} from {}.", list(&equal))),
+        (true, false) => Some(format!("Less likely than {about}, but not excluded: {}.", list(&behind))),
+        (false, false) => Some(format!(
+            "The data cannot tell {about} from {}; less likely, but not excluded: {}.",
+            list(&equal),
+            list(&behind)
+        )),
+    }
+}
+
+/// A probability in percent, honest at both ends.
+pub(crate) fn probability(p: f64) -> String {
+    match p {
+        p if p.is_nan() => "n/a".to_owned(),
+        p if p < 1e-4 => "<0.01 %".to_owned(),
+        p if p > 0.9999 => ">99.99 %".to_owned(),
+        p if p > 0.99 => format!("{} %", significant(100.0 * p, 4)),
+        p => format!("{} %", significant(100.0 * p, 2)),
+    }
+}
+
+/// A share in percent.
+pub(crate) fn share(share: f64) -> String {
+    if share.is_finite() { format!("{:.0} %", 100.0 * share) } else { "n/a".to_owned() }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn list(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [all @ .., last] => format!("{} and {last}", all.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::made_up;
+    use super::*;
+
+    #[test]
+    fn every_verdict_is_one_sentence_with_the_place_and_the_numbers() {
+        let found = verdict(&made_up::coulomb());
+        for part in [
+            "falls from 4.20 to 1.00 times the noise on calibration data and from 15.40 to 1.02 on validation data",
+            "lacks `coulomb-friction` in the joint `phi`",
+            "probability 97 %",
+        ] {
+            assert!(found.contains(part), "{part}: {found}");
+        }
+        assert!(verdict(&made_up::nothing()).starts_with("Nothing is missing that these data could show"));
+        let unexplained = verdict(&made_up::unexplained());
+        assert!(unexplained.contains("in the equation of `x`") && unexplained.contains("80 %"), "{unexplained}");
+    }
+
+    #[test]
+    fn what_is_equally_likely_is_told_from_what_is_only_not_excluded() {
+        let text = confusable(&made_up::coulomb().found[0]).unwrap();
+        assert!(text.contains("cannot tell `coulomb-friction` in the joint `phi` from `stribeck-friction`"), "{text}");
+        assert!(text.contains("not excluded: `quadratic-drag`"), "{text}");
+    }
+
+    #[test]
+    fn probabilities_near_certainty_keep_their_distance_from_it() {
+        let cases = [(0.974, "97 %"), (0.9973, "99.73 %"), (0.99999, ">99.99 %"), (1e-9, "<0.01 %"), (f64::NAN, "n/a")];
+        for (p, text) in cases {
+            assert_eq!(probability(p), text);
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The table of errors before and after, with bars in units of the noise.
+
+use maud::{Markup, html};
+use mops_discrepancy::{Diagnosis, ExperimentError};
+
+use super::super::figures::role_name;
+use super::super::numbers::{number, significant};
+use super::super::page::scrolling;
+use crate::diagnosis::words::times;
+
+/// Error of one channel, or of a whole experiment, in units of the noise; raw values where they have a unit.
+struct Line<'a> {
+    experiment: &'a ExperimentError,
+    /// `None`: all channels together.
+    channel: Option<&'a str>,
+    /// In units of the noise, before and after.
+    scaled: [f64; 2],
+    /// In the unit of the channel, before and after.
+    raw: [f64; 2],
+    noise: f64,
+    unit: &'a str,
+}
+
+fn lines(diagnosis: &Diagnosis) -> Vec<Line<'_>> {
+    let mut lines = Vec::new();
+    for before in &diagnosis.before {
+        let after = diagnosis.after.iter().find(|after| after.name == before.name).unwrap_or(before);
+        for (channel, error) in &before.channels {
+            let later = after.channels.iter().find(|(name, _)| name == channel).map_or(*error, |(_, error)| *error);
+            let prediction = diagnosis.predictions.iter().find(|p| p.experiment == before.name && p.signal == *channel);
+            let (noise, unit) = prediction.map_or((f64::NAN, ""), |p| (p.noise, p.unit.as_str()));
+            lines.push(Line {
+                experiment: before,
+                channel: Some(channel),
+                scaled: [error / noise, later / noise],
+                raw: [*error, later],
+                noise,
+                unit,
+            });
+        }
+        if before.channels.len() > 1 {
+            let scaled = [before.normalised, after.normalised];
+            lines.push(Line { experiment: before, channel: None, scaled, raw: scaled, noise: f64::NAN, unit: "" });
+        }
+    }
+    lines
+}
+
+/// All experiments and channels.
+pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
+    let lines = lines(diagnosis);
+    let same = lines.iter().all(|line| line.scaled[0].to_bits() == line.scaled[1].to_bits());
+    let largest = lines.iter().flat_map(|line| line.scaled).filter(|v| v.is_finite()).fold(1.5, f64::max);
+    let rows = html! {
+        table class="errors" {
+            thead {
+                tr {
+                    th scope="col" { "experiment" }
+                    th scope="col" { "channel" }
+                    @if same {
+                        th scope="col" class="number" { "error / noise" }
+                        th scope="col" {}
+                        th scope="col" class="number" { "RMS" }
+                    } @else {
+                        th scope="col" class="number" { "before" }
+                        th scope="col" class="number" { "after" }
+                        th scope="col" { "error / noise" }
+                        th scope="col" class="number" { "RMS before" }
+                        th scope="col" class="number" { "RMS after" }
+                    }
+                    th scope="col" class="number" { "noise" }
+                    th scope="col" { "unit" }
+                }
+            }
+            tbody {
+                @for line in &lines {
+                    tr {
+                        th scope="row" { (line.experiment.name) small { (role_name(line.experiment.role)) } }
+                        td { @if let Some(channel) = line.channel { (channel) } @else { strong { "together" } } }
+                        @if !same { td class="number" { (times(line.scaled[0])) } }
+                        td class="number" { strong { (times(line.scaled[1])) } }
+                        td { (bars(line.scaled, largest, same)) }
+                        @if line.channel.is_some() {
+                            @if !same { td class="number" { (significant(line.raw[0], 3)) } }
+                            td class="number" { (significant(line.raw[1], 3)) }
+                            td class="number" { @if line.noise.is_finite() { (number(line.noise)) } @else { "not known" } }
+                            td { (line.unit) }
+                        } @else {
+                            td colspan=(if same { 3 } else { 4 }) {}
+                        }
+                    }
+                }
+            }
+        }
+    };
+    html! {
+        p {
+            "Root mean square of measured - predicted in units of the noise"
+            @if same { "; " } @else {
+                ": the " span class="swatch before" {} " declared model, the " span class="swatch after" {} " repaired one; "
+            }
+            "the line marks the noise, 1, which is all that can be had."
+        }
+        (scrolling("Before and after", rows))
+    }
+}
+
+/// Two bars, before above after, or one for both where they are the same; and a mark at the noise.
+fn bars(scaled: [f64; 2], largest: f64, same: bool) -> Markup {
+    let width =
+        |value: f64| format!("width:{:.1}%", if value.is_finite() { 100.0 * (value / largest).min(1.0) } else { 0.0 });
+    html! {
+        span class="pair" aria-hidden="true" {
+            @if !same { span class="before" style=(width(scaled[0])) {} }
+            span class="after" style=(width(scaled[1])) {}
+            span class="floor" style=(format!("left:{:.1}%", 100.0 / largest)) {}
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Residuals of the declared model and of the repaired one: over time, as spectrum, as autocorrelation.
+
+use mops_core::Role;
+use mops_discrepancy::{Diagnosis, Prediction};
+
+use super::super::figures::{Figure, Group, role_name};
+use super::super::numbers::{labelled, with_unit};
+use super::super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+use super::super::sampling::thinned;
+use super::spectrum::{autocorrelation, band, even, spectrum};
+
+/// More experiments than this are not drawn.
+const MOST: usize = 4;
+
+pub(super) const EXPLAINED: &str = "Where nothing is missing, a residual stays within twice the noise, has as much power at \
+    every frequency, and its autocorrelation lies inside the band (95 % of it for white residuals).";
+
+/// The experiments that are drawn: at least one of each role, the first ones of the others.
+fn drawn(diagnosis: &Diagnosis) -> Vec<&[Prediction]> {
+    let all: Vec<&[Prediction]> = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).collect();
+    let first = |role| all.iter().position(|channels| channels[0].role == role);
+    let mut chosen: Vec<usize> =
+        [Role::Calibration, Role::Selection, Role::Validation].into_iter().filter_map(first).collect();
+    let others: Vec<usize> = (0..all.len()).filter(|i| !chosen.contains(i)).collect();
+    chosen.extend(others.into_iter().take(MOST.saturating_sub(chosen.len())));
+    chosen.sort_unstable();
+    chosen.into_iter().map(|i| all[i]).collect()
+}
+
+fn title(channels: &[Prediction]) -> String {
+    format!("Experiment `{}` ({})", channels[0].experiment, role_name(channels[0].role))
+}
+
+/// A group for every experiment: a column of plots for every channel, with spectrum and autocorrelation in the first.
+pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
+    let all = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).count();
+    let shown = drawn(diagnosis);
+    let left_out = (all > shown.len()).then(|| format!("Of {all} experiments {} are drawn.", shown.len()));
+    let group = |(i, channels): (usize, &&[Prediction])| Group {
+        title: title(channels),
+        about: left_out.iter().filter(|_| i == 0).cloned().collect(),
+        // Once is enough: spectra and autocorrelations of other experiments say the same.
+        figures: channels.iter().map(|channel| figure(channel, i == 0)).collect(),
+    };
+    shown.iter().enumerate().map(group).collect()
+}
+
+fn difference(prediction: &Prediction, model: &[f64]) -> Vec<f64> {
+    prediction.measured.iter().zip(model).map(|(measured, model)| measured - model).collect()
+}
+
+/// Two curves of one kind, the declared model below the repaired one; only one where they are the same.
+fn both(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, style: CurveStyle) -> Vec<Curve> {
+    let curve = |name: &str, points, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
+    if before == after {
+        return vec![curve("declared model", before, Ink::Result)];
+    }
+    vec![curve("declared model", before, Ink::Measured), curve("repaired model", after, Ink::Result)]
+}
+
+fn figure(prediction: &Prediction, whole: bool) -> Figure {
+    let Prediction { experiment, signal, times, unit, noise, .. } = prediction;
+    let place = format!("{experiment}-{signal}");
+    let [before, after] = [&prediction.before, &prediction.after].map(|model| difference(prediction, model));
+    let over_time = |values: &[f64]| times.iter().copied().zip(values.iter().copied()).collect();
+    let mut plots = vec![(
+        format!("left-{place}"),
+        Plot {
+            title: format!("residual of {signal}"),
+            x_label: "time (s)".into(),
+            y_label: labelled(signal, unit),
+            curves: both(over_time(&before), over_time(&after), CurveStyle::Dots),
+            bands: vec![Band {
+                name: format!("\u{b1}2 noise, {}", with_unit(2.0 * noise, unit)),
+                range: [-2.0 * noise, 2.0 * noise],
+            }],
+            ..Plot::default()
+        },
+    )];
+    let evenly = |values: &[f64]| even(times, values).filter(|_| whole);
+    if let (Some((step, before)), Some((_, after))) = (evenly(&before), evenly(&after)) {
+        plots.push((
+            format!("spectrum-{place}"),
+            Plot {
+                title: format!("spectrum of the residual of {signal}"),
+                x_label: "frequency (Hz)".into(),
+                y_label: "power / that of the noise".into(),
+                log_x: true,
+                log_y: true,
+                curves: both(spectrum(step, &before, *noise), spectrum(step, &after, *noise), CurveStyle::Line),
+                levels: vec![Level { name: "noise".into(), value: 1.0 }],
+                ..Plot::default()
+            },
+        ));
+        let width = band(before.len());
+        plots.push((
+            format!("autocorrelation-{place}"),
+            Plot {
+                title: format!("autocorrelation of the residual of {signal}"),
+                x_label: "lag (s)".into(),
+                y_label: "autocorrelation".into(),
+                curves: both(autocorrelation(step, &before), autocorrelation(step, &after), CurveStyle::Line),
+                bands: vec![Band { name: "95 % of white residuals".into(), range: [-width, width] }],
+                ..Plot::default()
+            },
+        ));
+    }
+    Figure { plots, caption: Vec::new() }
+}
+
+/// A group for every experiment that is drawn: measurement and both models.
+pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
+    let plot = |p: &Prediction| {
+        let points = |values: &[f64]| thinned(p.times.iter().copied().zip(values.iter().copied()).collect());
+        let mut curves = vec![Curve {
+            name: "measured".into(),
+            points: points(&p.measured),
+            style: CurveStyle::Dots,
+            ink: Ink::Start,
+            ..Curve::default()
+        }];
+        curves.extend(both(points(&p.before), points(&p.after), CurveStyle::Line));
+        let plot = Plot {
+            title: format!("{} in experiment {}", p.signal, p.experiment),
+            x_label: "time (s)".into(),
+            y_label: labelled(&p.signal, &p.unit),
+            curves,
+            ..Plot::default()
+        };
+        Figure { plots: vec![(format!("predicted-{}-{}", p.experiment, p.signal), plot)], caption: Vec::new() }
+    };
+    let group = |channels: &[Prediction]| Group {
+        title: title(channels),
+        about: Vec::new(),
+        figures: channels.iter().map(plot).collect(),
+    };
+    drawn(diagnosis).into_iter().map(group).collect()
+}

@@ -1,0 +1,128 @@
+//! The whole report of diagnoses by hand.
+
+use mops_core::{CaseDraft, ChannelDraft, Draft, Measured, Task, TunerDraft};
+use mops_discrepancy::Diagnosis;
+
+use super::super::Report;
+use super::super::tests::Lag;
+use crate::diagnosis::made_up;
+use crate::solve::Options;
+use crate::tasks::diagnosis::of;
+
+/// Writes the report into a folder that lives as long as the answer.
+fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
+    let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
+    let channel = ChannelDraft { signal: "y".into(), values: times.clone(), times, ..ChannelDraft::default() };
+    let measured = Measured { channels: vec![channel], ..Measured::default() };
+    let draft = Draft {
+        name: "swing".into(),
+        task: Task::Diagnosis,
+        models: vec![("lag".into(), Lag::new().into())],
+        tuners: vec![("T".into(), TunerDraft::new(2.0, 0.1, 20.0))],
+        cases: vec![CaseDraft { name: "step".into(), measured: Some(measured), ..CaseDraft::default() }],
+        ..Draft::default()
+    };
+    let solved = of(draft.build().unwrap(), &Options::default(), diagnosis);
+    let folder = tempfile::tempdir().unwrap();
+    let report = Report {
+        outcome: &solved.outcome,
+        problem: &solved.problem,
+        best: &solved.best,
+        archive: &solved.archive,
+        diagnosis: solved.diagnosis.as_ref(),
+        text: "",
+    };
+    report.write(folder.path()).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    (folder, page)
+}
+
+/// The titles of the sections, in their order.
+fn titles(page: &str) -> Vec<&str> {
+    page.split("<h2").skip(1).map(|after| after.split(['>', '<']).nth(1).unwrap()).collect()
+}
+
+#[test]
+fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
+    let (folder, page) = written(made_up::coulomb());
+    assert_eq!(
+        titles(&page),
+        [
+            "What is missing",
+            "Before and after",
+            "What the declared model leaves",
+            "Where it comes from",
+            "What it could be",
+            "How the parameters moved",
+            "What to measure next",
+            "Measured and predicted",
+            "Notes",
+            "Study"
+        ]
+    );
+    for text in [
+        "The model lacks <code>coulomb-friction</code> in the joint <code>phi</code>",
+        "c = 0.0124 (0.0118 to 0.013) N m",
+        "cannot be told apart",
+        "not excluded",
+        "screened only",
+        "15.40",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    for plot in [
+        "left-swing-phi",
+        "left-push-theta",
+        "spectrum-swing-theta",
+        "autocorrelation-swing-theta",
+        "missing-joint-phi-speed",
+        "predicted-push-phi",
+    ] {
+        assert!(folder.path().join(format!("plots/{plot}.svg")).exists(), "{plot}");
+    }
+    assert!(
+        !folder.path().join("plots/missing-sensor-phi-speed.svg").exists(),
+        "where no effect acts, nothing is drawn"
+    );
+}
+
+#[test]
+fn nothing_missing_is_told_with_what_would_have_been_noticed() {
+    let (_folder, page) = written(made_up::nothing());
+    assert!(page.contains("Nothing is missing that these data could show"));
+    assert!(
+        titles(&page).contains(&"What would have been noticed") && !titles(&page).contains(&"How the parameters moved")
+    );
+    assert!(!page.contains("repaired model</text>") && !page.contains("RMS before"), "there is but one model");
+}
+
+#[test]
+fn what_no_effect_explains_has_a_place_and_a_table() {
+    let mut diagnosis = made_up::unexplained();
+    diagnosis.evidence[0].place = "process:x".into();
+    diagnosis.next_experiment = None;
+    let (folder, page) = written(diagnosis);
+    assert!(
+        page.contains(
+            "Something is missing in the equation of <code>x</code> that no effect of the catalogue explains"
+        )
+    );
+    assert!(!titles(&page).contains(&"What is missing") && !titles(&page).contains(&"What to measure next"));
+    let plot = std::fs::read_to_string(folder.path().join("plots/missing-process-x-position.svg")).unwrap();
+    assert!(plot.contains("table, linear between its points"));
+}
+
+#[test]
+fn a_diagnosis_without_numbers_still_has_a_page() {
+    let mut diagnosis = made_up::coulomb();
+    for prediction in &mut diagnosis.predictions {
+        prediction.before.fill(f64::NAN);
+        prediction.noise = f64::NAN;
+    }
+    diagnosis.evidence.iter_mut().for_each(|e| e.evidence = f64::NAN);
+    for list in [&mut diagnosis.before, &mut diagnosis.after] {
+        list.iter_mut().for_each(|e| e.normalised = f64::NAN);
+    }
+    let (_folder, page) = written(diagnosis);
+    assert!(page.contains("n/a") && !page.contains("NaN"));
+}

@@ -1,0 +1,97 @@
+//! `task = "diagnosis"`: which physical effect the model lacks.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use mops_core::{DiagnosisTask, Effect, Mistake, Study, Watch, suggestion};
+use mops_discrepancy::Diagnosis;
+
+use crate::diagnosis::block;
+use crate::solve::{Options, Solved, Unsuitable, look};
+
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let begun = Instant::now();
+    let diagnosis = search(&study, options, watch)?;
+    let mut solved = of(study, options, diagnosis);
+    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    Ok(solved)
+}
+
+/// The search itself, over the effects that the task leaves.
+fn search(study: &Study, options: &Options, _watch: &dyn Watch) -> Result<Diagnosis, Unsuitable> {
+    let _effects = effects(&study.tasks.diagnosis, &options.effects)?;
+    Err(Unsuitable(Mistake::here("the search for missing effects is not there yet")))
+}
+
+/// The effects that the task leaves. N.B.: names in a study file were checked when it was read.
+fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn Effect>>, Unsuitable> {
+    let known = |name: &&String| all.iter().any(|effect| effect.name() == **name);
+    if let Some(unknown) = task.effects.iter().flatten().chain(&task.without).find(|name| !known(name)) {
+        let help = suggestion(unknown, all.iter().map(|effect| effect.name()));
+        return Err(Unsuitable(Mistake::new("diagnosis", format!("there is no effect `{unknown}`")).with_help(help)));
+    }
+    let left: Vec<_> = all.iter().filter(|effect| task.tries(effect.name())).cloned().collect();
+    if left.is_empty() {
+        let mistake = Mistake::new("without", "no effect is left to try").with_help("leave some of them in");
+        return Err(Unsuitable(mistake.within("diagnosis")));
+    }
+    Ok(left)
+}
+
+/// The outcome of a diagnosis: its tuners are those of the repaired model.
+pub(crate) fn of(mut study: Study, options: &Options, diagnosis: Diagnosis) -> Solved {
+    // Criteria have no say in this: every channel counts with its noise.
+    study.rows.clear();
+    study.jobs.clear();
+    let mut solved = look(study, options, &());
+    let outcome = &mut solved.outcome;
+    let study = solved.problem.study();
+    for (report, tuner) in outcome.tuners.iter_mut().zip(&study.tuners) {
+        let moved = diagnosis.parameters.iter().find(|p| p.name == report.name).map(|p| p.after);
+        let start = tuner.case.and_then(|case| {
+            let of_tuner = |(experiment, parameter, _): &&(String, String, f64)| {
+                *experiment == study.cases[case].name && *parameter == tuner.parameter
+            };
+            diagnosis.starts.iter().find(of_tuner).map(|(_, _, value)| *value)
+        });
+        if let Some(value) = moved.or(start) {
+            report.value = value;
+            report.at_bound = if report.active { tuner.at_bound(value) } else { None };
+        }
+    }
+    (outcome.solver, outcome.evaluations) = ("discrepancy".to_owned(), 0);
+    (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
+    outcome.front.clear();
+    outcome.found.diagnosis = Some(block(&diagnosis));
+    solved.diagnosis = Some(diagnosis);
+    solved
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_task_says_which_effects_are_tried() {
+        let all = Options::default().effects;
+        let tried = |effects: Option<&[&str]>, without: &[&str]| {
+            let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+            let task =
+                DiagnosisTask { effects: effects.map(owned), without: owned(without), ..DiagnosisTask::default() };
+            effects_of(&task, &all)
+        };
+        assert_eq!(tried(None, &[]).unwrap().len(), all.len());
+        assert_eq!(tried(Some(&["coulomb-friction"]), &[]).unwrap(), ["coulomb-friction"]);
+        assert_eq!(tried(None, &["coulomb-friction"]).unwrap().len(), all.len() - 1);
+        assert!(tried(None, &["coulomb-fricton"]).unwrap_err().contains("did you mean `coulomb-friction`?"));
+        assert!(
+            tried(None, &all.iter().map(|e| e.name()).collect::<Vec<_>>()).unwrap_err().contains("no effect is left")
+        );
+    }
+
+    /// The names of the effects left.
+    fn effects_of(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<&'static str>, String> {
+        let left = effects(task, all).map_err(|why| why.to_string())?;
+        Ok(left.iter().map(|effect| effect.name()).collect())
+    }
+}

@@ -1,0 +1,137 @@
+//! What an actuator makes of its command.
+
+use super::{Effect, Family, Scene, any_actuator, real_actuator};
+use crate::law::Law;
+
+/// A curve of the command.
+fn curve(f: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
+    Law { actuate: Some(Box::new(move |_, u| f(u))), ..Law::default() }
+}
+
+/// What acts at the start: the first command, or nothing as after switching on.
+fn first(s: &Scene<'_>) -> f64 {
+    let crate::law::Spot::Actuator(i) = s.spot else { return 0.0 };
+    if s.chance(0.6) { s.setup.inputs[i][0] } else { 0.0 }
+}
+
+pub const ALL: &[Effect] = &[
+    Effect {
+        name: "input-delay",
+        fits: real_actuator,
+        build: |s| {
+            let most = (0.12 * s.setup.duration()).min(40.0 * s.setup.dt);
+            Family::up_to(most, |delay| (Law { delay, ..Law::default() }, vec![("delay", delay)]))
+        },
+    },
+    Effect {
+        name: "actuator-lag",
+        fits: real_actuator,
+        build: |s| {
+            let (start, most) = (first(s), (0.12 * s.setup.duration()).min(80.0 * s.setup.dt));
+            let least = 0.05 * s.setup.dt;
+            Family::up_to(most, move |time| {
+                let slow = time.max(least);
+                let law = Law {
+                    states: vec![start],
+                    rates: Some(Box::new(move |at, dz| dz[0] = (at.q - at.z[0]) / slow)),
+                    actuate: Some(Box::new(|at, _| at.z[0])),
+                    ..Law::default()
+                };
+                (law, vec![("time", slow)])
+            })
+        },
+    },
+    Effect {
+        name: "input-saturation",
+        fits: real_actuator,
+        build: |s| {
+            let (peak, low, high) = (s.peak(), s.range.0, s.range.1);
+            // One-sided commands are cut at the top.
+            let floor = if low >= 0.0 { low } else { -high };
+            Family::up_to(0.75, move |cut| {
+                let limit = if floor >= 0.0 { high - cut * (high - floor) } else { peak * (1.0 - cut) };
+                (curve(move |u| u.clamp(-limit, limit)), vec![("limit", limit)])
+            })
+        },
+    },
+    Effect {
+        name: "input-dead-zone",
+        fits: real_actuator,
+        build: |s| {
+            Family::up_to(0.6 * s.peak(), |width| (curve(move |u| u - u.clamp(-width, width)), vec![("width", width)]))
+        },
+    },
+    Effect {
+        name: "input-bias",
+        fits: any_actuator,
+        build: |s| {
+            let sign = s.sign();
+            Family::up_to(0.5 * s.peak(), move |b| (curve(move |u| u + sign * b), vec![("bias", sign * b)]))
+        },
+    },
+    Effect {
+        name: "input-asymmetry",
+        fits: real_actuator,
+        build: |s| {
+            if s.range.0 >= 0.0 {
+                return None;
+            }
+            let side = s.sign();
+            Family::up_to(0.7, move |a| {
+                let law = curve(move |u| if side * u > 0.0 { u * (1.0 - a) } else { u });
+                (law, vec![("difference", side * a)])
+            })
+        },
+    },
+    Effect {
+        name: "input-quadratic",
+        fits: real_actuator,
+        build: |s| {
+            let (peak, sign) = (s.peak(), s.sign());
+            Family::up_to(0.6 / peak, move |k| {
+                (curve(move |u| u + sign * k * u * u.abs()), vec![("curvature", sign * k)])
+            })
+        },
+    },
+    Effect {
+        name: "input-quantisation",
+        fits: real_actuator,
+        build: |s| {
+            Family::up_to(0.8 * s.peak(), |step| (curve(move |u| (u / step).round() * step), vec![("step", step)]))
+        },
+    },
+    Effect {
+        name: "rate-limit",
+        fits: real_actuator,
+        build: |s| {
+            // The limit is neutral at infinity: what is open is its inverse.
+            let (start, peak, quick) = (first(s), s.peak(), 0.1 * s.setup.dt);
+            Family::up_to(0.25 * s.setup.duration(), move |slowness| {
+                let limit = peak / slowness;
+                let law = Law {
+                    states: vec![start],
+                    rates: Some(Box::new(move |at, dz| dz[0] = ((at.q - at.z[0]) / quick).clamp(-limit, limit))),
+                    actuate: Some(Box::new(|at, _| at.z[0])),
+                    ..Law::default()
+                };
+                (law, vec![("rate", limit)])
+            })
+        },
+    },
+    Effect {
+        name: "backlash",
+        fits: real_actuator,
+        build: |s| {
+            let start = first(s);
+            Family::up_to(0.6 * s.peak(), move |gap| {
+                let law = Law {
+                    states: vec![start],
+                    settle: Some(Box::new(move |at, z| z[0] = z[0].clamp(at.q - gap, at.q + gap))),
+                    actuate: Some(Box::new(|at, _| at.z[0])),
+                    ..Law::default()
+                };
+                (law, vec![("gap", gap)])
+            })
+        },
+    },
+];

@@ -1,0 +1,84 @@
+//! Forces and flows from outside, and what changes with time.
+
+use std::f64::consts::TAU;
+
+use super::{Effect, Family, any_place};
+use crate::law::{At, Law, Spot};
+use crate::plant::Plant;
+
+fn masses(plant: &Plant) -> Vec<Spot> {
+    plant.traits.mass.map(|_| vec![Spot::Place(plant.places.len() - 1)]).unwrap_or_default()
+}
+
+fn athermal(plant: &Plant) -> Vec<Spot> {
+    if plant.traits.thermal { Vec::new() } else { any_place(plant) }
+}
+
+pub const ALL: &[Effect] = &[
+    Effect {
+        name: "constant-force",
+        fits: athermal,
+        build: |s| {
+            let sign = s.sign();
+            Family::up_to(0.8 * s.force, move |a| {
+                (Law { force: Some(Box::new(move |_| sign * a)), ..Law::default() }, vec![("force", sign * a)])
+            })
+        },
+    },
+    Effect {
+        name: "periodic-disturbance",
+        fits: any_place,
+        build: |s| {
+            // At least three periods, at most a tenth of the sample rate; the phase differs between experiments.
+            let slow = 3.0 * TAU / s.setup.duration();
+            let omega = (s.omega * s.between(0.6, 3.0)).clamp(slow, 0.1 * TAU / s.setup.dt);
+            let phases = [s.between(-3.0, 3.0), s.between(-3.0, 3.0), s.between(-3.0, 3.0)];
+            Family::up_to(1.5 * s.force, move |a| {
+                let force = move |at: &At<'_>| a * (omega * at.t + phases[at.experiment]).sin();
+                (
+                    Law { force: Some(Box::new(force)), ..Law::default() },
+                    vec![("amplitude", a), ("frequency", omega), ("phase", phases[0])],
+                )
+            })
+        },
+    },
+    Effect {
+        name: "wind-gust",
+        fits: any_place,
+        build: |s| {
+            // One smooth pulse, in the calibration experiment only.
+            let (sign, end) = (s.sign(), s.setup.duration());
+            let (from, long) = (end * s.between(0.2, 0.6), end * s.between(0.08, 0.25));
+            Family::up_to(3.0 * s.force, move |a| {
+                let force = move |at: &At<'_>| {
+                    let c = (at.t - from) / long;
+                    if at.experiment == 0 && (0.0..1.0).contains(&c) {
+                        sign * a * 0.5 * (1.0 - (TAU * c).cos())
+                    } else {
+                        0.0
+                    }
+                };
+                (
+                    Law { force: Some(Box::new(force)), ..Law::default() },
+                    vec![("amplitude", sign * a), ("from", from), ("length", long)],
+                )
+            })
+        },
+    },
+    Effect {
+        name: "mass-loss",
+        fits: masses,
+        build: |s| {
+            let (mass, full) = (s.plant.traits.mass?, s.p[s.plant.traits.mass?]);
+            // Most that may go in the calibration experiment is 70 %; a longer one ends at 15 % left.
+            let most = 0.7 * full / s.setup.duration();
+            Family::up_to(most, move |rate| {
+                let law = Law {
+                    parameters: Some(Box::new(move |t, p| p[mass] = (p[mass] - rate * t.max(0.0)).max(0.15 * full))),
+                    ..Law::default()
+                };
+                (law, vec![("rate", rate)])
+            })
+        },
+    },
+];

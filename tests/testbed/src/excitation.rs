@@ -1,0 +1,59 @@
+//! Signals that drive the inputs of experiments; values as they stand in the data file, six digits after the point.
+
+use std::f64::consts::TAU;
+
+use crate::draw::Draw;
+
+/// Rounds to what the data file shows.
+fn shown(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    values.map(|v| (v * 1e6).round() / 1e6).collect()
+}
+
+/// Sum of `n` sines with random phases, frequencies (Hz) spread between two, rms `rms`.
+pub fn multisine(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), rms: f64) -> Vec<f64> {
+    let n = 4 + draw.below(4);
+    let lines: Vec<_> = (0..n).map(|_| (TAU * draw.log_between(low, high), draw.between(0.0, TAU))).collect();
+    let amplitude = rms * (2.0 / n as f64).sqrt();
+    shown((0..samples).map(|k| lines.iter().map(|(w, phase)| amplitude * (w * k as f64 * dt + phase).sin()).sum()))
+}
+
+/// Levels between two values, each kept for a time between two, s.
+pub fn steps(draw: &mut Draw, samples: usize, dt: f64, (short, long): (f64, f64), (low, high): (f64, f64)) -> Vec<f64> {
+    let (mut level, mut left) = (draw.between(low, high), 0.0);
+    shown((0..samples).map(|_| {
+        if left <= 0.0 {
+            level = draw.between(low, high);
+            left = draw.between(short, long);
+        }
+        left -= dt;
+        level
+    }))
+}
+
+/// A sine whose frequency rises from one to another, Hz.
+pub fn chirp(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), amplitude: f64) -> Vec<f64> {
+    let (phase, end) = (draw.between(0.0, TAU), samples as f64 * dt);
+    shown((0..samples).map(|k| {
+        let t = k as f64 * dt;
+        amplitude * (phase + TAU * (low * t + (high - low) * t * t / (2.0 * end))).sin()
+    }))
+}
+
+/// One of multisine, steps and chirp, with values of about `size`.
+pub fn any(draw: &mut Draw, samples: usize, dt: f64, band: (f64, f64), size: f64) -> Vec<f64> {
+    match draw.below(3) {
+        0 => multisine(draw, samples, dt, band, size * 0.7),
+        1 => steps(draw, samples, dt, (0.3 / band.1.max(band.0), 0.6 / band.0), (-size, size)),
+        _ => chirp(draw, samples, dt, band, size),
+    }
+}
+
+/// A slow wander about a mean, such as a temperature outdoors over days: a daily wave and a random walk.
+pub fn weather(draw: &mut Draw, samples: usize, dt: f64, mean: f64, swing: f64) -> Vec<f64> {
+    let (phase, mut walk) = (draw.between(0.0, TAU), 0.0);
+    let kick = 0.15 * swing * (dt / 3600.0).sqrt();
+    shown((0..samples).map(|k| {
+        walk += kick * draw.normal() - walk * dt / 40_000.0;
+        mean + walk + swing * (TAU * k as f64 * dt / 86_400.0 + phase).sin()
+    }))
+}

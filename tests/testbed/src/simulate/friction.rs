@@ -1,0 +1,128 @@
+//! Dry friction with exact rest.
+//!
+//! A joint with dry friction slides one way, slides the other way or rests. While it slides the direction in the formula
+//! is that of the mode, so that a step is smooth; where a step passes zero speed, the crossing is located (regula falsi on
+//! the length of the step), the speed set to exactly 0, and the joint rests if the force that holds it is within the
+//! breakaway level, else it slides on. While it rests, the force that keeps its acceleration at 0 is solved for, and it
+//! breaks away where a command takes that force out of the level, or at the end of the step in which it leaves.
+
+use super::world::World;
+use super::{FEW, SIZE, State, runge_kutta};
+use crate::law::Spot;
+
+/// What a joint with dry friction does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    /// No dry friction here.
+    Free,
+    /// It slides in this direction, 1 or -1.
+    Slides(f64),
+    /// It rests.
+    Rests,
+}
+
+impl World<'_> {
+    /// The levels at a joint for a direction, of all effects there.
+    fn hold(&self, j: usize, t: f64, x: &State, way: f64) -> f64 {
+        let here = self.effects.iter().enumerate().filter(|(_, e)| e.spot == Spot::Place(j));
+        here.filter_map(|(i, e)| e.law.dry.as_ref().map(|dry| dry(&self.at(i, t, x), way).hold)).sum()
+    }
+
+    /// Modes at the start.
+    pub(super) fn begin(&mut self, t: f64, x: &State) {
+        for j in 0..self.plant.places.len() {
+            let speed = x[self.plant.places[j].equation()];
+            if self.modes[j] != Mode::Free && speed != 0.0 {
+                self.modes[j] = Mode::Slides(speed.signum());
+            }
+        }
+        self.break_away(t, x);
+    }
+
+    /// Lets joints go that rest under more than the level.
+    pub(super) fn break_away(&mut self, t: f64, x: &State) {
+        for j in 0..self.plant.places.len() {
+            if self.modes[j] == Mode::Rests {
+                let (mut dx, mut held) = ([0.0; SIZE], [0.0; FEW]);
+                self.rates(t, x, &mut dx, &mut held);
+                let way = -held[j].signum();
+                if held[j].abs() > self.hold(j, t, x, way) {
+                    self.modes[j] = Mode::Slides(way);
+                }
+            }
+        }
+    }
+
+    fn step(&self, t: f64, x: &State, h: f64) -> State {
+        runge_kutta(x, self.n, h, |c, x, dx| self.rates(t + c * h, x, dx, &mut [0.0; FEW]))
+    }
+
+    /// Advances by `h`, through what joints with dry friction do.
+    pub(super) fn advance(&mut self, t: f64, x: State, h: f64) -> State {
+        let (mut x, mut t, mut left) = (x, t, h);
+        for _ in 0..12 {
+            let y = self.step(t, &x, left);
+            let turned = (0..self.plant.places.len()).filter_map(|j| match self.modes[j] {
+                Mode::Slides(way) if way * y[self.plant.places[j].equation()] < 0.0 => {
+                    Some((j, self.crossing(j, t, &x, left, &y)))
+                }
+                _ => None,
+            });
+            let first = turned.min_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((j, length)) = first else {
+                x = y;
+                t += left;
+                break;
+            };
+            if length > 0.0 {
+                x = self.step(t, &x, length);
+                x[self.plant.places[j].equation()] = 0.0;
+            }
+            self.modes[j] = Mode::Rests;
+            if length <= 0.0 {
+                continue; // It would turn back at once: it rests to the end of this step.
+            }
+            t += length;
+            left -= length;
+            self.break_away(t, &x);
+            if left <= 1e-9 * h {
+                break;
+            }
+        }
+        self.break_away(t, &x);
+        self.settle(t, &mut x);
+        x
+    }
+
+    /// Length of the step at whose end the speed of joint `j` is 0.
+    fn crossing(&self, j: usize, t: f64, x: &State, h: f64, end: &State) -> f64 {
+        let equation = self.plant.places[j].equation();
+        let (mut low, mut high) = ((0.0, x[equation]), (h, end[equation]));
+        if low.1 == 0.0 {
+            return 0.0;
+        }
+        let mut last = 0;
+        for _ in 0..30 {
+            let middle = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+            let speed = self.step(t, x, middle)[equation];
+            if speed.abs() < 1e-12 * (low.1.abs() + high.1.abs()) || high.0 - low.0 < 1e-12 * h {
+                return middle;
+            }
+            // Illinois: the end that stays twice counts half.
+            if speed * low.1 > 0.0 {
+                low = (middle, speed);
+                if last == 1 {
+                    high.1 *= 0.5;
+                }
+                last = 1;
+            } else {
+                high = (middle, speed);
+                if last == -1 {
+                    low.1 *= 0.5;
+                }
+                last = -1;
+            }
+        }
+        high.0
+    }
+}

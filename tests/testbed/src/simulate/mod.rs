@@ -1,0 +1,85 @@
+//! The integrator: classical Runge-Kutta of order 4 with fixed steps.
+//!
+//! Inputs are held; a delayed input ends a step where it changes. Dry friction: see [`friction`].
+
+mod friction;
+mod world;
+
+pub use world::outputs;
+
+use crate::plant::{Plant, Setup};
+
+/// Steps per sample of a plant with effects.
+const STEPS: usize = 20;
+/// Largest number of states, of the plant and of its effects.
+const SIZE: usize = 16;
+/// Largest number of places, inputs, outputs.
+const FEW: usize = 4;
+/// Largest number of parameters.
+const MANY: usize = 8;
+
+/// States of the plant, then those of its effects.
+type State = [f64; SIZE];
+
+/// Clean outputs of the base model, by output and sample; `None` where it diverges. `steps` per sample.
+pub fn base_outputs(plant: &Plant, p: &[f64], start: &[f64], setup: &Setup, steps: usize) -> Option<Vec<Vec<f64>>> {
+    let outputs: Vec<usize> = plant.outputs.iter().map(|output| output.state).collect();
+    base_states(plant, p, start, setup, (steps, &outputs))
+}
+
+/// The same for some states; `None` where it diverges.
+pub fn base_states(
+    plant: &Plant,
+    p: &[f64],
+    start: &[f64],
+    setup: &Setup,
+    (steps, states): (usize, &[usize]),
+) -> Option<Vec<Vec<f64>>> {
+    let n = plant.states.len();
+    let h = setup.dt / steps as f64;
+    let w = [0.0; FEW];
+    let mut x = [0.0; SIZE];
+    x[..n].copy_from_slice(start);
+    let mut out: Vec<Vec<f64>> = states.iter().map(|_| Vec::with_capacity(setup.samples)).collect();
+    let mut u = [0.0; FEW];
+    let inputs = plant.inputs.len();
+    for k in 0..setup.samples {
+        for (y, &state) in out.iter_mut().zip(states) {
+            y.push(x[state]);
+        }
+        if k + 1 == setup.samples {
+            break;
+        }
+        for i in 0..inputs {
+            u[i] = setup.inputs[i][k];
+        }
+        for _ in 0..steps {
+            x = runge_kutta(&x, n, h, |_, x, dx| (plant.rates)(&x[..n], &u, p, &w, dx));
+        }
+        if !x[..n].iter().all(|v| v.abs() < 1e9) {
+            return None;
+        }
+    }
+    Some(out)
+}
+
+/// One step of the classical method of order 4 over `n` states; `rates(fraction, x, dx)`.
+fn runge_kutta(x: &State, n: usize, h: f64, rates: impl Fn(f64, &State, &mut [f64])) -> State {
+    let (mut k1, mut k2, mut k3, mut k4) = ([0.0; SIZE], [0.0; SIZE], [0.0; SIZE], [0.0; SIZE]);
+    let ahead = |k: &State, c: f64| {
+        let mut y = *x;
+        for i in 0..n {
+            y[i] += c * h * k[i];
+        }
+        y
+    };
+    rates(0.0, x, &mut k1);
+    rates(0.5, &ahead(&k1, 0.5), &mut k2);
+    rates(0.5, &ahead(&k2, 0.5), &mut k3);
+    rates(1.0, &ahead(&k3, 1.0), &mut k4);
+    let mut y = *x;
+    for i in 0..n {
+        y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+    }
+    y
+}

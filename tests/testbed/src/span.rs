@@ -1,0 +1,126 @@
+//! What can stand in for what: outputs as vectors, with all that the base model can absorb taken out.
+
+use crate::bench::Bench;
+use crate::draw::Draw;
+use crate::effects::{Scene, effects};
+use crate::law::{Installed, Law, Spot};
+use crate::plant::Setup;
+use crate::simulate::{base_outputs, outputs};
+
+/// Steps per sample of the base model here.
+const STEPS: usize = 4;
+/// Shapes drawn of every effect of the catalogue.
+const SHAPES: usize = 2;
+/// Shares of the largest strength at which they are looked at.
+const STRENGTHS: [f64; 2] = [0.02, 0.2];
+/// Effects that may stand in together.
+const TOGETHER: usize = 3;
+
+/// The calibration outputs about a base model, in units of the noise.
+pub struct Frame<'a> {
+    bench: &'a Bench,
+    p: &'a [f64],
+    setup: Setup,
+    base: Vec<f64>,
+    /// Orthonormal directions of parameters and start values.
+    absorbed: Vec<Vec<f64>>,
+}
+
+impl<'a> Frame<'a> {
+    /// About given parameters and start values; `None` where the model diverges.
+    pub fn new(bench: &'a Bench, p: &'a [f64], start: &[f64]) -> Option<Self> {
+        let setup = Setup { start: start.to_vec(), ..bench.setups[0].clone() };
+        let run = |p: &[f64], start: &[f64]| Some(weigh(bench, &base_outputs(bench.plant, p, start, &setup, STEPS)?));
+        let base = run(p, start)?;
+        let mut absorbed = Vec::new();
+        for j in 0..p.len() + start.len() {
+            let (mut p, mut start) = (p.to_vec(), start.to_vec());
+            let moved = if j < p.len() { &mut p[j] } else { &mut start[j - bench.p.len()] };
+            *moved += 1e-6 * if j < bench.p.len() { *moved } else { moved.abs().max(0.1) };
+            add(&mut absorbed, minus(&run(&p, &start)?, &base));
+        }
+        Some(Self { bench, p, setup, base, absorbed })
+    }
+
+    /// How an effect moves the outputs, in a direction that the base model cannot follow; `None` where it diverges.
+    pub fn shift(&self, law: Law, spot: Spot) -> Option<Vec<f64>> {
+        let y = outputs(self.bench.plant, self.p, &self.setup, 0, &[Installed { law, spot }])?;
+        let shift = off(&self.absorbed, minus(&weigh(self.bench, &y), &self.base));
+        shift.iter().all(|v| v.is_finite()).then_some(shift)
+    }
+
+    /// Root mean square, in units of the noise, of what the best few effects of the catalogue leave of a measurement:
+    /// orthogonal matching pursuit over all effects at all places, with shapes drawn at random and strengths that enter
+    /// linearly.
+    pub fn left_by_catalogue(&self, measured: &[Vec<f64>]) -> f64 {
+        let mut rest = off(&self.absorbed, minus(&weigh(self.bench, measured), &self.base));
+        let mut candidates = self.catalogue();
+        for _ in 0..TOGETHER {
+            let along = |v: &Vec<f64>| dot(v, &rest).powi(2) / dot(v, v).max(1e-300);
+            let Some(best) =
+                (0..candidates.len()).max_by(|&a, &b| along(&candidates[a]).total_cmp(&along(&candidates[b])))
+            else {
+                break;
+            };
+            let mut direction = Vec::new();
+            add(&mut direction, candidates.swap_remove(best));
+            rest = off(&direction, rest);
+            candidates = candidates.into_iter().map(|v| off(&direction, v)).collect();
+        }
+        (dot(&rest, &rest) / rest.len() as f64).sqrt()
+    }
+
+    fn catalogue(&self) -> Vec<Vec<f64>> {
+        let mut found = Vec::new();
+        for effect in effects() {
+            for spot in (effect.fits)(self.bench.plant) {
+                for shape in 0..SHAPES {
+                    let draw = Draw::new(shape as u64, &format!("stand-in {}", effect.name));
+                    let scene = Scene::new(self.bench.plant, self.p, &self.setup, spot, draw);
+                    let Some(family) = scene.and_then(|scene| (effect.build)(&scene)) else { continue };
+                    for share in STRENGTHS {
+                        let law = (family.make)(share * family.bounds.1).0;
+                        found.extend(self.shift(law, spot));
+                    }
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Cosine between two vectors.
+pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
+    dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(1e-300)
+}
+
+fn weigh(bench: &Bench, y: &[Vec<f64>]) -> Vec<f64> {
+    y.iter().zip(&bench.total).flat_map(|(y, s)| y.iter().map(move |y| y / s)).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// A vector without its parts along orthonormal directions, which are taken out twice against rounding.
+fn off(directions: &[Vec<f64>], mut v: Vec<f64>) -> Vec<f64> {
+    for direction in directions.iter().chain(directions) {
+        let along = dot(direction, &v);
+        v.iter_mut().zip(direction).for_each(|(v, d)| *v -= along * d);
+    }
+    v
+}
+
+/// Adds the direction of a vector to orthonormal ones, unless it is one of them.
+fn add(directions: &mut Vec<Vec<f64>>, v: Vec<f64>) {
+    let before = dot(&v, &v);
+    let v = off(directions, v);
+    let size = dot(&v, &v);
+    if size > 1e-16 * before && size > 0.0 {
+        directions.push(v.iter().map(|v| v / size.sqrt()).collect());
+    }
+}

@@ -1,0 +1,58 @@
+//! The strength at which the refitted base model has a wanted error.
+
+/// Relative error that is good enough.
+const CLOSE: f64 = 0.04;
+
+/// Finds `e` in the bounds with `error(e)` near `size`, from below; `floor` is the error without the effect. Above the
+/// floor the error grows about in proportion with the strength, in root sums of squares: a secant in logarithms, held by
+/// a bracket. `None` where the size is not reached, or `error` is `None` on the way.
+pub fn find(
+    (low, high): (f64, f64),
+    start: f64,
+    (size, floor): (f64, f64),
+    mut error: impl FnMut(f64) -> Option<f64>,
+) -> Option<f64> {
+    let excess = |value: f64| (value * value - floor * floor).max(1e-6 * floor * floor).sqrt();
+    let wanted = excess(size).ln();
+    let mut below: Option<(f64, f64)> = None;
+    let mut above: Option<(f64, f64)> = None;
+    let mut e = start.clamp(low, high);
+    for _ in 0..24 {
+        let value = error(e);
+        if let Some(value) = value {
+            if (value / size - 1.0).abs() < CLOSE {
+                return Some(e);
+            }
+            let point = (e.ln(), excess(value).ln());
+            if point.1 < wanted {
+                if e >= high {
+                    return None;
+                }
+                below = Some(point);
+            } else {
+                above = Some(point);
+            }
+        } else {
+            // It diverges: as good as too strong.
+            above = Some((e.ln(), f64::INFINITY));
+        }
+        e = match (below, above) {
+            (Some(b), Some(a)) => {
+                if a.0 - b.0 < 1e-4 {
+                    return None;
+                }
+                let secant = b.0 + (wanted - b.1) * (a.0 - b.0) / (a.1 - b.1);
+                let margin = 0.1 * (a.0 - b.0);
+                let inside = if a.1.is_finite() { secant } else { 0.5 * (a.0 + b.0) };
+                inside.clamp(b.0 + margin, a.0 - margin).exp()
+            }
+            (Some(b), None) => (b.0 + (wanted - b.1).clamp(0.2, 3.0)).exp().min(high),
+            (None, Some(a)) if a.1.is_finite() => (a.0 + (wanted - a.1).clamp(-4.0, -0.2)).exp(),
+            _ => e * 0.1,
+        };
+        if e < low {
+            return None;
+        }
+    }
+    None
+}
