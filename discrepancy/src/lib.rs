@@ -3,18 +3,21 @@
 
 mod base;
 mod candidate;
-pub mod dev;
+mod diagnose;
 mod diagnosis;
 mod fit;
 mod hygiene;
+mod repaired;
 mod screen;
 mod search;
 mod subject;
 mod trace_of;
 mod trajectory;
 mod variant;
+mod weigh;
 mod windows;
 
+pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
     StrengthValue, Unexplained, Verdict,

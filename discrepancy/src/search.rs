@@ -3,20 +3,27 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Role};
+use mops_core::{Effect, Model, Role, Trials};
 use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Piece, Point};
+use crate::fit::{Fit, Fitted, Piece};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
+use crate::weigh::{Dispersion, by_chance};
+use crate::windows::cut;
+
+/// Residuals, in units of the noise, up to which a linear view of them is trusted.
+const NEARLY_LINEAR: f64 = 6.0;
 
 /// A model that was fitted to calibration and selection data together.
 pub struct Trial<'a> {
     /// Effects, with the strengths fitted.
     pub added: Vec<Added>,
+    /// Windows that each record is cut into; 1: none.
+    pub windows: usize,
     /// The problem.
     pub fit: Fit<'a>,
     /// Its model.
@@ -34,8 +41,6 @@ pub struct Limits {
     pub refits: usize,
     /// Those of them that are fitted to the end.
     pub finalists: usize,
-    /// Fall of the sum of squares, per the dispersion of the residuals, below which nothing is added.
-    pub least_gain: f64,
 }
 
 /// The search in a subject.
@@ -56,12 +61,57 @@ pub struct Round<'a> {
     pub screened: Vec<Screened>,
     /// As fitted, best first.
     pub trials: Vec<Trial<'a>>,
+    /// Directions that were looked in, as many as independent ones.
+    pub directions: f64,
+    /// The criterion of what the round began with.
+    pub before: f64,
 }
 
 impl<'a> Search<'a> {
-    /// Pieces that choose between models: calibration and selection data.
-    fn pieces(&self) -> Vec<Piece> {
-        base::pieces(self.subject, |role| role != Role::Validation)
+    /// Pieces that choose between models: calibration and selection data, each record in so many windows.
+    fn pieces(&self, windows: usize) -> Vec<Piece> {
+        let whole = base::pieces(self.subject, |role| role != Role::Validation);
+        if windows == 1 {
+            return whole;
+        }
+        let cut = |p: &Piece| {
+            cut(p.measurement, &self.subject.measurements[p.measurement], self.subject.model.as_ref(), windows)
+        };
+        whole.iter().flat_map(cut).collect()
+    }
+
+    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them.
+    pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
+        let mut best = trial;
+        for windows in [2, 4, 8] {
+            if best.fitted.normalised() < NEARLY_LINEAR {
+                break;
+            }
+            let pieces = self.pieces(windows);
+            let tuners = best.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            let locals = base::first_locals(&pieces);
+            if let Some(next) = self.trial(&best.added, &tuners, locals, windows, 40) {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// The trial over whole records; `None` where that cannot be simulated.
+    pub fn over_whole(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        let pieces = self.pieces(1);
+        let mut locals = base::first_locals(&pieces);
+        for (piece, locals) in pieces.iter().zip(&mut locals) {
+            let first = trial.fit.pieces.iter().position(|p| p.measurement == piece.measurement)?;
+            for (local, value) in piece.locals.iter().zip(locals) {
+                let window = &trial.fit.pieces[first];
+                if let Some(k) = window.locals.iter().position(|l| l.parameter == local.parameter) {
+                    *value = trial.fitted.point.locals[first][k].clamp(local.bounds[0], local.bounds[1]);
+                }
+            }
+        }
+        let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
+        self.trial(&trial.added, tuners, locals, 1, 40)
     }
 
     /// Fits start values alone, with the globals held: the experiments that parameters do not come from.
@@ -79,7 +129,7 @@ impl<'a> Search<'a> {
     /// The declared model, fitted to all data that may choose; `tuners` come from calibration data, with the `locals` of
     /// these experiments.
     pub fn declared(&self, calibrated: &Fitted) -> Option<Trial<'a>> {
-        let pieces = self.pieces();
+        let pieces = self.pieces(1);
         let mut locals = base::first_locals(&pieces);
         let mut calibration = calibrated.point.locals.iter();
         let tuners = &calibrated.point.globals;
@@ -90,7 +140,7 @@ impl<'a> Search<'a> {
                 locals.clone_from(&fitted.point.locals[0]);
             }
         }
-        self.trial(&[], tuners, locals, &[], 40)
+        self.trial(&[], tuners, locals, 1, 40)
     }
 
     /// Fits a variant to all data that may choose.
@@ -99,12 +149,13 @@ impl<'a> Search<'a> {
         added: &[Added],
         tuners: &[f64],
         locals: Vec<Vec<f64>>,
-        held: &[usize],
+        windows: usize,
         iterations: usize,
     ) -> Option<Trial<'a>> {
-        let (fit, point, variant) = problem(self.subject, added, self.pieces(), tuners, locals, held, self.simulations);
+        let pieces = self.pieces(windows);
+        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals, &[], self.simulations);
         let fitted = fit.solve(point, iterations)?;
-        Some(Trial { added: added.to_vec(), fit, variant, fitted }.read())
+        Some(Trial { added: added.to_vec(), windows, fit, variant, fitted }.read())
     }
 
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
@@ -125,8 +176,14 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|i| {
-                let added: Vec<Added> = from.added.iter().cloned().chain([screened[i].added.clone()]).collect();
-                self.from(from, &added, 4)
+                let mut last = screened[i].added.clone();
+                let first = &last.candidate.effect.strengths()[0];
+                if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
+                    // From where nothing has changed every step leads downwards.
+                    last.strengths[0] = neutral;
+                }
+                let added: Vec<Added> = from.added.iter().cloned().chain([last]).collect();
+                self.from(from, &added, 5)
             })
             .collect();
         // Those that lead after a few steps go on to the end.
@@ -141,16 +198,114 @@ impl<'a> Search<'a> {
             .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
             .collect();
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        Some(Round { screened, trials })
+        let directions = screened.iter().map(|s| s.directions).sum();
+        Some(Round { screened, trials, directions, before: from.score() })
     }
 
     /// Fits a variant from where another ended.
     pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
-        let own = |piece: &Piece| self.subject.measurements[piece.measurement].locals.len();
-        let locals = from.fit.pieces.iter().zip(&from.fitted.point.locals);
-        let locals = locals.map(|(piece, values)| values[..own(piece)].to_vec()).collect();
-        self.trial(added, tuners, locals, &[], iterations)
+        let own = self.pieces(from.windows);
+        let locals = own.iter().zip(&from.fitted.point.locals);
+        let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
+        self.trial(added, tuners, locals, from.windows, iterations)
+    }
+
+    /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
+    /// linear view, else in windows.
+    pub fn over_or_in_windows(&self, trial: &Trial<'a>) -> Trial<'a> {
+        let whole = if trial.windows == 1 { self.again(trial) } else { self.over_whole(trial) };
+        match whole {
+            Some(whole) if whole.fitted.normalised() < NEARLY_LINEAR => whole,
+            Some(whole) => {
+                let windows = self.in_windows(whole);
+                // A trial that was in windows stays there: a fit of whole records that failed has nothing to tell.
+                if trial.windows > 1 && trial.fitted.normalised() <= windows.fitted.normalised() {
+                    return self.again(trial).unwrap_or(windows);
+                }
+                windows
+            }
+            None => self.again(trial).expect("it was fitted before"),
+        }
+    }
+
+    /// The same trial once more.
+    pub fn again(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        let variant = Variant::new(self.subject, &trial.added);
+        let fit = Fit {
+            subject: self.subject,
+            model: Arc::clone(&variant.model) as Arc<dyn Model>,
+            globals: trial.fit.globals.clone(),
+            pieces: trial.fit.pieces.clone(),
+            simulations: self.simulations,
+        };
+        let (added, fitted) = (trial.added.clone(), trial.fitted.clone());
+        Some(Trial { added, windows: trial.windows, fit, variant, fitted })
+    }
+
+    /// The trial without effects that the others make superfluous.
+    pub fn pruned(&self, mut trial: Trial<'a>, level: f64) -> Trial<'a> {
+        let mut index = 0;
+        while trial.added.len() > 1 && index < trial.added.len() {
+            let mut added = trial.added.clone();
+            added.remove(index);
+            let tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            let own = self.pieces(trial.windows);
+            let locals = own.iter().zip(&trial.fitted.point.locals);
+            let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
+            let Some(without) = self.trial(&added, &tuners, locals, trial.windows, 40) else {
+                index += 1;
+                continue;
+            };
+            let dispersion = Dispersion::of(&trial);
+            let loss = (without.fitted.chi2 - trial.fitted.chi2) / dispersion.weight();
+            if by_chance(loss, 30.0) > level {
+                trial = without;
+                index = 0;
+            } else {
+                index += 1;
+            }
+        }
+        trial
+    }
+
+    /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that
+    /// may be zero, and are no larger than their uncertainty.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn without_declared(&self, trial: Trial<'a>) -> (Trial<'a>, Vec<usize>) {
+        let mut held = Vec::new();
+        let mut trial = trial;
+        if trial.added.is_empty() {
+            return (trial, held);
+        }
+        for k in 0..self.subject.globals.len() {
+            let global = &trial.fit.globals[k];
+            let value = trial.fitted.point.globals[k];
+            let error = trial.fitted.covariance[(k, k)].max(0.0).sqrt();
+            let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
+            let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
+            if !(zero && (at_least || value.abs() < 2.0 * error)) {
+                continue;
+            }
+            let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            tuners[k] = global.bounds[0].max(0.0);
+            let own = self.pieces(trial.windows);
+            let locals: Vec<Vec<f64>> = own
+                .iter()
+                .zip(&trial.fitted.point.locals)
+                .map(|(piece, values)| values[..piece.locals.len()].to_vec())
+                .collect();
+            let all: Vec<usize> = held.iter().copied().chain([k]).collect();
+            let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
+            let Some(fitted) = made.0.solve(made.1, 40) else { continue };
+            let weight = Dispersion::of(&trial).weight();
+            if (fitted.chi2 - trial.fitted.chi2) / weight < (fitted.count as f64).ln() {
+                held = all;
+                let (added, windows) = (trial.added.clone(), trial.windows);
+                trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
+            }
+        }
+        (trial, held)
     }
 
     fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
@@ -221,9 +376,4 @@ impl<'a> Trial<'a> {
         let names = self.added.iter().map(|a| format!("{} at {}", a.candidate.effect.name(), a.candidate.place()));
         names.collect::<Vec<_>>().join(" + ")
     }
-}
-
-/// The point of a fit with other globals.
-pub fn with_globals(point: &Point, globals: Vec<f64>) -> Point {
-    Point { globals, locals: point.locals.clone() }
 }

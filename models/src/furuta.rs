@@ -211,10 +211,6 @@ impl<S: Scalar> Holds<S> for FurutaDynamics<'_, S> {
         self.drive = Drive::held(u[0]);
         self.outside = [w[1], w[0]];
     }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 4).then_some(signal)
-    }
 }
 
 impl<S: Scalar> FurutaDynamics<'_, S> {

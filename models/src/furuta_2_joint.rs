@@ -99,10 +99,6 @@ impl<S: Scalar> Holds<S> for TwoJoints<'_, S> {
         self.bodies.drive = Drive::held(u[0]);
         self.outside.copy_from_slice(w);
     }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 4).then_some(signal)
-    }
 }
 
 impl Equations for Furuta2Joint {

@@ -117,10 +117,6 @@ impl<S: Scalar> Holds<S> for ThreeJoints<'_, S> {
         self.bodies.drive = Drive::held(u[0]);
         self.outside.copy_from_slice(w);
     }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 6).then_some(signal)
-    }
 }
 
 impl Equations for Furuta3Joint {

@@ -313,6 +313,11 @@ pub trait Acting<S: Scalar> {
     /// input that reaches the plant. At a sensor: what is measured.
     fn value(&self, at: &At<'_, S>, z: &[S]) -> S;
 
+    /// At a joint or process whose companion is one too: what is added to the companion's equation.
+    fn onward(&self, _at: &At<'_, S>, _z: &[S]) -> S {
+        S::from(0.0)
+    }
+
     /// Dry friction on top of [`Acting::value`], at a joint.
     fn friction(&self, _at: &At<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
         None

@@ -30,11 +30,6 @@ pub trait Plant<S: Scalar> {
         at.x.get(signal).copied().unwrap_or_else(|| at.u[signal - at.x.len()])
     }
 
-    /// The state that a signal shows as it is, by index; `None` for a signal that is computed.
-    fn shows(&self, _signal: usize) -> Option<usize> {
-        None
-    }
-
     /// Number of its guards.
     fn guards(&self) -> usize {
         0

@@ -58,8 +58,4 @@ impl<S: Scalar> Holds<S> for Running<'_, S, Vec<S>, Many<S>> {
     fn hold(&mut self, u: &[S], w: &[S]) {
         self.hold_drives(u.iter().chain(w).copied());
     }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        Running::shows(self, signal)
-    }
 }

@@ -98,14 +98,6 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         }
     }
 
-    /// The state that a signal is, if it is one.
-    pub fn shows(&self, signal: usize) -> Option<usize> {
-        match &self.model.signals[signal] {
-            Signal::State(state) => Some(*state),
-            _ => None,
-        }
-    }
-
     /// The value of a signal.
     pub fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         match &self.model.signals[signal] {

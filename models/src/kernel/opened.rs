@@ -11,11 +11,6 @@ pub trait Holds<S: Scalar>: Dynamics<S> {
     /// Holds inputs and forces at these values: inputs in the order of [`mops_core::Interface::inputs`], forces in that of
     /// the processes in [`mops_core::Interface::ports`].
     fn hold(&mut self, u: &[S], w: &[S]);
-
-    /// As [`Plant::shows`].
-    fn shows(&self, _signal: usize) -> Option<usize> {
-        None
-    }
 }
 
 /// A [`Plant`] made of dynamics and of the function that gives its signals.
@@ -67,10 +62,6 @@ impl<S: Scalar, D: Holds<S>, F: Fn(&D, usize, f64, &D::State) -> S> Plant<S> for
         let mut held = self.held.borrow_mut();
         held.look(at);
         (self.signal)(&held.dynamics, signal, at.t, &held.x)
-    }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        self.held.borrow().dynamics.shows(signal)
     }
 
     fn guards(&self) -> usize {

@@ -80,7 +80,7 @@ impl WithEffects {
         let start = dynamics.start(job.parameters)?;
         let mut looks = Looks { times, next: 0, found: Vec::with_capacity(times.len()) };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
-        integrate(&mut dynamics, 0.0, end, start, &open.tolerance(), &mut looks)?;
+        integrate(&mut dynamics, 0.0, end, start, &self.tolerance(open), &mut looks)?;
 
         let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
         let plant = Along::open(open, &parameters[..self.own()])?;

@@ -26,6 +26,7 @@ pub struct WithEffects {
     placements: Vec<Placement>,
     places: Vec<Place>,
     interface: Interface,
+    max_steps: usize,
 }
 
 /// Where an effect acts, as indices; and where its strengths and start values stand among the parameters.
@@ -106,7 +107,19 @@ impl WithEffects {
             }
             places.push(Place { site: sites.0, companion: sites.1, strengths, starts });
         }
-        Ok(Self { model, placements, places, interface })
+        Ok(Self { model, placements, places, interface, max_steps: usize::MAX })
+    }
+
+    /// Fails simulations that need more steps: effects at strengths that make them stiff.
+    #[must_use]
+    pub fn with_step_limit(mut self, max_steps: usize) -> Self {
+        self.max_steps = max_steps;
+        self
+    }
+
+    fn tolerance(&self, open: &dyn mops_core::Open) -> Tolerance {
+        let tolerance = open.tolerance();
+        Tolerance { max_steps: tolerance.max_steps.min(self.max_steps), ..tolerance }
     }
 
     /// The model without effects.
@@ -139,7 +152,7 @@ impl WithEffects {
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
-        let recording = record(&mut dynamics, start, job.horizon, &open.tolerance(), &signals, &output)?;
+        let recording = record(&mut dynamics, start, job.horizon, &self.tolerance(open), &signals, &output)?;
         Ok(dynamics.remembered(recording, &signals))
     }
 }
@@ -278,7 +291,10 @@ impl Model for WithEffects {
             let first = self.places[i].strengths;
             !self.acts(i, job.parameters) && seeds.iter().all(|seed| seed[first] == 0.0)
         };
-        if seeds.is_empty() || (0..self.placements.len()).all(neutral) {
+        if seeds.is_empty() {
+            return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
+        }
+        if (0..self.placements.len()).all(neutral) {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }

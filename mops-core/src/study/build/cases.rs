@@ -31,7 +31,7 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
     let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
     let horizon = draft.horizon.or(end);
     check_horizon(draft.horizon)?;
-    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon })
+    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon, begins: 0.0 })
 }
 
 fn build_input(
