@@ -148,9 +148,7 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let own = self.model.equation_states().len();
-        let actors = self.actors(&acting, own, parameters);
-        let mut dynamics = Driven::new(self.model.interface(), own, plant, actors, job);
+        let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
