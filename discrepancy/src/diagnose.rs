@@ -3,14 +3,19 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mops_core::{Effect, Mistake, Study, Watch};
+use mops_core::{Effect, Mistake, Port, Study, Watch};
 
 use crate::base;
-use crate::diagnosis::{Diagnosis, Found, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict};
+use crate::diagnosis::{
+    Diagnosis, Found, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Unexplained, Verdict,
+};
 use crate::fit::dot;
+use crate::locate::locate;
 use crate::repaired::Calibrated;
-use crate::screen::Screened;
+use crate::screen::{Scene, Screened};
+
 use crate::search::{Limits, Round, Search, Trial};
+use crate::stopgap::{best_table, points};
 use crate::subject::Subject;
 use crate::weigh::{Dispersion, by_chance, criterion, probabilities};
 
@@ -54,7 +59,10 @@ pub fn diagnose(
     let mut rounds: Vec<Round<'_>> = Vec::new();
     let mut p_value = 1.0;
     let base = search.over_or_in_windows(&declared);
-    let mut current = base;
+    watch.stage("where the residual comes from", 0.08);
+    let scene = Scene::new(&base.fit, &base.variant.model, &base.fitted);
+    let located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
+    let mut current = search.again(&base).ok_or_else(lost)?;
     #[allow(clippy::cast_precision_loss)]
     for k in 0..options.max_effects {
         if watch.wants_stop() {
@@ -82,19 +90,41 @@ pub fn diagnose(
     if last.added.len() > 1 {
         last = search.pruned(last, options.level);
     }
-    let (last, held) = search.without_declared(last);
+    let (mut last, held) = search.without_declared(last);
     watch.stage("the repaired model", 0.9);
-    let after = search.calibrate(&last, &held).ok_or_else(lost)?;
+    let mut after = search.calibrate(&last, &held).ok_or_else(lost)?;
 
     let verdict = match (last.added.is_empty(), last.fitted.normalised() > UNEXPLAINED) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,
     };
+    let mut unexplained = None;
+    if verdict == Verdict::Unexplained {
+        unexplained = located.first().and_then(|place| place.stopgap());
+        let ports: Vec<Port> = located.iter().map(|l| l.port.clone()).take(2).collect();
+        let table = scene.as_ref().and_then(|scene| best_table(&search, &base, scene, &ports));
+        if let Some(table) = table.filter(|table| table.fitted.chi2 < last.fitted.chi2 && table.windows == 1) {
+            let added = table.added.last().expect("a table was added");
+            unexplained = Some(Unexplained {
+                place: added.candidate.place(),
+                share: unexplained.map_or(f64::NAN, |u| u.share),
+                over: if added.candidate.effect.name().ends_with("speed") { "speed" } else { "position" }.to_owned(),
+                table: points(added),
+            });
+            if let Some(with_table) = search.calibrate(&table, &[]) {
+                after = with_table;
+                last = table;
+            }
+        }
+    }
+    let is_table = |index: &usize| last.added[*index].candidate.effect.name().starts_with("force-over");
     let ranking = ranking(&rounds, &last);
     let dispersion = Dispersion::of(&last);
-    let found: Vec<Found> =
-        (0..last.added.len()).map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion)).collect();
+    let found: Vec<Found> = (0..last.added.len())
+        .filter(|index| !is_table(index))
+        .map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion))
+        .collect();
     let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
     let removed = held.iter().map(|k| crate::diagnosis::Removed { term: names(k), place: String::new() }).collect();
     let probability = match verdict {
@@ -109,13 +139,13 @@ pub fn diagnose(
         found,
         removed,
         ranked: ranking,
-        unexplained: None,
+        unexplained,
         next_experiment: None,
         before: before.errors(&subject.measurements),
         after: after.errors(&subject.measurements),
         parameters: moves(&subject, &before, &after),
         noticeable: Vec::new(),
-        evidence: Vec::new(),
+        evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
         notes: subject.notes.clone(),
         starts: starts(&subject, &after),

@@ -53,8 +53,7 @@ const SAME: f64 = 0.5;
 pub fn locate(fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Vec<Located> {
     let ports = &model.model().interface().ports;
     let places: Vec<&Port> = ports.iter().filter(|port| port.kind(ports).is_some()).collect();
-    let mut all: Vec<Located> =
-        places.into_par_iter().filter_map(|port| located(port, fit, model, scene)).collect();
+    let mut all: Vec<Located> = places.into_par_iter().filter_map(|port| located(port, fit, model, scene)).collect();
     let best = all.iter().map(|l| l.evidence.evidence).fold(0.0, f64::max);
     let first = all.iter().position(|l| l.evidence.evidence > best - SAME);
     let first = first.map(|first| all.remove(first));

@@ -54,11 +54,8 @@ fn plant(hidden: Hidden, label: &str) -> Subject {
     let x = states.iter().zip(times()).zip(&noise[0]).map(|((s, t), e)| measured(t, s[0]) + e).collect();
     let f = states.iter().zip(&noise[1]).map(|(s, e)| s[2] + e).collect();
     let input = Input::Sampled { times: times(), values: times().into_iter().map(command).collect(), hold: Hold::Zero };
-    let record = Record {
-        inputs: vec![("u", input)],
-        times: times(),
-        signals: vec![("x", x, NOISE[0]), ("f", f, NOISE[1])],
-    };
+    let record =
+        Record { inputs: vec![("u", input)], times: times(), signals: vec![("x", x, NOISE[0]), ("f", f, NOISE[1])] };
     let guess = TRUTH.map(|p| 1.1 * p);
     subject(PLANT, &guess, 3, vec![record])
 }
@@ -141,14 +138,20 @@ fn timing_scratch() {
     "#;
     let n = 2000;
     let times: Vec<f64> = (0..n).map(|k| k as f64 * STEP).collect();
-    let input = Input::Sampled { times: times.clone(), values: times.iter().map(|&t| command(t)).collect(), hold: Hold::Zero };
+    let input =
+        Input::Sampled { times: times.clone(), values: times.iter().map(|&t| command(t)).collect(), hold: Hold::Zero };
     let wave = |f: f64| times.iter().map(|t| (f * t).sin()).collect::<Vec<f64>>();
-    let record = Record { inputs: vec![("u", input)], times: times.clone(), signals: vec![("x", wave(1.0), 0.01), ("y", wave(1.3), 0.01)] };
+    let record = Record {
+        inputs: vec![("u", input)],
+        times: times.clone(),
+        signals: vec![("x", wave(1.0), 0.01), ("y", wave(1.3), 0.01)],
+    };
     let subject = subject(text, &[2.0, 0.8, 40.0, 30.0, 0.0, 0.0, 0.0, 0.0], 4, vec![record]);
     let simulations = AtomicUsize::new(0);
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let t0 = std::time::Instant::now();
-    let u = crate::unknown::Unknown::new(&variant.model.model().interface().ports[0], &fit, &variant.model, &scene).unwrap();
+    let u = crate::unknown::Unknown::new(&variant.model.model().interface().ports[0], &fit, &variant.model, &scene)
+        .unwrap();
     println!("unknown {:?} cols {}", t0.elapsed(), u.columns.ncols());
     let t0 = std::time::Instant::now();
     let p = u.prior(&[crate::unknown::Term { family: 0, length: 0.05, factor: 1.0 }]).unwrap();

@@ -379,10 +379,4 @@ impl<'a> Trial<'a> {
         let rarity: f64 = self.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
         self.fitted.chi2 + self.unknowns() as f64 * (self.fitted.count as f64).ln() + 2.0 * rarity
     }
-
-    /// Its effects in short.
-    pub fn name(&self) -> String {
-        let names = self.added.iter().map(|a| format!("{} at {}", a.candidate.effect.name(), a.candidate.place()));
-        names.collect::<Vec<_>>().join(" + ")
-    }
 }

@@ -1,6 +1,6 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Effect, Port, PortKind};
+use mops_core::{Acting, At, Effect, Port};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
@@ -346,14 +346,4 @@ fn measured(
             (value - y[k]) / s.noise
         })
         .collect()
-}
-
-/// Whether a place is a sensor.
-pub fn is_sensor(port: &Port) -> bool {
-    matches!(port, Port::Sensor { .. })
-}
-
-/// The sort of a port, for ranking by place.
-pub fn kind(port: &Port, ports: &[Port]) -> Option<PortKind> {
-    port.kind(ports)
 }
