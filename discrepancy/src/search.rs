@@ -184,17 +184,14 @@ impl<'a> Search<'a> {
                 self.from(from, &added, 5)
             })
             .collect();
-        // Those that lead after a few steps go on to the end.
-        let mut order: Vec<usize> = (0..started.len()).collect();
-        order.sort_by(|&a, &b| started[a].score().total_cmp(&started[b].score()));
-        let leading = &order[..order.len().min(self.limits.finalists)];
-        let mut trials: Vec<Trial<'a>> = started
-            .into_iter()
-            .enumerate()
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
-            .collect();
+        // Those that lead after a few steps go on, and the best of them to the end.
+        let mut trials = started;
+        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
+            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            let rest = trials.split_off(trials.len().min(count));
+            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
+            trials.extend(rest);
+        }
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
@@ -361,9 +358,9 @@ impl<'a> Trial<'a> {
         self
     }
 
-    /// Fitted to the end.
-    fn continued(self, _: &Search<'a>) -> Option<Self> {
-        let fitted = self.fit.solve(self.fitted.point.clone(), 40)?;
+    /// Fitted further.
+    fn continued(self, iterations: usize) -> Option<Self> {
+        let fitted = self.fit.solve(self.fitted.point.clone(), iterations)?;
         Some(Self { fitted, ..self }.read())
     }
 
