@@ -37,7 +37,7 @@ fn variants() -> Vec<Variant> {
     vec![
         Variant {
             name: "compiled",
-            model: Box::new(Furuta::new(None, tolerance)),
+            model: Box::new(Furuta::model(None, tolerance)),
             parameters: vec![a, b, c, d, ba, bp, 0.0, 0.0, 0.3, 0.0, 2.0, 0.0],
         },
         Variant { name: "equations", model: text(IMPLICIT), parameters: vec![b, c, d, bp, ba, 2.0, 0.0, 0.3, 0.0] },

@@ -129,14 +129,23 @@ fn simulate<S: Scalar>(
 ) -> ([S; 4], Work) {
     let [a, b, c, d, ba, bp, ca, cp] = parameters;
     let drive = Drive::new(Some(input));
-    let mut dynamics =
-        FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] };
+    let mut dynamics = FurutaDynamics {
+        a,
+        b,
+        c,
+        d,
+        viscous: [bp, ba],
+        coulomb: [cp, ca],
+        drive,
+        outside: [S::from(0.0); 2],
+        contact: [Contact::Forward; 2],
+    };
     integrate(&mut dynamics, 0.0, END, START.map(S::from), &TOLERANCE, sink).expect("it simulates")
 }
 
 /// The model as a study uses it, with traces of all signals.
 fn analysis(physical: [f64; 8]) -> impl Fn() -> Analysis {
-    let model = Furuta::new(None, TOLERANCE);
+    let model = Furuta::model(None, TOLERANCE);
     let case = Case { inputs: vec![("u".into(), torque())], ..Case::default() };
     let parameters: Vec<f64> = physical.into_iter().chain(START).collect();
     move || {

@@ -60,6 +60,7 @@ pub fn catalogue() -> Catalogue {
         criteria: mops_criteria::kinds(),
         solvers: mops_solvers::kinds(),
         effects: mops_models::effects::effects(),
+        augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
         studies: mops_studies::shipped(),
     }
 }

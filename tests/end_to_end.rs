@@ -240,6 +240,20 @@ fn check_list_and_describe_tell_what_is_there() {
 }
 
 #[test]
+fn every_effect_is_listed_and_has_a_page_with_its_strengths() {
+    let list = String::from_utf8(mops(&["list", "effects"]).output().unwrap().stdout).unwrap();
+    assert!(!list.contains("settling-time"), "{list}");
+    for effect in mops::catalogue().effects {
+        assert!(list.contains(effect.name()), "{}", effect.name());
+    }
+    let page = String::from_utf8(mops(&["describe", "stribeck-friction"]).output().unwrap().stdout).unwrap();
+    for part in ["-c (1 + rise exp(-(v/vs)^2)) sgn(v)", "joint", "dissipative", "neutral at 0", "Source: B. Armstrong"]
+    {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+}
+
+#[test]
 fn a_new_study_checks_and_runs() {
     let folder = tempfile::tempdir().unwrap();
     mops(&["new", "mine"]).current_dir(&folder).assert().code(0);

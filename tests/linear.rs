@@ -169,6 +169,44 @@ response = { frequency-fit = { signal = 'y' }, demand = 1 }
 }
 
 #[test]
+fn a_measured_response_is_taken_in_the_units_of_the_model_or_refused() {
+    // One second-order joint, 0.01 w' = u - 0.6 ph: 1/0.6 rad/(N m) at rest.
+    let folder = tempfile::tempdir().unwrap();
+    let text = "
+[study]
+name = 'joint'
+[models.p.equations]
+states = { ph = 'rad', w = 'rad/s' }
+inputs = { u = 'N m' }
+der = { ph = 'w', w = \"0.01*w' = u - 0.6*ph\" }
+[models.p.linearise]
+[experiments.sweep]
+file = 'sweep.csv'
+frequency = 'f'
+responses = { ph = { magnitude = 'm', phase = 'p' } }
+[criteria]
+response = { frequency-fit = { signal = 'ph', input = 'u' }, demand = 1 }
+";
+    let file = study(folder.path(), text);
+    let measured = |unit: &str, size: f64| {
+        let data = format!("f [Hz],m [{unit}],p [deg]\n0,{size},0\n");
+        std::fs::write(folder.path().join("sweep.csv"), data).unwrap();
+        let output = mops(&["run", &file, "--json", "--out", folder.path().join("out").to_str().unwrap()]).output();
+        let output = output.unwrap();
+        let result: Result<Value, _> = serde_json::from_slice(&output.stdout);
+        result.map(|r| r["worst_scaled"].as_f64().unwrap()).map_err(|_| String::from_utf8(output.stderr).unwrap())
+    };
+    for (unit, size) in
+        [("1", 1.0 / 0.6), ("rad/(N m)", 1.0 / 0.6), ("mrad/(N m)", 1e3 / 0.6), ("deg/(N m)", 95.492_966)]
+    {
+        assert!(measured(unit, size).unwrap() < 1e-12, "{unit}");
+    }
+    let wrong = measured("rad/V", 1.0).unwrap_err();
+    assert!(wrong.contains("the response is measured in `rad/V`, that of the model is in `rad/(N m)`"), "{wrong}");
+    assert!(wrong.contains("study.toml:12:15"), "{wrong}");
+}
+
+#[test]
 fn a_joint_with_dry_friction_is_held_by_the_input_alone_and_rounding_is_not_printed() {
     let text = "
 [study]

@@ -601,6 +601,72 @@ fn a_command_line_that_asks_for_what_is_not_there() {
     );
 }
 
+/// The calibration on a model of its equations, with an effect in the place of its friction.
+fn effect(what: &'static str, effects: &str) -> Case {
+    let study = broken(CALIBRATION, "[models.rig.furuta]\n", SHAFT);
+    let study = broken(&study, "[models.rig.parameters]\na = 9e-4\nb = 2e-3\nc = 4e-4\n", "");
+    let study = broken(&study, "[tuners]", &format!("[models.rig.effects]\n{effects}\n[tuners]"));
+    Case::new(what, &study).with("swing.csv", RECORDING)
+}
+
+/// Two pendulums on one shaft.
+const SHAFT: &str = r#"[models.rig.equations]
+states     = { phi = "rad", dphi = "rad/s", theta = "rad", dtheta = "rad/s" }
+inputs     = { u = "N m" }
+parameters = { d = "N m" }
+constants  = { J = "0.01 kg m2" }
+
+[models.rig.equations.der]
+phi    = "dphi"
+theta  = "dtheta"
+dphi   = "J*dphi' = u - d*sin(phi)"
+dtheta = "J*dtheta' = d*sin(theta)"
+"#;
+
+#[test]
+fn effects_that_are_not_there_or_do_not_fit() {
+    check(
+        "effects",
+        &[
+            effect("a misspelt effect", "arm = { coulomb-frction = { place = \"joint:phi\" } }"),
+            effect("no effect", "arm = {}"),
+            effect(
+                "two effects under one name",
+                "arm = { coulomb-friction = { place = \"joint:phi\" }, viscous-friction = { place = \"joint:phi\" } }",
+            ),
+            effect("an effect without a place", "arm = { coulomb-friction = {} }"),
+            effect("a place alone", "arm = { coulomb-friction = \"joint:phi\" }"),
+            effect("a key that is not known", "arm = { coulomb-friction = { place = \"joint:phi\", c = 0.1 } }"),
+            effect("a misspelt place", "arm = { coulomb-friction = { place = \"joint:pih\" } }"),
+            effect("a place without its sort", "arm = { coulomb-friction = { place = \"phi\" } }"),
+            effect(
+                "a place that the effect does not act at",
+                "arm = { coulomb-friction = { place = \"actuator:u\" } }",
+            ),
+            effect("the equation of a joint's speed", "arm = { coulomb-friction = { place = \"process:phi\" } }"),
+            effect(
+                "a companion that is not wanted",
+                "arm = { coulomb-friction = { place = \"joint:phi\", companion = \"actuator:u\" } }",
+            ),
+            effect(
+                "a misspelt companion",
+                "arm = { coulomb-friction = { place = \"joint:phi\", companion = \"actuator:v\" } }",
+            ),
+            effect("a name with a point", "\"arm.1\" = { coulomb-friction = { place = \"joint:phi\" } }"),
+            effect(
+                "a misspelt strength",
+                "arm = { coulomb-friction = { place = \"joint:phi\" } }\n[models.rig.parameters]\n\"arm.d\" = 0.1",
+            ),
+            design(
+                "a model without places",
+                "[tuners]",
+                "[models.loop.effects]\narm = { coulomb-friction = { place = \"joint:phi\" } }\n[tuners]",
+            ),
+            effect("a linearisation", "arm = { coulomb-friction = { place = \"joint:phi\" } }\n[models.rig.linearise]"),
+        ],
+    );
+}
+
 /// `mops` points at the last place of `wrong` in the file, line and column counted in characters from 1.
 fn points_at(case: &Case, file: &str, wrong: &str) {
     let text = std::str::from_utf8(&case.files[file]).unwrap();

@@ -98,7 +98,7 @@ mod tests {
     fn measured(response: impl Fn(f64) -> Complex) -> Case {
         let frequencies: Vec<f64> = (1..=20).map(|i| 0.3 * f64::from(i)).collect();
         let values = frequencies.iter().map(|&w| response(w)).map(|g| [g.re, g.im]).collect();
-        let data = ResponseData { signal: "y".into(), frequencies, values };
+        let data = ResponseData { signal: "y".into(), frequencies, values, unit: None };
         Case { experiment: Some(Experiment { responses: vec![data], ..Experiment::default() }), ..Case::default() }
     }
 

@@ -36,7 +36,17 @@ pub fn dev(study: &Study, effects: &[Arc<dyn Effect>]) {
         current.fitted.point.globals,
         t0.elapsed().as_secs_f64()
     );
+    current = s.in_windows(current);
+    println!("windows {} {:.4} {:.2}s", current.windows, current.fitted.normalised(), t0.elapsed().as_secs_f64());
     for round in 0..3 {
+        if current.windows > 1 {
+            if let Some(w) = s.over_whole(&current) {
+                println!("  whole {:.4} {:.2}s", w.fitted.normalised(), t0.elapsed().as_secs_f64());
+                if w.fitted.normalised() < 6.0 {
+                    current = w;
+                }
+            }
+        }
         let Some(r) = s.round(&current) else {
             println!("round failed");
             break;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Role};
+use mops_core::{Effect, Role, Trials};
 use rayon::prelude::*;
 
 use crate::base;
@@ -12,11 +12,17 @@ use crate::fit::{Fit, Fitted, Piece, Point};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
+use crate::windows::cut;
+
+/// Residuals, in units of the noise, up to which a linear view of them is trusted.
+const NEARLY_LINEAR: f64 = 6.0;
 
 /// A model that was fitted to calibration and selection data together.
 pub struct Trial<'a> {
     /// Effects, with the strengths fitted.
     pub added: Vec<Added>,
+    /// Windows that each record is cut into; 1: none.
+    pub windows: usize,
     /// The problem.
     pub fit: Fit<'a>,
     /// Its model.
@@ -59,9 +65,50 @@ pub struct Round<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Pieces that choose between models: calibration and selection data.
-    fn pieces(&self) -> Vec<Piece> {
-        base::pieces(self.subject, |role| role != Role::Validation)
+    /// Pieces that choose between models: calibration and selection data, each record in so many windows.
+    fn pieces(&self, windows: usize) -> Vec<Piece> {
+        let whole = base::pieces(self.subject, |role| role != Role::Validation);
+        if windows == 1 {
+            return whole;
+        }
+        let cut = |p: &Piece| {
+            cut(p.measurement, &self.subject.measurements[p.measurement], self.subject.model.as_ref(), windows)
+        };
+        whole.iter().flat_map(cut).collect()
+    }
+
+    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them.
+    pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
+        let mut best = trial;
+        for windows in [2, 4, 8] {
+            if best.fitted.normalised() < NEARLY_LINEAR {
+                break;
+            }
+            let pieces = self.pieces(windows);
+            let tuners = best.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            let locals = base::first_locals(&pieces);
+            if let Some(next) = self.trial(&best.added, &tuners, locals, windows, 40) {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// The trial over whole records; `None` where that cannot be simulated.
+    pub fn over_whole(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        let pieces = self.pieces(1);
+        let mut locals = base::first_locals(&pieces);
+        for (piece, locals) in pieces.iter().zip(&mut locals) {
+            let first = trial.fit.pieces.iter().position(|p| p.measurement == piece.measurement)?;
+            for (local, value) in piece.locals.iter().zip(locals) {
+                let window = &trial.fit.pieces[first];
+                if let Some(k) = window.locals.iter().position(|l| l.parameter == local.parameter) {
+                    *value = trial.fitted.point.locals[first][k].clamp(local.bounds[0], local.bounds[1]);
+                }
+            }
+        }
+        let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
+        self.trial(&trial.added, tuners, locals, 1, 40)
     }
 
     /// Fits start values alone, with the globals held: the experiments that parameters do not come from.
@@ -79,7 +126,7 @@ impl<'a> Search<'a> {
     /// The declared model, fitted to all data that may choose; `tuners` come from calibration data, with the `locals` of
     /// these experiments.
     pub fn declared(&self, calibrated: &Fitted) -> Option<Trial<'a>> {
-        let pieces = self.pieces();
+        let pieces = self.pieces(1);
         let mut locals = base::first_locals(&pieces);
         let mut calibration = calibrated.point.locals.iter();
         let tuners = &calibrated.point.globals;
@@ -90,7 +137,7 @@ impl<'a> Search<'a> {
                 locals.clone_from(&fitted.point.locals[0]);
             }
         }
-        self.trial(&[], tuners, locals, &[], 40)
+        self.trial(&[], tuners, locals, 1, 40)
     }
 
     /// Fits a variant to all data that may choose.
@@ -99,12 +146,13 @@ impl<'a> Search<'a> {
         added: &[Added],
         tuners: &[f64],
         locals: Vec<Vec<f64>>,
-        held: &[usize],
+        windows: usize,
         iterations: usize,
     ) -> Option<Trial<'a>> {
-        let (fit, point, variant) = problem(self.subject, added, self.pieces(), tuners, locals, held, self.simulations);
+        let pieces = self.pieces(windows);
+        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals, &[], self.simulations);
         let fitted = fit.solve(point, iterations)?;
-        Some(Trial { added: added.to_vec(), fit, variant, fitted }.read())
+        Some(Trial { added: added.to_vec(), windows, fit, variant, fitted }.read())
     }
 
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
@@ -125,8 +173,14 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|i| {
-                let added: Vec<Added> = from.added.iter().cloned().chain([screened[i].added.clone()]).collect();
-                self.from(from, &added, 4)
+                let mut last = screened[i].added.clone();
+                let first = &last.candidate.effect.strengths()[0];
+                if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
+                    // From where nothing has changed every step leads downwards.
+                    last.strengths[0] = neutral;
+                }
+                let added: Vec<Added> = from.added.iter().cloned().chain([last]).collect();
+                self.from(from, &added, 5)
             })
             .collect();
         // Those that lead after a few steps go on to the end.
@@ -147,10 +201,10 @@ impl<'a> Search<'a> {
     /// Fits a variant from where another ended.
     pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
-        let own = |piece: &Piece| self.subject.measurements[piece.measurement].locals.len();
-        let locals = from.fit.pieces.iter().zip(&from.fitted.point.locals);
-        let locals = locals.map(|(piece, values)| values[..own(piece)].to_vec()).collect();
-        self.trial(added, tuners, locals, &[], iterations)
+        let own = self.pieces(from.windows);
+        let locals = own.iter().zip(&from.fitted.point.locals);
+        let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
+        self.trial(added, tuners, locals, from.windows, iterations)
     }
 
     fn candidates(&self, added: &[Added]) -> Vec<Candidate> {

@@ -56,9 +56,11 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: &[Trajectory]) -> Option<Sizes> {
     let spots: Vec<(usize, Spot)> =
         pieces.iter().enumerate().filter_map(|(i, piece)| Some((i, spot(place, model, piece)?))).collect();
-    let record = pieces.iter().map(|p| p.horizon).fold(0.0, f64::max);
+    let record = pieces.iter().map(|p| p.horizon + p.case.begins).fold(0.0, f64::max);
     let samples = pieces.iter().flat_map(|p| &p.series);
-    let sample = samples.map(|s| record.min(s.times[s.times.len() - 1] / (s.times.len() - 1).max(1) as f64));
+    let sample = samples
+        .filter(|s| s.times.len() > 1)
+        .map(|s| (s.times[s.times.len() - 1] - s.times[0]) / (s.times.len() - 1) as f64);
     let sample = sample.fold(f64::INFINITY, f64::min);
     let moments = || spots.iter().flat_map(|(i, _)| trajectories[*i].moments.iter());
     let positive = |x: f64| if x.is_finite() && x > 1e-300 { x } else { 1.0 };
@@ -210,7 +212,7 @@ fn signal(
             Spot::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
             Spot::Sensor(_) => (0.0, 0.0, 0.0, 0.0, 0.0),
         };
-        At { t: m.t, value, q, v, a, mobility, other, other_speed, u: &m.u }
+        At { t: m.t + piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u }
     };
     let delay = acting.delay();
     for k in 0..along.moments.len() {
@@ -221,7 +223,7 @@ fn signal(
             advance(acting, &look(k - 1), &at, &mut z);
         }
         let value = if let Some(delay) = delay {
-            command(at.t - delay)
+            command(at.t - piece.case.begins - delay)
         } else if memory.is_empty() {
             acting.value(&at, &z)
         } else {
@@ -313,7 +315,17 @@ fn measured(
             Some(Spot::Sensor(other)) => along.predicted[other].get(k).copied().unwrap_or(0.0),
             _ => 0.0,
         };
-        At { t: s.times[k], value: y[k], q: y[k], v: 0.0, a: 0.0, mobility: 0.0, other, other_speed: 0.0, u: &[] }
+        At {
+            t: s.times[k] + piece.case.begins,
+            value: y[k],
+            q: y[k],
+            v: 0.0,
+            a: 0.0,
+            mobility: 0.0,
+            other,
+            other_speed: 0.0,
+            u: &[],
+        }
     };
     (0..y.len())
         .map(|k| {

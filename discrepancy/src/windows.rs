@@ -42,7 +42,7 @@ pub fn cut(index: usize, measurement: &Measurement, model: &dyn Model, count: us
             })
             .collect();
         let inputs = measurement.case.inputs.iter().map(|(name, input)| (name.clone(), shifted(input, from)));
-        let case = Case { inputs: inputs.collect(), ..measurement.case.clone() };
+        let case = Case { inputs: inputs.collect(), begins: from, ..measurement.case.clone() };
         Piece {
             measurement: index,
             case,

@@ -1,8 +1,8 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter,
-    Quantity, Scalar, State, Unit, Variable, WithTangents,
+    AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity,
+    Scalar, State, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +10,8 @@ use serde::Deserialize;
 use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
 use crate::kernel::{
-    self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, rests, wanted,
+    Dynamics, Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, mechanism, rates_and_signals,
+    record, rests, wanted,
 };
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
@@ -48,7 +49,7 @@ impl ModelOptions for FurutaOptions {
         self.tolerance.check()?;
         let horizon = self.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|e| Mistake::new("horizon", e))?;
-        Ok(Box::new(Furuta::new(horizon, self.tolerance)))
+        Ok(Box::new(Furuta::model(horizon, self.tolerance)))
     }
 }
 
@@ -60,7 +61,7 @@ pub struct Furuta {
 
 impl Furuta {
     /// A Furuta pendulum that is simulated to `horizon` (s) where no experiment says otherwise.
-    pub fn new(horizon: Option<f64>, tolerance: Tolerance) -> Self {
+    pub fn model(horizon: Option<f64>, tolerance: Tolerance) -> Kernel<Self> {
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
         let friction =
             |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY).with_default(0.0);
@@ -100,33 +101,30 @@ impl Furuta {
                 state("dtheta", "dtheta0", "dtheta", Some("theta")),
             ],
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
-            ports: Vec::new(),
+            ports: mechanism::ports(&["phi", "theta"], &["u"]),
             horizon,
             analysis: AnalysisKind::Time,
         };
-        Self { interface, tolerance }
+        Kernel(Self { interface, tolerance })
     }
 }
 
-impl Model for Furuta {
+impl Written for Furuta {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..4].to_vec()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)))?;
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
     }
 }
 
@@ -162,7 +160,14 @@ impl Furuta {
             let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
             return Err(Failure::Undefined(fact));
         }
-        Ok(FurutaDynamics { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], drive, contact: [Contact::Forward; 2] })
+        let (viscous, coulomb) = ([bp, ba], [cp, ca]);
+        let outside = [S::from(0.0); 2];
+        Ok(FurutaDynamics { a, b, c, d, viscous, coulomb, drive, outside, contact: [Contact::Forward; 2] })
+    }
+
+    /// The start values.
+    fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
+        parameters[8..].try_into().expect("four start values come last")
     }
 
     /// The value of a signal: the states, then the torque.
@@ -174,7 +179,7 @@ impl Furuta {
 impl Simulate for Furuta {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
-        let start = parameters[8..].try_into().expect("four start values come last");
+        let start = Self::start(parameters);
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -195,8 +200,17 @@ pub struct FurutaDynamics<'a, S> {
     pub coulomb: [S; 2],
     /// Torque on the arm, N m.
     pub drive: Drive<'a, S>,
+    /// Torques on pendulum and arm from outside the model, N m.
+    pub outside: [S; 2],
     /// How pendulum and arm move.
     pub contact: [Contact; 2],
+}
+
+impl<S: Scalar> Holds<S> for FurutaDynamics<'_, S> {
+    fn hold(&mut self, u: &[S], w: &[S]) {
+        self.drive = Drive::held(u[0]);
+        self.outside = [w[1], w[0]];
+    }
 }
 
 impl<S: Scalar> FurutaDynamics<'_, S> {
@@ -208,9 +222,10 @@ impl<S: Scalar> FurutaDynamics<'_, S> {
         let coupling = self.c * cos;
         let arm = self.b + self.a * sin * sin;
         let turning = self.a * dphi * sin * cos;
-        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta;
-        let arm_force =
-            self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi + self.drive.at(t);
+        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta + self.outside[0];
+        let arm_force = self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi
+            + self.drive.at(t)
+            + self.outside[1];
         (coupling, arm, [pendulum_force, arm_force])
     }
 

@@ -1,8 +1,7 @@
 //! The Furuta pendulum as two rigid bodies and two bearings.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
-    Scalar, Variable, WithTangents,
+    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +9,10 @@ use serde::Deserialize;
 use crate::kernel::drive::Drive;
 use crate::kernel::elements::BearingFriction;
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted};
+use crate::kernel::{
+    Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds,
+    wanted,
+};
 
 /// The Furuta pendulum as two rigid bodies: an arm that turns by `phi` about the vertical, a pendulum that turns by `theta`
 /// about the arm, 0 upright and pi hanging. With `K = J + m l^2`, `C = m r l`:
@@ -58,8 +60,12 @@ impl ModelOptions for Furuta2JointOptions {
             peak("peak2", "pendulum"),
         ]);
         let interface = mechanism::interface(&[ARM, PENDULUM], parameters, vec![arm_torque()]);
+        let ports = mechanism::ports(&["phi", "theta"], &["u"]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Furuta2Joint { interface: Interface { horizon, ..interface }, tolerance: self.tolerance }))
+        Ok(Box::new(Kernel(Furuta2Joint {
+            interface: Interface { ports, horizon, ..interface },
+            tolerance: self.tolerance,
+        })))
     }
 }
 
@@ -69,25 +75,29 @@ struct Furuta2Joint {
     tolerance: Tolerance,
 }
 
-impl Model for Furuta2Joint {
+impl Written for Furuta2Joint {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..4].to_vec()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
+    }
+}
+
+impl<S: Scalar> Holds<S> for TwoJoints<'_, S> {
+    fn hold(&mut self, u: &[S], w: &[S]) {
+        self.bodies.drive = Drive::held(u[0]);
+        self.outside.copy_from_slice(w);
     }
 }
 
@@ -110,7 +120,7 @@ impl Equations for Furuta2Joint {
 impl Simulate for Furuta2Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
-        let start = *parameters.last_chunk().expect("four start values come last");
+        let start = Self::start(parameters);
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -129,6 +139,11 @@ impl Furuta2Joint {
     fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 2]) -> TwoJoints<'a, S> {
         let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
         Mechanism::new(TwoBodies { lumped, drive }, friction, &[ARM, PENDULUM])
+    }
+
+    /// The start values.
+    fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
+        *parameters.last_chunk().expect("four start values come last")
     }
 
     /// The value of a signal: the states, then the torque.

@@ -1,8 +1,7 @@
 //! The Furuta pendulum whose pendulum can also tilt sideways, against a spring.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
-    Scalar, Variable, WithTangents,
+    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -11,7 +10,10 @@ use crate::furuta_2_joint::{ARM, Lumped, PENDULUM, arm_torque, body_parameters, 
 use crate::kernel::drive::Drive;
 use crate::kernel::elements::{BearingFriction, SpringDamper};
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{self, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted};
+use crate::kernel::{
+    Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds,
+    wanted,
+};
 
 /// The Furuta pendulum of `furuta-2-joint` with a third joint: at its top the pendulum tilts by `psi` in the plane through
 /// its swing axis, against a spring and a damper in parallel. The rod has no inertia about its own axis. With
@@ -74,8 +76,12 @@ impl ModelOptions for Furuta3JointOptions {
             positive("d", "N m s/rad", "damper against the tilt"),
         ]);
         let interface = mechanism::interface(&[ARM, PENDULUM, TILT], parameters, vec![arm_torque()]);
+        let ports = mechanism::ports(&["phi", "theta", "psi"], &["u"]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Furuta3Joint { interface: Interface { horizon, ..interface }, tolerance: self.tolerance }))
+        Ok(Box::new(Kernel(Furuta3Joint {
+            interface: Interface { ports, horizon, ..interface },
+            tolerance: self.tolerance,
+        })))
     }
 }
 
@@ -87,25 +93,29 @@ struct Furuta3Joint {
     tolerance: Tolerance,
 }
 
-impl Model for Furuta3Joint {
+impl Written for Furuta3Joint {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..6].to_vec()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
+        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
+        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
+    }
+}
+
+impl<S: Scalar> Holds<S> for ThreeJoints<'_, S> {
+    fn hold(&mut self, u: &[S], w: &[S]) {
+        self.bodies.drive = Drive::held(u[0]);
+        self.outside.copy_from_slice(w);
     }
 }
 
@@ -128,7 +138,7 @@ impl Equations for Furuta3Joint {
 impl Simulate for Furuta3Joint {
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
-        let start = *parameters.last_chunk().expect("six start values come last");
+        let start = Self::start(parameters);
         record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
     }
 }
@@ -153,6 +163,11 @@ impl Furuta3Joint {
         // Spring and damper stand before the six start values.
         let tilt = SpringDamper::new(p[p.len() - 8], p[p.len() - 7]);
         Mechanism::new(ThreeBodies { lumped, tilt, drive }, friction, &[ARM, PENDULUM, TILT])
+    }
+
+    /// The start values.
+    fn start<S: Scalar>(parameters: &[S]) -> [S; 6] {
+        *parameters.last_chunk().expect("six start values come last")
     }
 
     /// The value of a signal: the states, then the torque.

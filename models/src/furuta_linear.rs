@@ -1,8 +1,7 @@
 //! The Furuta pendulum near its upright position, linearised.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
-    Scalar, Variable, WithTangents,
+    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -12,7 +11,7 @@ use crate::kernel::drive::Drive;
 use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::{self, Joint};
 use crate::kernel::{
-    self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, seconds, wanted,
+    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds, wanted,
 };
 
 /// The Furuta pendulum linearised about the upright position, with a spring and a damper in parallel in each joint:
@@ -45,7 +44,7 @@ impl ModelOptions for FurutaLinearOptions {
         self.tolerance.check()?;
         let interface = mechanism::interface(&upright_joints(), lumped_parameters(), vec![arm_torque()]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(FurutaLinear { interface: Interface { horizon, ..interface }, tolerance: self.tolerance }))
+        Ok(Box::new(Kernel(FurutaLinear { interface: Interface { horizon, ..interface }, tolerance: self.tolerance })))
     }
 }
 
@@ -55,25 +54,17 @@ struct FurutaLinear {
     tolerance: Tolerance,
 }
 
-impl Model for FurutaLinear {
+impl Written for FurutaLinear {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..4].to_vec()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
     }
 }
 

@@ -1,8 +1,7 @@
 //! The Furuta pendulum held upright by state feedback, its arm led to an angle.
 
 use mops_core::{
-    Analysis, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
-    Scalar, Variable, WithTangents,
+    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,7 +9,8 @@ use serde::Deserialize;
 use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
 use crate::kernel::elements::{Lag, Saturation};
 use crate::kernel::{
-    self, Dynamics, Equations, Recording, Simulate, Tolerance, mechanism, rates_and_signals, record, seconds, wanted,
+    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, mechanism, rates_and_signals, record,
+    seconds, wanted,
 };
 
 /// The Furuta pendulum with a spring and a damper in each joint, upright, under state feedback with a filtered reference:
@@ -75,7 +75,7 @@ impl ModelOptions for FurutaStateFeedbackOptions {
         interface.signals.push(Variable::new("ref", "rad", "reference of the arm's angle"));
         interface.signals.push(Variable::new("u", "N m", "torque on the arm"));
         interface.horizon = seconds("horizon", Some(&self.horizon))?;
-        Ok(Box::new(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance }))
+        Ok(Box::new(Kernel(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance })))
     }
 }
 
@@ -86,25 +86,17 @@ struct FurutaStateFeedback {
     tolerance: Tolerance,
 }
 
-impl Model for FurutaStateFeedback {
+impl Written for FurutaStateFeedback {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..5].to_vec()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
     }
 }
 

@@ -17,7 +17,7 @@ pub mod transfer_function;
 mod with_effects;
 
 use mops_core::ModelKind;
-pub use with_effects::{Moment, WithEffects};
+pub use with_effects::{Moment, Own, OwnModel, WithEffects};
 
 /// Every kind of model. A new one is a file, and a line here.
 pub fn kinds() -> Vec<ModelKind> {

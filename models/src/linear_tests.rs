@@ -33,7 +33,7 @@ const FURUTA: [f64; 12] =
 
 #[test]
 fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
-    let furuta: Arc<dyn Model> = Arc::new(Furuta::new(None, Tolerance::default()));
+    let furuta: Arc<dyn Model> = Arc::new(Furuta::model(None, Tolerance::default()));
     let linearised = Linearised::new(furuta, &Linearise::default()).unwrap();
     let found = system(&linearised, &FURUTA);
     // M q'' = f with M = [[a, c], [c, b]]: by hand.
@@ -87,7 +87,7 @@ fn bearings_rest_without_dry_friction_and_slide_where_they_move() {
 
 #[test]
 fn coulomb_friction_of_the_furuta_pendulum_has_its_sign_where_a_joint_moves() {
-    let furuta = Furuta::new(None, Tolerance::default());
+    let furuta = Furuta::model(None, Tolerance::default());
     let look = |dphi: f64, at_rest: bool| {
         let states = [0.0, dphi, 0.0, 0.0];
         let at = OperatingPoint { parameters: &FURUTA, states: &states, inputs: &[0.0], at_rest };
@@ -102,7 +102,7 @@ fn coulomb_friction_of_the_furuta_pendulum_has_its_sign_where_a_joint_moves() {
 
 #[test]
 fn slopes_at_any_state_agree_with_central_differences() {
-    let furuta = Furuta::new(None, Tolerance::default());
+    let furuta = Furuta::model(None, Tolerance::default());
     let (states, inputs) = ([0.3, -1.2, 2.1, 4.0], [0.01]);
     let local = |states: &[f64], inputs: &[f64]| {
         furuta.local(&OperatingPoint { parameters: &FURUTA, states, inputs, at_rest: false }).unwrap().unwrap()
@@ -131,7 +131,7 @@ fn slopes_at_any_state_agree_with_central_differences() {
 
 #[test]
 fn the_pendulum_finds_its_equilibrium_and_hangs_stably() {
-    let furuta: Arc<dyn Model> = Arc::new(Furuta::new(None, Tolerance::default()));
+    let furuta: Arc<dyn Model> = Arc::new(Furuta::model(None, Tolerance::default()));
     let at = |value: &str| vec![("theta".to_owned(), Quantity::parse(value).unwrap())];
     let near = Linearise { at: at("2.9 rad"), equilibrium: true, free: vec!["theta".into()], ..Linearise::default() };
     let resting = Linearised::new(furuta, &near).unwrap().at(&Case::default(), &FURUTA).unwrap();

@@ -1,14 +1,16 @@
 //! A PID controller in a loop with a linear plant.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Input, Interface, Job, Local, Mistake, Model, ModelOptions, OperatingPoint,
-    Parameter, Quantity, Scalar, Unit, Variable, WithTangents,
+    AnalysisKind, Failure, Input, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
+    Scalar, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::kernel::drive::Drive;
-use crate::kernel::{self, Dynamics, Equations, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
+use crate::kernel::{
+    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, rates_and_signals, record, wanted,
+};
 use crate::plant::{Plant, TransferFunction};
 
 /// A PID controller with filtered derivative in a loop with unity feedback and a linear plant `G`:
@@ -110,7 +112,7 @@ impl ModelOptions for PidLoopOptions {
         };
         let mut names = Vec::new();
         let plant = TransferFunction::new(&self.plant, &CONTROLLER, &mut names).map_err(|m| m.within("plant"))?;
-        Ok(Box::new(PidLoop {
+        Ok(Box::new(Kernel(PidLoop {
             interface: interface(&names, horizon),
             plant,
             setpoint,
@@ -118,7 +120,7 @@ impl ModelOptions for PidLoopOptions {
             limit,
             sampling,
             tolerance: self.tolerance,
-        }))
+        })))
     }
 }
 
@@ -173,28 +175,20 @@ struct PidLoop {
     tolerance: Tolerance,
 }
 
-impl Model for PidLoop {
+impl Written for PidLoop {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         let of_plant = (1..=self.plant.order()).map(|i| Variable::new(format!("x{i}"), "1", "state of the plant"));
         let integral = Variable::new("integral", "1", "integral part of the controller");
         let filtered = Variable::new("filtered", "1", "filter of the derivative");
         of_plant.chain([integral, filtered]).collect()
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
     }
 }
 

@@ -71,7 +71,7 @@ const EXACT: Tolerance =
 
 #[test]
 fn tangents_of_a_furuta_pendulum_that_sticks_agree_with_differences() {
-    let model = Furuta::new(None, EXACT);
+    let model = Furuta::model(None, EXACT);
     let swing = [
         ("a", 0.0044),
         ("b", 0.0118),
@@ -219,7 +219,7 @@ const FURUTA: [(&str, f64); 4] = [("a", 9.035_24e-4), ("b", 1.133_13e-3), ("c", 
 fn furuta(extra: &[(&'static str, f64)], case: &Case, horizon: f64) -> Response {
     let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 1_000_000, ..Tolerance::default() };
     let values: Vec<(&str, f64)> = FURUTA.iter().chain(extra).copied().collect();
-    respond(&Furuta::new(None, tolerance), case, &values, horizon)
+    respond(&Furuta::model(None, tolerance), case, &values, horizon)
 }
 
 /// Kinetic and potential energy, J, by the Lagrangian the equations follow from.
@@ -284,7 +284,7 @@ fn a_sliding_mass_stops_where_coulomb_friction_says() {
     // With c = 0 and no gravity the arm is alone: constant deceleration ca/b, stop after w^2 b/(2 ca).
     let tolerance = Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000, ..Tolerance::default() };
     let values = [("a", 1.0), ("b", 2.0), ("c", 0.0), ("d", 0.0), ("ca", 0.5), ("dphi0", 1.5)];
-    let response = respond(&Furuta::new(None, tolerance), &Case::default(), &values, 10.0);
+    let response = respond(&Furuta::model(None, tolerance), &Case::default(), &values, 10.0);
     assert!((response.trace("phi").unwrap().at(10.0) - 1.5 * 1.5 * 2.0 / (2.0 * 0.5)).abs() < 1e-9);
     assert!((response.events[0].time - 1.5 * 2.0 / 0.5).abs() < 1e-9);
 }

@@ -15,6 +15,8 @@ pub struct Case {
     pub experiment: Option<Experiment>,
     /// End of the simulation, s; the models' own where absent.
     pub horizon: Option<f64>,
+    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time.
+    pub begins: f64,
 }
 
 impl Case {

@@ -10,6 +10,7 @@ use crate::criterion::CriterionSpec;
 use crate::effect::Effect;
 use crate::file::schema_of;
 use crate::model::Model;
+use crate::placement::Augment;
 use crate::solver::Solver;
 use crate::study::Mistake;
 
@@ -56,6 +57,11 @@ impl ModelKind {
     /// The kind with options `O`.
     pub fn of<O: ModelOptions>() -> Self {
         Self { name: O::KIND, schema: schema_of::<O>, read: |value| O::deserialize(value).map(O::build) }
+    }
+
+    /// A model of this kind with default options, where every option has a default.
+    pub fn default_model(&self) -> Option<Box<dyn Model>> {
+        (self.read)(ValueDeserializer::parse("{}").expect("an empty table is TOML")).ok()?.ok()
     }
 }
 
@@ -152,6 +158,8 @@ pub struct Catalogue {
     pub solvers: Vec<SolverKind>,
     /// Effects that models may lack.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// What puts effects into a model; without it no study can name one.
+    pub augment: Option<Augment>,
     /// Shipped studies.
     pub studies: Vec<Shipped>,
 }

@@ -64,6 +64,18 @@ pub enum PortKind {
     Sensor,
 }
 
+impl PortKind {
+    /// Its name, as places begin with it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Process => "process",
+            Self::Actuator => "actuator",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
 impl Port {
     /// Its sort; `None` for the equation of a joint's speed, which its [`Port::Joint`] stands for.
     pub fn kind(&self, ports: &[Self]) -> Option<PortKind> {
@@ -300,6 +312,11 @@ pub trait Acting<S: Scalar> {
     /// At a joint or a process: what is added to the right-hand side of the equation, positive forward. At an actuator: the
     /// input that reaches the plant. At a sensor: what is measured.
     fn value(&self, at: &At<'_, S>, z: &[S]) -> S;
+
+    /// At a joint or process whose companion is one too: what is added to the companion's equation.
+    fn onward(&self, _at: &At<'_, S>, _z: &[S]) -> S {
+        S::from(0.0)
+    }
 
     /// Dry friction on top of [`Acting::value`], at a joint.
     fn friction(&self, _at: &At<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {

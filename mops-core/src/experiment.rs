@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::unit::Unit;
+
 /// What an experiment is used for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -142,8 +144,10 @@ pub struct ResponseData {
     pub signal: String,
     /// Angular frequencies, rad/s.
     pub frequencies: Vec<f64>,
-    /// Real and imaginary part at each, in the unit of the output over that of the input; gaps are left out.
+    /// Real and imaginary part at each; gaps are left out.
     pub values: Vec<[f64; 2]>,
+    /// Unit of the values; that of the output over that of the input where absent, and in a study that is built.
+    pub unit: Option<Unit>,
 }
 
 /// A measurement: what was recorded, what it is used for.

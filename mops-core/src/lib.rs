@@ -18,6 +18,7 @@ pub mod linear;
 mod linearised;
 mod model;
 mod outcome;
+mod placement;
 mod plant;
 mod port;
 mod problem;
@@ -54,6 +55,7 @@ pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
+pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};

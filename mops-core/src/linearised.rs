@@ -67,6 +67,7 @@ impl Linearised {
         let of = model.interface();
         if states.is_empty() {
             let fact = match of.analysis {
+                AnalysisKind::Time if model.augmented().is_some() => "a model with effects cannot be linearised",
                 AnalysisKind::Time => "this model cannot be linearised: it does not give its equations",
                 AnalysisKind::Linear => "this model is linear already",
             };

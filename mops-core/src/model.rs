@@ -1,11 +1,13 @@
 //! What a model is: signals, parameters, states, inputs, and the analysis that criteria read.
 
 use std::fmt;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::effect::Placement;
 use crate::linear::StateSpace;
 use crate::plant::Open;
 use crate::port::Port;
@@ -153,6 +155,12 @@ pub trait Model: Send + Sync {
 
     /// The model opened at its ports, where it has some.
     fn ported(&self) -> Option<&dyn Open> {
+        None
+    }
+
+    /// The model without the effects that were added to it, and these effects, where it is such a model: its parameters are
+    /// those of the model, then the strengths. More effects are added to the model without.
+    fn augmented(&self) -> Option<(&Arc<dyn Model>, &[Placement])> {
         None
     }
 

@@ -25,12 +25,9 @@ pub trait Plant<S: Scalar> {
     /// Writes `x'` in the present mode.
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]);
 
-    /// The value of a signal, by its index in the interface.
-    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S;
-
-    /// The state that a signal shows as it is, by index; `None` for a signal that is computed.
-    fn shows(&self, _signal: usize) -> Option<usize> {
-        None
+    /// The value of a signal, by its index in the interface; where not said otherwise, signals are the states, then the inputs.
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        at.x.get(signal).copied().unwrap_or_else(|| at.u[signal - at.x.len()])
     }
 
     /// Number of its guards.

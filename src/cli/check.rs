@@ -6,6 +6,7 @@ use clap::Args;
 use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale};
 
 use super::families::folded;
+use super::places::places;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, print};
@@ -56,6 +57,11 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         })
     });
     text += &format!("\n{}", table(&["case", "fixed parameter", "value", "unit"], &[2], folded(fixed.collect(), 1)));
+    let models = study.models.iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
+    let models: Vec<_> = models.filter(|row| !row[1].is_empty()).collect();
+    if !models.is_empty() {
+        text += &format!("\n{}", table(&["model", "places for effects"], &[], models));
+    }
     for warning in &study.warnings {
         text += &format!("\nwarning: {warning}\n");
     }

@@ -1,17 +1,18 @@
-//! `mops describe`: the manual page of a kind or of a shipped study.
+//! `mops describe`: the manual page of a kind, an effect or a shipped study.
 
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, suggestion};
+use mops_core::{Catalogue, Diagnostic, ModelKind, suggestion};
 
-use super::{Trouble, effects, print};
+use super::places::places;
+use super::{Trouble, effect, print};
 
 /// What is described.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, an effect, a shipped study, a table of study files (study, models, tuners,
-    /// cases, experiments, criteria, solver, diagnosis), or a key of one, such as `step` or `hold`.
+    /// A kind of model, criterion or solver, an effect, a shipped study, a table of study files (study, models, tuners, cases,
+    /// experiments, criteria, solver), or a key of one, such as `step` or `hold`.
     name: String,
 }
 
@@ -26,11 +27,14 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         return Ok(ExitCode::SUCCESS);
     }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
-        print(&mops_core::file::describe(name, &schema()));
+        let model = catalogue.models.iter().find(|kind| kind.name == name).and_then(ModelKind::default_model);
+        let places = model.map_or_else(String::new, |model| places(model.interface()));
+        let places = if places.is_empty() { places } else { format!("\nPlaces for effects:\n  {places}\n") };
+        print(&(mops_core::file::describe(name, &schema()) + &places));
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {
-        print(&effects::page(effect.as_ref()));
+        print(&effect::page(effect.as_ref()));
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {

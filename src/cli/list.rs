@@ -1,13 +1,31 @@
-//! `mops list`: what is there.
+//! `mops list`: what is there, all of it or one sort.
 
 use std::process::ExitCode;
 
+use clap::{Args, ValueEnum};
 use mops_core::Catalogue;
 
 use super::tables::table;
 use super::{Trouble, print};
 
-pub(super) fn list(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
+/// What is listed.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// One sort of thing alone.
+    what: Option<Sort>,
+}
+
+/// A sort of thing that there is.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Sort {
+    Studies,
+    Models,
+    Criteria,
+    Solvers,
+    Effects,
+}
+
+pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let first_line = |schema: schemars::Schema| {
         let about = schema.as_value().get("description").and_then(|d| d.as_str()).unwrap_or_default();
         first_statement(about)
@@ -21,17 +39,18 @@ pub(super) fn list(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
     let criteria = catalogue.criteria.iter().map(|k| row(k.name, first_line((k.schema)())));
     let solvers = catalogue.solvers.iter().map(|k| row(k.name, first_line((k.schema)())));
     let effects = catalogue.effects.iter().map(|effect| row(effect.name(), first_statement(effect.about())));
-    let text = [
-        ("studies (mops run NAME)", studies.collect()),
-        ("models", models.collect()),
-        ("criteria", criteria.collect()),
-        ("solvers", solvers.collect::<Vec<_>>()),
-        ("effects that a model may lack (mops diagnose STUDY)", effects.collect()),
-    ]
-    .map(|(title, rows)| table(&[title, ""], &[], rows))
-    .join("\n");
+    let tables = [
+        (Sort::Studies, "studies (mops run NAME)", studies.collect()),
+        (Sort::Models, "models", models.collect()),
+        (Sort::Criteria, "criteria", criteria.collect()),
+        (Sort::Solvers, "solvers", solvers.collect::<Vec<_>>()),
+        (Sort::Effects, "effects a model may lack", effects.collect()),
+    ];
+    let wanted = tables.into_iter().filter(|(sort, ..)| arguments.what.is_none_or(|what| what == *sort));
+    let text: Vec<String> = wanted.map(|(_, title, rows)| table(&[title, ""], &[], rows)).collect();
     print(&format!(
-        "{text}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver, diagnosis.\n"
+        "{}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver.\n",
+        text.join("\n")
     ));
     Ok(ExitCode::SUCCESS)
 }

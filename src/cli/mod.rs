@@ -5,13 +5,14 @@ mod data;
 mod describe;
 mod diagnose;
 mod diagnosis;
-mod effects;
+mod effect;
 mod families;
 mod findings;
 mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod places;
 mod progress;
 mod remains;
 mod run;
@@ -59,8 +60,8 @@ enum Command {
     /// Check a study and its data without running anything.
     Check(check::Arguments),
     /// List the kinds of model, criterion and solver, the effects a model may lack, and the shipped studies.
-    List,
-    /// Describe a kind, a shipped study, or a signal list of a model: formula, options, units, source.
+    List(list::Arguments),
+    /// Describe a kind, an effect, a shipped study, or a signal list of a model: formula, options, units, source.
     Describe(describe::Arguments),
     /// Write a commented study to start from, or a copy of a shipped one.
     New(new::Arguments),
@@ -109,7 +110,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
-        Command::List => list::list(catalogue),
+        Command::List(arguments) => list::list(catalogue, &arguments),
         Command::Describe(arguments) => describe::describe(catalogue, &arguments),
         Command::New(arguments) => new::new(catalogue, &arguments),
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),

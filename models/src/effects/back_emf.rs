@@ -16,7 +16,8 @@ impl Definition for BackEmf {
     const NAME: &'static str = "back-emf";
     const ABOUT: &'static str = "The motion of a joint induces a voltage against the command.";
     const FORMULA: &'static str = "u - k v, v the speed of the companion joint";
-    const SOURCE: &'static str = "R. Isermann, Mechatronic Systems: Fundamentals (Springer 2005), section 5.3";
+    const SOURCE: &'static str = "G. F. Franklin, J. D. Powell, A. Emami-Naeini, Feedback Control of Dynamic Systems, \
+                                  6th edition (Pearson 2010), section 2.3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);

@@ -17,8 +17,8 @@ impl Definition for Backlash {
     const NAME: &'static str = "backlash";
     const ABOUT: &'static str = "Play of a gear: the output follows only after the gap is crossed.";
     const FORMULA: &'static str = "the output moves as little as keeps it within u - gap/2 and u + gap/2";
-    const SOURCE: &'static str = "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, \
-                                  Automatica 38 (2002), section 2";
+    const SOURCE: &'static str =
+        "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =

@@ -19,8 +19,8 @@ impl Definition for Cogging {
     const NAME: &'static str = "cogging";
     const ABOUT: &'static str = "A force that repeats a whole number of times in a turn, from magnets or teeth.";
     const FORMULA: &'static str = "a sin(n q + phase)";
-    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
-                                  Collective 2003), chapter 4";
+    const SOURCE: &'static str =
+        "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

@@ -16,7 +16,7 @@ impl Definition for ConstantForce {
     const NAME: &'static str = "constant-force";
     const ABOUT: &'static str = "A constant force, torque, flow or gain of heat: an unknown load, a slope, the sun.";
     const FORMULA: &'static str = "f";
-    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 3-2";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 3";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[Strength::signed("f", "what is added", Dimension::OUTPUT)];

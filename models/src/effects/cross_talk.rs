@@ -16,7 +16,7 @@ impl Definition for CrossTalk {
     const NAME: &'static str = "cross-talk";
     const ABOUT: &'static str = "What another sensor measures is seen in this one too.";
     const FORMULA: &'static str = "y + k y2, y2 the signal of the companion sensor";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const COMPANION: Option<PortKind> = Some(PortKind::Sensor);

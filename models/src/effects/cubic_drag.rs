@@ -16,7 +16,7 @@ impl Definition for CubicDrag {
     const NAME: &'static str = "cubic-drag";
     const ABOUT: &'static str = "A force against the motion in proportion to the third power of the speed.";
     const FORMULA: &'static str = "-k v^3";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 3.3.2";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[Strength::positive(

@@ -19,7 +19,7 @@ impl Definition for CubicStiffness {
     const ABOUT: &'static str = "A spring whose force has a share with the third power of the displacement: hardening, \
                                  or softening where it is negative.";
     const FORMULA: &'static str = "-k (q - rest)^3";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 4.1 (Duffing)";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4 (Duffing)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

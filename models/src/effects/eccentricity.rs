@@ -18,7 +18,7 @@ impl Definition for Eccentricity {
     const NAME: &'static str = "eccentricity";
     const ABOUT: &'static str = "An angle is measured with a scale whose centre is off the axis.";
     const FORMULA: &'static str = "y + a sin(y + phase)";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[Strength::positive("a", "amplitude", Dimension::OUTPUT), phase()];

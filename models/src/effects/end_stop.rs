@@ -19,7 +19,7 @@ impl Definition for EndStop {
     const NAME: &'static str = "end-stop";
     const ABOUT: &'static str = "Elastic stops that push back beyond a lower and an upper position.";
     const FORMULA: &'static str = "-k max(q - high, 0) + k max(low - q, 0)";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 4.1";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

@@ -20,7 +20,7 @@ impl Definition for FlexibleMode {
     const ABOUT: &'static str =
         "A second mass, attached to the joint through a spring and a damper, with a resonance of its own.";
     const FORMULA: &'static str = "m (w^2 (z - q) + 2 d w (z' - v)), z'' = -w^2 (z - q) - 2 d w (z' - v)";
-    const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), section 3.2";
+    const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), section 3.3";
     const CLASS: EffectClass = EffectClass::Inertial;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

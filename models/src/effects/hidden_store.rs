@@ -19,7 +19,7 @@ impl Definition for HiddenStore {
     const ABOUT: &'static str = "A second store of heat or matter that exchanges with this one: walls, a dead volume.";
     const FORMULA: &'static str = "k (z - x), z' = (x - z)/tau";
     const SOURCE: &'static str = "P. Bacher, H. Madsen, Identifying suitable models for the heat dynamics of \
-                                  buildings, Energy and Buildings 43 (2011), section 3";
+                                  buildings, Energy and Buildings 43 (2011)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[

@@ -18,7 +18,7 @@ impl Definition for Imbalance {
     const NAME: &'static str = "imbalance";
     const ABOUT: &'static str = "The weight of a mass off the axis of a turning joint.";
     const FORMULA: &'static str = "-a sin(q - phase)";
-    const SOURCE: &'static str = "R. Isermann, Mechatronic Systems: Fundamentals (Springer 2005), section 4.3";
+    const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), chapter 6";
     const CLASS: EffectClass = EffectClass::Gravity;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] =

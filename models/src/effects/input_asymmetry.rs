@@ -16,8 +16,7 @@ impl Definition for InputAsymmetry {
     const NAME: &'static str = "input-asymmetry";
     const ABOUT: &'static str = "The command acts stronger one way than the other.";
     const FORMULA: &'static str = "u + a |u|";
-    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
-                                  Nonlinearities (Wiley 1996), chapter 2";
+    const SOURCE: &'static str = "R. Isermann, Fault-Diagnosis Systems (Springer 2006)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =

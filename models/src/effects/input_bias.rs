@@ -16,8 +16,7 @@ impl Definition for InputBias {
     const NAME: &'static str = "input-bias";
     const ABOUT: &'static str = "A constant is added to the command.";
     const FORMULA: &'static str = "u + b";
-    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
-                                  Nonlinearities (Wiley 1996), chapter 2";
+    const SOURCE: &'static str = "R. Isermann, Fault-Diagnosis Systems (Springer 2006)";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] = &[Strength::signed("b", "what is added", Dimension::OUTPUT)];

@@ -17,8 +17,7 @@ impl Definition for InputDeadZone {
     const NAME: &'static str = "input-dead-zone";
     const ABOUT: &'static str = "Small commands do nothing, and larger ones act less by as much.";
     const FORMULA: &'static str = "u - clamp(u, -width, width)";
-    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
-                                  Nonlinearities (Wiley 1996), chapter 2";
+    const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =

@@ -16,7 +16,7 @@ impl Definition for InputQuantisation {
     const NAME: &'static str = "input-quantisation";
     const ABOUT: &'static str = "The command acts in steps.";
     const FORMULA: &'static str = "step round(u/step)";
-    const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008), chapter 1";
+    const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =

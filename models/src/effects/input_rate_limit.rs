@@ -17,8 +17,7 @@ impl Definition for InputRateLimit {
     const NAME: &'static str = "input-rate-limit";
     const ABOUT: &'static str = "The actuator follows the command no faster than a rate.";
     const FORMULA: &'static str = "u' between -rate and rate";
-    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
-                                  Nonlinearities (Wiley 1996), chapter 2";
+    const SOURCE: &'static str = "L. Zaccarian, A. R. Teel, Modern Anti-windup Synthesis (Princeton 2011)";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =

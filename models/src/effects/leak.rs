@@ -18,8 +18,7 @@ impl Definition for Leak {
     const NAME: &'static str = "leak";
     const ABOUT: &'static str = "Outflow through a hole, with the square root of the level above it.";
     const FORMULA: &'static str = "-k sqrt(max(x - hole, 0))";
-    const SOURCE: &'static str =
-        "G. K. Batchelor, An Introduction to Fluid Dynamics (Cambridge 1967), section 5.1 (Torricelli)";
+    const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 3 (Torricelli)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[

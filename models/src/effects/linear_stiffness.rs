@@ -18,7 +18,7 @@ impl Definition for LinearStiffness {
     const NAME: &'static str = "linear-stiffness";
     const ABOUT: &'static str = "A spring or cable that pulls back to a position of rest.";
     const FORMULA: &'static str = "-k (q - rest)";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 1.1";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 1";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

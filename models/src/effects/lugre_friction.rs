@@ -23,8 +23,7 @@ impl Definition for LugreFriction {
         "Dry friction as the bending of bristles, with a force that falls as the joint moves faster.";
     const FORMULA: &'static str = "-c (z + tau z'), z' = (v - |v| z/(1 + rise exp(-(v/vs)^2)))/y";
     const SOURCE: &'static str = "C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control \
-                                  of systems with friction, IEEE Transactions on Automatic Control 40 (1995), section \
-                                  II";
+                                  of systems with friction, IEEE Transactions on Automatic Control 40 (1995)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

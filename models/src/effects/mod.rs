@@ -11,6 +11,7 @@ mod bouc_wen;
 mod cogging;
 mod constant_force;
 mod coulomb_friction;
+mod coupling_play;
 mod cross_talk;
 mod cubic_drag;
 mod cubic_stiffness;
@@ -55,6 +56,8 @@ mod sensor_gap;
 mod sensor_lag;
 mod sensor_quantisation;
 mod sensor_saturation;
+mod spill_over;
+mod spring_play;
 mod stiction;
 mod stribeck_friction;
 mod tabulated_friction;
@@ -214,6 +217,9 @@ pub fn effects() -> Vec<Arc<dyn Effect>> {
         effect::<torque_ripple::TorqueRipple>(),
         effect::<eccentricity::Eccentricity>(),
         effect::<cross_talk::CrossTalk>(),
+        effect::<spill_over::SpillOver>(),
+        effect::<spring_play::SpringPlay>(),
+        effect::<coupling_play::CouplingPlay>(),
         effect::<sensor_gap::SensorGap>(),
         effect::<position_ripple::PositionRipple>(),
         effect::<load_dependent_friction::LoadDependentFriction>(),

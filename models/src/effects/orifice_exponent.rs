@@ -18,7 +18,7 @@ impl Definition for OrificeExponent {
     const NAME: &'static str = "orifice-exponent";
     const ABOUT: &'static str = "An outflow with a power of the level other than the square root.";
     const FORMULA: &'static str = "-k max(x, 0)^n";
-    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
+    const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6 (orifices)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[

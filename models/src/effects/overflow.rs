@@ -19,7 +19,7 @@ impl Definition for Overflow {
     const NAME: &'static str = "overflow";
     const ABOUT: &'static str = "Outflow over an edge above a level.";
     const FORMULA: &'static str = "-k max(x - level, 0)^n";
-    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14 (weirs)";
+    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[

@@ -19,7 +19,7 @@ impl Definition for PeriodicDisturbance {
     const NAME: &'static str = "periodic-disturbance";
     const ABOUT: &'static str = "A force, torque or flow that changes like a sine over time.";
     const FORMULA: &'static str = "a sin(w t + phase)";
-    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 7-1";
+    const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 7";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[

@@ -20,8 +20,8 @@ impl Definition for PositionRipple {
     const ABOUT: &'static str = "A force that repeats along the position with a period of its own: the magnets of a \
                                  linear motor, the pitch of a screw.";
     const FORMULA: &'static str = "a sin(n q + phase)";
-    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
-                                  Collective 2003), chapter 4";
+    const SOURCE: &'static str =
+        "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

@@ -19,7 +19,7 @@ impl Definition for PowerFriction {
     const ABOUT: &'static str =
         "A force against the motion with any power of the speed, between dry friction and steep drag.";
     const FORMULA: &'static str = "-c |v|^p sgn(v)";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 3.3";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

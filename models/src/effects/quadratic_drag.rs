@@ -16,7 +16,7 @@ impl Definition for QuadraticDrag {
     const NAME: &'static str = "quadratic-drag";
     const ABOUT: &'static str = "A force against the motion in proportion to the square of the speed.";
     const FORMULA: &'static str = "-k v |v|";
-    const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965), chapter 1";
+    const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] =

@@ -17,8 +17,7 @@ impl Definition for QuadraticInput {
     const ABOUT: &'static str =
         "The command acts with a share that grows with its square, as the thrust of a fan does.";
     const FORMULA: &'static str = "u + a u |u|";
-    const SOURCE: &'static str =
-        "T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (Wiley 2011), section 12.3";
+    const SOURCE: &'static str = "T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (Wiley 2011)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =

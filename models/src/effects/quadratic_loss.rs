@@ -16,7 +16,7 @@ impl Definition for QuadraticLoss {
     const NAME: &'static str = "quadratic-loss";
     const ABOUT: &'static str = "A loss in proportion to the square of the state.";
     const FORMULA: &'static str = "-k x |x|";
-    const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), section 6.6";
+    const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] =

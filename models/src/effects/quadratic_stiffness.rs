@@ -17,7 +17,7 @@ impl Definition for QuadraticStiffness {
     const ABOUT: &'static str =
         "A spring whose force has a share with the square of the position, so that it is stiffer to one side.";
     const FORMULA: &'static str = "-k q^2";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), section 4.1";
+    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[Strength::signed(

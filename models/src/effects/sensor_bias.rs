@@ -16,7 +16,7 @@ impl Definition for SensorBias {
     const NAME: &'static str = "sensor-bias";
     const ABOUT: &'static str = "A constant is added to what is measured.";
     const FORMULA: &'static str = "y + b";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[Strength::signed("b", "what is added", Dimension::OUTPUT)];

@@ -16,7 +16,7 @@ impl Definition for SensorDrift {
     const NAME: &'static str = "sensor-drift";
     const ABOUT: &'static str = "What is measured drifts with time.";
     const FORMULA: &'static str = "y + r t";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =

@@ -16,7 +16,7 @@ impl Definition for SensorGain {
     const NAME: &'static str = "sensor-gain";
     const ABOUT: &'static str = "What is measured is larger or smaller than it should be.";
     const FORMULA: &'static str = "y (1 + g)";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =

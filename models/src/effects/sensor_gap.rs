@@ -18,7 +18,7 @@ impl Definition for SensorGap {
     const NAME: &'static str = "sensor-gap";
     const ABOUT: &'static str = "Within a gap the sensor shows one value, and the right one outside of it.";
     const FORMULA: &'static str = "centre where |y - centre| < width, else y";
-    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016), chapter 3";
+    const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[

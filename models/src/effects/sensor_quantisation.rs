@@ -16,7 +16,7 @@ impl Definition for SensorQuantisation {
     const NAME: &'static str = "sensor-quantisation";
     const ABOUT: &'static str = "What is measured comes in steps.";
     const FORMULA: &'static str = "step round(y/step)";
-    const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008), chapter 1";
+    const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =

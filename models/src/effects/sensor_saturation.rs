@@ -17,8 +17,7 @@ impl Definition for SensorSaturation {
     const NAME: &'static str = "sensor-saturation";
     const ABOUT: &'static str = "The sensor shows no more than a limit, either way.";
     const FORMULA: &'static str = "clamp(y, -limit, limit)";
-    const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
-                                  Nonlinearities (Wiley 1996), chapter 2";
+    const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[Strength::positive("limit", "limit", Dimension::VALUE)

@@ -22,7 +22,7 @@ impl Definition for StribeckFriction {
     const FORMULA: &'static str = "-c (1 + rise exp(-(v/vs)^2)) sgn(v); at rest whatever holds it, up to c (1 + rise)";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
-                                  30 (1994), section 2.1";
+                                  30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

@@ -24,7 +24,7 @@ impl Definition for TabulatedFriction {
         "-c r(|v|) sgn(v), r linear between 1, r1, r2, r3 at 0, top/4, top/2, top, constant above";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
-                                  30 (1994), section 2.2";
+                                  30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[

@@ -19,8 +19,8 @@ impl Definition for TorqueRipple {
     const NAME: &'static str = "torque-ripple";
     const ABOUT: &'static str = "The command acts stronger and weaker over a turn of a joint.";
     const FORMULA: &'static str = "u (1 + a sin(n q + phase)), q the position of the companion joint";
-    const SOURCE: &'static str = "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' \
-                                  Collective 2003), chapter 9";
+    const SOURCE: &'static str =
+        "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);

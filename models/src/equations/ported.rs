@@ -1,16 +1,14 @@
 //! A model from text, opened at its ports.
 
-use std::cell::RefCell;
-
-use mops_core::{Along, Failure, Instant, Open, Plant, Port, Scalar, Tolerance};
+use mops_core::{Along, Failure, Open, Plant, Port, Scalar, Tolerance};
 
 use super::bank::Large;
 use super::compiled::Compiled;
 use super::running::Running;
 use super::system::System;
 use super::{Equations, Many};
-use crate::kernel::Dynamics;
 use crate::kernel::drive::Drive;
+use crate::kernel::{Holds, Opened};
 
 impl Equations {
     fn opened(&self) -> &Compiled {
@@ -36,10 +34,9 @@ impl Equations {
         let running: Running<'_, S, Vec<S>, Large<S>> = Running::new(model, drives, parameters, self.tolerance);
         let start = self.start(&running, parameters);
         running.check_start(&start)?;
-        Ok(Box::new(Opened {
-            start,
-            at: RefCell::new(Held { running, x: Vec::new(), dx: vec![S::from(0.0); model.states] }),
-        }))
+        let signal =
+            |running: &Running<'_, S, Vec<S>, Many<S>>, signal: usize, t: f64, x: &Vec<S>| running.signal(signal, t, x);
+        Ok(Box::new(Opened::new(running, start, signal)))
     }
 }
 
@@ -57,70 +54,8 @@ impl Open for Equations {
     }
 }
 
-/// A running model whose inputs and forces are set anew at every look.
-struct Opened<'a, S> {
-    start: Vec<S>,
-    at: RefCell<Held<'a, S>>,
-}
-
-struct Held<'a, S> {
-    running: Running<'a, S, Vec<S>, Many<S>>,
-    x: Vec<S>,
-    dx: Vec<S>,
-}
-
-impl<S: Scalar> Held<'_, S> {
-    fn look(&mut self, at: &Instant<'_, S>) {
-        self.running.hold(at.u.iter().chain(at.w).copied());
-        self.x.clear();
-        self.x.extend_from_slice(at.x);
-    }
-}
-
-impl<S: Scalar> Plant<S> for Opened<'_, S> {
-    fn start(&self) -> Vec<S> {
-        self.start.clone()
-    }
-
-    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        let mut held = self.at.borrow_mut();
-        let held = &mut *held;
-        held.look(at);
-        held.running.derivative(at.t, &held.x, &mut held.dx);
-        dx.copy_from_slice(&held.dx);
-    }
-
-    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
-        let mut held = self.at.borrow_mut();
-        held.look(at);
-        held.running.signal(signal, at.t, &held.x)
-    }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        self.at.borrow().running.shows(signal)
-    }
-
-    fn guards(&self) -> usize {
-        self.at.borrow().running.guards()
-    }
-
-    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
-        let mut held = self.at.borrow_mut();
-        held.look(at);
-        held.running.guard(index, at.t, &held.x)
-    }
-
-    fn switch(&mut self, index: usize, at: &Instant<'_, S>, x: &mut [S]) -> &str {
-        let held = self.at.get_mut();
-        held.look(at);
-        let what = held.running.switch(index, at.t, &mut held.x);
-        x.copy_from_slice(&held.x);
-        what
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        let held = self.at.get_mut();
-        held.look(at);
-        held.running.pass_break(at.t, &mut held.x);
+impl<S: Scalar> Holds<S> for Running<'_, S, Vec<S>, Many<S>> {
+    fn hold(&mut self, u: &[S], w: &[S]) {
+        self.hold_drives(u.iter().chain(w).copied());
     }
 }

@@ -92,17 +92,9 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
     }
 
     /// Holds the inputs at these values.
-    pub fn hold(&mut self, values: impl Iterator<Item = S>) {
+    pub fn hold_drives(&mut self, values: impl Iterator<Item = S>) {
         for (drive, value) in self.drives.iter_mut().zip(values) {
             *drive = Drive::held(value);
-        }
-    }
-
-    /// The state that a signal is, if it is one.
-    pub fn shows(&self, signal: usize) -> Option<usize> {
-        match &self.model.signals[signal] {
-            Signal::State(state) => Some(*state),
-            _ => None,
         }
     }
 

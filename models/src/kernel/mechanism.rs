@@ -1,6 +1,6 @@
 //! Mechanisms: joints coupled by a mass matrix, with the friction of their bearings.
 
-use mops_core::{Interface, OperatingPoint, Parameter, Scalar, State, Variable};
+use mops_core::{Interface, OperatingPoint, Parameter, Port, Scalar, State, Unit, Variable};
 
 use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};
@@ -59,10 +59,27 @@ pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<V
     Interface { parameters, inputs, ..interface }
 }
 
+/// Where effects act on joints of these angles, whose speeds are called `d` and the angle; on inputs; and on what shows the
+/// joints.
+pub fn ports(angles: &[&str], inputs: &[&str]) -> Vec<Port> {
+    let torque = || Some(Unit::known("N m"));
+    let of_joint = |angle: &&str| {
+        let (name, speed) = ((*angle).to_owned(), format!("d{angle}"));
+        let process = Port::Process { name: name.clone(), state: speed.clone(), unit: torque() };
+        [Port::Joint { name: name.clone(), position: name, velocity: speed, unit: torque() }, process]
+    };
+    let sensors = |angle: &&str| [(*angle).to_owned(), format!("d{angle}")].map(|output| Port::Sensor { output });
+    let actuator = |input: &&str| Port::Actuator { input: (*input).to_owned() };
+    let joints = angles.iter().flat_map(of_joint);
+    joints.chain(inputs.iter().map(actuator)).chain(angles.iter().flat_map(sensors)).collect()
+}
+
 /// A mechanism with its friction, and how its joints move; the state is angle and speed of each joint in turn, `M = 2 N`.
 pub struct Mechanism<S, B, const N: usize, const M: usize> {
     /// The bodies.
     pub bodies: B,
+    /// Torques on the joints from outside the model, N m.
+    pub outside: [S; N],
     friction: [BearingFriction<S>; N],
     contact: [Contact; N],
     /// Lines of the friction tables over which the joints slide.
@@ -99,7 +116,17 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         let events = std::array::from_fn(|i| joints[i].events);
         // Until it settles at the start of a simulation; a joint without dry friction cannot stick.
         let contact = std::array::from_fn(|i| if friction[i].is_viscous() { Contact::Forward } else { Contact::Stuck });
-        Self { bodies, friction, contact, line: [0; N], drives: [false; N], guards, events, started: false }
+        Self {
+            bodies,
+            outside: [S::from(0.0); N],
+            friction,
+            contact,
+            line: [0; N],
+            drives: [false; N],
+            guards,
+            events,
+            started: false,
+        }
     }
 
     /// How the joints move.
@@ -138,17 +165,24 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         (forward, self.friction[i].table().on(self.line[i], forward))
     }
 
+    #[inline]
+    fn mass_and_force(&self, t: f64, q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]) {
+        let (mass, mut force) = self.bodies.mass_and_force(t, q, w);
+        force.iter_mut().zip(self.outside).for_each(|(force, outside)| *force += outside);
+        (mass, force)
+    }
+
     /// Accelerations and friction torques.
     fn balance(&self, t: f64, x: &[S; M]) -> ([S; N], [S; N]) {
         let (q, w) = Self::split(x);
-        let (mass, force) = self.bodies.mass_and_force(t, &q, &w);
+        let (mass, force) = self.mass_and_force(t, &q, &w);
         let sliding = std::array::from_fn(|i| self.sliding(i, w[i]).1);
         balance(&mass, &force, &sliding, &self.contact)
     }
 
     fn settle(&mut self, t: f64, x: &[S; M], wish: &[Contact; N], released: Option<usize>) {
         let (q, w) = Self::split(x);
-        let (mass, force) = self.bodies.mass_and_force(t, &q, &w);
+        let (mass, force) = self.mass_and_force(t, &q, &w);
         let mass = mass.map(|row| row.map(Scalar::value));
         let (force, speed) = (force.map(Scalar::value), w.map(Scalar::value));
         let sliding = std::array::from_fn(|i| self.friction[i].sliding(w[i].abs()).value());

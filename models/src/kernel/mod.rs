@@ -10,7 +10,9 @@ pub mod friction;
 mod integrate;
 mod local;
 pub mod mechanism;
+mod opened;
 mod record;
+mod written;
 
 use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 
@@ -18,7 +20,9 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 
 pub use integrate::{Step, integrate};
 pub use local::{Equations, local, rates_and_signals, rests};
+pub use opened::{Holds, Opened};
 pub use record::{Recording, Simulate, analyse, record, tangents, tangents_of, wanted};
+pub use written::{Kernel, Written};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
 ///

@@ -76,7 +76,8 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
         let plant = f64::open(open, &job.parameters[..self.own()])?;
-        let mut dynamics = Driven::new(self, plant, &acting, job, job.parameters);
+        let (of, own) = (self.model.interface(), self.model.equation_states().len());
+        let mut dynamics = Driven::new(of, own, plant, self.actors(&acting, own, job.parameters), job);
         let start = dynamics.start(job.parameters)?;
         let mut looks = Looks { times, next: 0, found: Vec::with_capacity(times.len()) };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
@@ -84,7 +85,7 @@ impl WithEffects {
 
         let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
         let plant = Along::open(open, &parameters[..self.own()])?;
-        let mut tangent = Driven::new(self, plant, &acting, job, &parameters);
+        let mut tangent = Driven::new(of, own, plant, self.actors(&acting, own, &parameters), job);
         tangent.start(&parameters)?;
         let ports = self.model.interface().ports.iter();
         let forces = ports.filter(|port| matches!(port, Port::Process { .. })).count();

@@ -64,11 +64,14 @@ impl<S: Opening> Driven<'_, S> {
             self.moved(t, x, u, &mut moved, dx);
             columns.push((0..n).map(|i| dx[joints[stuck[i]].velocity] - free[i]).collect::<Vec<S>>());
         }
-        let held = solve(&columns, &free);
+        // What the plant itself holds needs nothing more, and does not move.
+        let moves: Vec<usize> = (0..n).filter(|&k| columns[k][k].value() != 0.0).collect();
+        let pick = |list: &[S]| moves.iter().map(|&k| list[k]).collect::<Vec<S>>();
+        let held = solve(&moves.iter().map(|&k| pick(&columns[k])).collect::<Vec<_>>(), &pick(&free));
         let mut forces = vec![S::from(0.0); joints.len()];
-        for (k, &j) in stuck.iter().enumerate() {
-            forces[j] = held[k];
-            w[joints[j].w] += held[k];
+        for (&k, &held) in moves.iter().zip(&held) {
+            forces[stuck[k]] = held;
+            w[joints[stuck[k]].w] += held;
         }
         self.moved(t, x, u, w, dx);
         for &j in &stuck {
@@ -163,8 +166,10 @@ impl<S: Opening> Driven<'_, S> {
 /// Solves `columns f = -free` by elimination over the scalar; there are few.
 fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
     let n = free.len();
-    if n == 1 {
-        return vec![-free[0] / columns[0][0]];
+    match n {
+        0 => return Vec::new(),
+        1 => return vec![-free[0] / columns[0][0]],
+        _ => {}
     }
     // Values by LU, tangents by one step of Newton's method, which is exact for them.
     let matrix = DMatrix::from_fn(n, n, |i, j| columns[j][i].value());

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use mops_core::{Acting, At, Failure, Instant, Job, Opening, Plant, Scalar};
+use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -18,6 +18,27 @@ pub(super) struct Actor<S> {
     /// What it remembers.
     pub(super) memory: Vec<S>,
     inertial: bool,
+}
+
+impl WithEffects {
+    /// The effects of these indices; their states stand behind the `own` of the plant.
+    pub(super) fn actors<S: Opening>(&self, acting: &[usize], own: usize, parameters: &[S]) -> Vec<Actor<S>> {
+        let mut states = own;
+        let actor = |&index: &usize| {
+            let (effect, place) = (&self.placements[index].effect, self.places[index]);
+            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
+            let z = (states, effect.states());
+            states += effect.states();
+            Actor {
+                acting: S::act(effect.as_ref(), strengths),
+                place,
+                z,
+                memory: vec![S::from(f64::NAN); effect.memory()],
+                inertial: effect.is_inertial(),
+            }
+        };
+        acting.iter().map(actor).collect()
+    }
 }
 
 /// An input, which an effect may delay.
@@ -59,6 +80,10 @@ pub(super) struct Driven<'a, S> {
     forces: usize,
     breaks: Vec<f64>,
     longest_step: f64,
+    /// For each signal the state that it shows as it is.
+    shows: Vec<Option<usize>>,
+    /// What a clock shows at time 0, s.
+    begins: f64,
     started: bool,
     scratch: RefCell<Scratch<S>>,
     /// For each force the sign with which a positive one acts forward.
@@ -76,28 +101,12 @@ struct Scratch<S> {
 
 impl<'a, S: Opening> Driven<'a, S> {
     pub(super) fn new(
-        model: &WithEffects,
+        of: &Interface,
+        own: usize,
         plant: Box<dyn Plant<S> + 'a>,
-        acting: &[usize],
+        actors: Vec<Actor<S>>,
         job: &Job<'a>,
-        parameters: &[S],
     ) -> Self {
-        let of = model.model.interface();
-        let own = model.model.equation_states().len();
-        let mut states = own;
-        let mut actors = Vec::new();
-        for &index in acting {
-            let (effect, place) = (&model.placements[index].effect, model.places[index]);
-            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
-            actors.push(Actor {
-                acting: S::act(effect.as_ref(), strengths),
-                place,
-                z: (states, effect.states()),
-                memory: vec![S::from(f64::NAN); effect.memory()],
-                inertial: effect.is_inertial(),
-            });
-            states += effect.states();
-        }
         let delay = |input: usize| {
             let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
@@ -106,7 +115,13 @@ impl<'a, S: Opening> Driven<'a, S> {
         let commands = commands.map(|(i, v)| Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i) });
         let commands: Vec<_> = commands.collect();
         let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
-        let mut breaks: Vec<f64> = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite()).collect();
+        let shown = |signal: &mops_core::Variable| {
+            let all = of.states.len() == own;
+            of.states.iter().position(|state| all && state.signal.as_ref() == Some(&signal.name))
+        };
+        let begins = job.case.begins;
+        let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
+        let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
         breaks.sort_by(f64::total_cmp);
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
@@ -119,6 +134,8 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
+            shows: of.signals.iter().map(shown).collect(),
+            begins,
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
@@ -136,8 +153,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
         self.plant.settle(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w });
         self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[0]);
-        for actor in &self.actors {
-            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = actor.place.site else {
+        let sites = self.actors.iter().flat_map(|actor| [Some(actor.place.site), actor.place.companion]);
+        for site in sites.flatten() {
+            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = site else {
                 continue;
             };
             w[k] = S::from(1.0);
@@ -193,7 +211,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             None => (zero, zero),
         };
-        At { t, value, q, v, a: zero, mobility: zero, other, other_speed, u }
+        At { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u }
     }
 
     fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
@@ -229,6 +247,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             let at = self.at(actor, t, x, u, S::from(0.0));
             let z = self.states(actor, x);
             w[k] += actor.acting.value(&at, z) * self.forward[k];
+            if let Some(Site::Joint { w: next, .. } | Site::Process { w: next, .. }) = actor.place.companion {
+                w[next] += actor.acting.onward(&at, z) * self.forward[next];
+            }
             if let Some(direction) = self.contacts.direction(index) {
                 let friction = actor.acting.friction(&at, z).expect("it has friction from the start");
                 let against = friction.sliding[usize::from(direction < 0.0)];
@@ -322,7 +343,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
         };
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
-        if let Some(state) = self.plant.shows(signal) {
+        if let Some(state) = self.shows[signal] {
             if self.actors.iter().filter(here).all(simple) {
                 let see = |value: S, actor: &Actor<S>| {
                     actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
@@ -336,9 +357,10 @@ impl<'a, S: Opening> Driven<'a, S> {
         // Outputs may contain rates: the forces count.
         self.balance(t, x, u, w, dx);
         let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        self.actors.iter().filter(here).fold(value, |value, actor| {
-            actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x))
-        })
+        self.actors
+            .iter()
+            .filter(here)
+            .fold(value, |value, actor| actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x)))
     }
 
     /// Moves what actuators remember to the command of the moment.

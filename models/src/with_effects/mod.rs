@@ -3,18 +3,20 @@
 mod along;
 mod contacts;
 mod dynamics;
+mod own;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Port, Scalar, State,
-    Unit, Variable, WithTangents,
+    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Plant, Port, Scalar,
+    State, Unit, Variable, WithTangents,
 };
 
-use crate::kernel::{self, Recording, record, wanted};
+use crate::kernel::{self, Recording, Tolerance, record, wanted};
 pub use along::Moment;
 use dynamics::Driven;
+pub use own::{Own, OwnModel};
 
 /// A model with effects.
 ///
@@ -48,46 +50,37 @@ impl WithEffects {
     /// The model with these effects.
     ///
     /// # Errors
-    /// A model without ports, a port that it does not have, or one that the effect does not act at.
+    /// A model without ports, a port that it does not have, or one that the effect does not act at; two effects of one name.
+    /// The mistake stands under the name of the effect.
     pub fn new(model: Arc<dyn Model>, placements: Vec<Placement>) -> Result<Self, Mistake> {
+        // To a model with effects more are added.
+        let before = model.augmented().map(|(model, placements)| (Arc::clone(model), placements.to_vec()));
+        let (model, placements) = match before {
+            Some((model, before)) => (model, [before, placements].concat()),
+            None => (model, placements),
+        };
         let of = model.interface();
         if model.ported().is_none() {
             let fact = "this model cannot take effects: it does not open its equations";
-            return Err(Mistake::here(fact).with_help("`mops describe KIND` says which places a model has"));
+            return Err(Mistake::here(fact).with_help("`mops check` tells which places the models of a study have"));
         }
         let mut interface = of.clone();
         let mut places = Vec::new();
         let states = model.equation_states();
         for placement in &placements {
-            let Placement { name, effect, port, companion } = placement;
-            let kind = port.kind(&of.ports);
-            if !kind.is_some_and(|kind| effect.ports().contains(&kind)) {
-                let names = effect.ports().iter().map(|kind| format!("{kind:?}").to_lowercase()).collect::<Vec<_>>();
-                let fact = format!("`{}` does not act at {port}", effect.name());
-                return Err(Mistake::new("place", fact).with_help(format!("it acts at: {}", names.join(", "))));
-            }
-            let site = |port: &Port| Site::of(port, of, &states);
-            let here = site(port).ok_or_else(|| Mistake::new("place", format!("the model has no place {port}")))?;
-            let companion = match (effect.companion(), companion) {
-                (None, None) => None,
-                (Some(kind), Some(companion)) if companion.kind(&of.ports) == Some(kind) => site(companion),
-                (Some(kind), _) => {
-                    let fact =
-                        format!("`{}` needs a second place: {}", effect.name(), format!("{kind:?}").to_lowercase());
-                    return Err(Mistake::new("companion", fact).with_help("such as companion = \"joint:phi\""));
-                }
-                (None, Some(_)) => {
-                    return Err(Mistake::new("companion", format!("`{}` has no second place", effect.name()))
-                        .with_help("remove `companion`"));
-                }
-            };
+            let Placement { name, effect, .. } = placement;
+            let sites = Site::of_both(placement, of, &states).map_err(|mistake| mistake.within(name))?;
             let strengths = interface.parameters.len();
             for strength in effect.strengths() {
                 let variable = Variable {
                     name: format!("{name}.{}", strength.name),
-                    unit: unit(strength.dimension, port, placement.companion.as_ref(), of),
+                    unit: unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
                     about: strength.about.to_owned(),
                 };
+                if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
+                    let fact = format!("the model has a parameter `{}` already", variable.name);
+                    return Err(Mistake::new(name, fact).with_help("give the effect another name"));
+                }
                 let default = strength.neutral;
                 interface.parameters.push(Parameter { variable, default, range: strength.bounds });
             }
@@ -111,7 +104,7 @@ impl WithEffects {
                     });
                 }
             }
-            places.push(Place { site: here, companion, strengths, starts });
+            places.push(Place { site: sites.0, companion: sites.1, strengths, starts });
         }
         Ok(Self { model, placements, places, interface })
     }
@@ -142,7 +135,9 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let mut dynamics = Driven::new(self, plant, &acting, job, parameters);
+        let own = self.model.equation_states().len();
+        let actors = self.actors(&acting, own, parameters);
+        let mut dynamics = Driven::new(self.model.interface(), own, plant, actors, job);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
@@ -151,7 +146,59 @@ impl WithEffects {
     }
 }
 
+/// Simulates a plant without effects.
+fn alone<'a, S: Opening>(
+    interface: &Interface,
+    plant: Box<dyn Plant<S> + 'a>,
+    tolerance: &Tolerance,
+    job: &Job<'a>,
+) -> Result<Recording, Failure> {
+    let own = plant.start().len();
+    let mut dynamics = Driven::new(interface, own, plant, Vec::new(), job);
+    let start = dynamics.start(&[])?;
+    let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
+    record(&mut dynamics, start, job.horizon, tolerance, &wanted(job, &interface.signals), &output)
+}
+
 impl Site {
+    /// Where an effect acts, and its companion.
+    fn of_both(
+        placement: &Placement,
+        interface: &Interface,
+        states: &[Variable],
+    ) -> Result<(Self, Option<Self>), Mistake> {
+        let Placement { effect, port, companion, .. } = placement;
+        let kind = |port: &Port| port.kind(&interface.ports);
+        let site = |key: &str, port: &Port| {
+            Self::of(port, interface, states).ok_or_else(|| Mistake::new(key, format!("the model has no place {port}")))
+        };
+        if !kind(port).is_some_and(|kind| effect.ports().contains(&kind)) {
+            let names: Vec<&str> = effect.ports().iter().map(|kind| kind.name()).collect();
+            let fact = format!("`{}` does not act at {port}", effect.name());
+            return Err(Mistake::new("place", fact).with_help(format!("it acts at: {}", names.join(", "))));
+        }
+        let here = site("place", port)?;
+        let there = match (effect.companion(), companion) {
+            (None, None) => None,
+            (Some(wanted), Some(companion)) if kind(companion) == Some(wanted) => Some(site("companion", companion)?),
+            (Some(wanted), given) => {
+                let (key, what) = if given.is_some() { ("companion", "another") } else { ("place", "a") };
+                let fact = format!("`{}` needs {what} second place: {}", effect.name(), wanted.name());
+                let such = interface.ports.iter().find(|port| kind(port) == Some(wanted));
+                let help = such.map_or_else(
+                    || format!("the model has no {}", wanted.name()),
+                    |port| format!("such as companion = \"{port}\""),
+                );
+                return Err(Mistake::new(key, fact).with_help(help));
+            }
+            (None, Some(_)) => {
+                let fact = format!("`{}` has no second place", effect.name());
+                return Err(Mistake::new("companion", fact).with_help("remove `companion`"));
+            }
+        };
+        Ok((here, there))
+    }
+
     fn of(port: &Port, interface: &Interface, states: &[Variable]) -> Option<Self> {
         let state = |name: &str| states.iter().position(|s| s.name == name);
         let force = |name: &str| {
@@ -217,6 +264,10 @@ impl Model for WithEffects {
         &self.interface
     }
 
+    fn augmented(&self) -> Option<(&Arc<dyn Model>, &[Placement])> {
+        Some((&self.model, &self.placements))
+    }
+
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         if (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
             return self.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response));
@@ -229,7 +280,10 @@ impl Model for WithEffects {
             let first = self.places[i].strengths;
             !self.acts(i, job.parameters) && seeds.iter().all(|seed| seed[first] == 0.0)
         };
-        if seeds.is_empty() || (0..self.placements.len()).all(neutral) {
+        if seeds.is_empty() {
+            return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
+        }
+        if (0..self.placements.len()).all(neutral) {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }

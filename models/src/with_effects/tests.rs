@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
-use mops_core::{Case, Hold, Input, Job, Model, ModelOptions, Placement, Port};
+use mops_core::{
+    Case, Failure, Hold, Input, Instant, Interface, Job, Model, ModelOptions, OperatingPoint, Parameter, Placement,
+    Plant, Port, Scalar, Variable,
+};
 
-use super::WithEffects;
+use super::{Own, OwnModel, WithEffects};
 use crate::effects::effects;
 use crate::equations::EquationsOptions;
+use crate::kernel::mechanism;
 
 fn equations(text: &str) -> Arc<dyn Model> {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
@@ -103,4 +107,186 @@ fn tangents_along_strengths_are_those_of_differences() {
             assert!((exact - difference).abs() < 1e-4 * (1.0 + difference.abs()), "{i} {signal} {exact} {difference}");
         }
     }
+}
+
+fn built_in(kind: &str) -> Arc<dyn Model> {
+    let kinds = crate::kinds();
+    let kind = kinds.iter().find(|known| known.name == kind).expect("it is there");
+    Arc::from(kind.default_model().expect("every option has a default"))
+}
+
+/// Parameters in the order of the model, by name; others at their defaults.
+fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
+    let unknown = given.iter().find(|(name, _)| !model.interface().parameters.iter().any(|p| p.variable.name == *name));
+    assert_eq!(unknown, None);
+    let value =
+        |p: &Parameter| given.iter().find(|(name, _)| *name == p.variable.name).map(|(_, value)| *value).or(p.default);
+    model.interface().parameters.iter().map(|p| value(p).expect(&p.variable.name)).collect()
+}
+
+/// Traces of signals over 6 s with a torque that pushes, holds and lets go, and the events.
+fn pushed(
+    model: &dyn Model,
+    given: &[(&str, f64)],
+    signals: &[&str],
+) -> (Vec<mops_core::Trace>, Vec<mops_core::Event>) {
+    let times: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.1).collect();
+    let push = |&t: &f64| {
+        if t < 2.0 {
+            0.06 * (4.0 * t).sin()
+        } else if t < 4.0 {
+            0.008
+        } else {
+            -0.03
+        }
+    };
+    let values_of = times.iter().map(push).collect();
+    let inputs = vec![("u".to_owned(), Input::Sampled { times, values: values_of, hold: Hold::Zero })];
+    let case = Case { inputs, ..Case::default() };
+    let index = |name: &&str| model.interface().signals.iter().position(|s| s.name == **name).expect("it is there");
+    let wanted: Vec<usize> = signals.iter().map(index).collect();
+    let parameters = values(model, given);
+    let job = Job { case: &case, parameters: &parameters, signals: &wanted, horizon: 6.0 };
+    let analysis = model.analyse(&job).expect("it simulates");
+    let response = analysis.response().expect("it is a simulation").clone();
+    (signals.iter().map(|name| response.trace(name).expect("it was asked for").clone()).collect(), response.events)
+}
+
+/// The largest difference of two models' signals.
+fn apart(a: &[mops_core::Trace], b: &[mops_core::Trace]) -> f64 {
+    let at = |k: i32| f64::from(k) * 0.013;
+    let difference = |k: i32| a.iter().zip(b).map(move |(a, b)| (a.at(at(k)) - b.at(at(k))).abs()).fold(0.0, f64::max);
+    (0..460).map(difference).fold(0.0, f64::max)
+}
+
+const LUMPED: [(&str, f64); 7] =
+    [("a", 0.0044), ("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("theta0", 2.2)];
+
+#[test]
+fn dry_friction_as_an_effect_is_that_of_the_model_sticking_included() {
+    let plain = built_in("furuta");
+    let signals = ["phi", "dphi", "theta", "dtheta"];
+    let (own, events) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012)]].concat(), &signals);
+    assert!(events.iter().any(|event| event.what == "arm sticks"), "{events:?}");
+    let arm = with(&plain, &[("coulomb-friction", "joint:phi")]);
+    let (added, events) = pushed(&arm, &[&LUMPED[..], &[("e0.c", 0.012)]].concat(), &signals);
+    assert!(events.iter().any(|event| event.what == "a joint sticks"), "{events:?}");
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+
+    // The same in both joints, and shared between the model and the effect.
+    let (own, _) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012), ("cp", 0.001)]].concat(), &signals);
+    let both = with(&plain, &[("coulomb-friction", "joint:phi"), ("coulomb-friction", "joint:theta")]);
+    let (added, _) = pushed(&both, &[&LUMPED[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &signals);
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+    let (shared, _) = pushed(&arm, &[&LUMPED[..], &[("ca", 0.008), ("cp", 0.001), ("e0.c", 0.004)]].concat(), &signals);
+    assert!(apart(&own, &shared) < 1e-7, "{}", apart(&own, &shared));
+}
+
+#[test]
+fn a_pendulum_of_equations_takes_friction_as_the_built_in_one_does() {
+    let text = equations(include_str!("../../tests/equations/furuta-free.toml"));
+    let text = with(&text, &[("coulomb-friction", "joint:ph"), ("coulomb-friction", "joint:th")]);
+    let of_text = [("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("th0", 2.2)];
+    let (added, _) = pushed(&text, &[&of_text[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &["ph", "th"]);
+    let plain = built_in("furuta");
+    let (own, _) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012), ("cp", 0.001)]].concat(), &["phi", "theta"]);
+    assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
+}
+
+#[test]
+fn bodies_with_bearings_take_forces_at_every_joint() {
+    // A bearing whose table is flat is Coulomb friction, one that rises by 0.002 in 1 rad/s has viscous friction besides.
+    let bodies = [("J", 4e-3), ("Ja", 0.01), ("m", 0.04), ("l", 0.1), ("r", 0.2), ("theta0", 2.2)];
+    for (kind, signals) in [("furuta-2-joint", &["phi", "theta"][..]), ("furuta-3-joint", &["phi", "theta", "psi"])] {
+        let plain = built_in(kind);
+        let third: &[(&str, f64)] = if signals.len() == 3 { &[("c", 2.0), ("d", 2e-3), ("psi0", 0.02)] } else { &[] };
+        let own = [&bodies[..], third, &[("tau11", 0.012), ("tau21", 0.001), ("tau22", 0.002)]].concat();
+        let mut own = own;
+        own.extend(if third.is_empty() {
+            vec![("tau12", 0.012)]
+        } else {
+            ["tau01", "tau05", "tau12"].map(|n| (n, 0.012)).to_vec()
+        });
+        let (own, _) = pushed(plain.as_ref(), &own, signals);
+        let added = with(
+            &plain,
+            &[
+                ("coulomb-friction", "joint:phi"),
+                ("coulomb-friction", "joint:theta"),
+                ("viscous-friction", "joint:theta"),
+            ],
+        );
+        let strengths = [("e0.c", 0.012), ("e1.c", 0.001), ("e2.d", 0.001)];
+        let (added, _) = pushed(&added, &[&bodies[..], third, &strengths].concat(), signals);
+        assert!(apart(&own, &added) < 1e-7, "{kind}: {}", apart(&own, &added));
+    }
+}
+
+/// `theta'' = u - 4 sin(theta) + w`, written in Rust.
+struct Pendulum(Interface);
+
+impl Pendulum {
+    fn new() -> Self {
+        let joint = mechanism::Joint { angle: "theta", about: "pendulum", start: 0.5, events: [""; 4] };
+        let gravity = vec![Parameter::new("d", "N m", "gravity torque")];
+        let interface = mechanism::interface(&[joint], gravity, vec![Variable::new("u", "N m", "torque")]);
+        Self(Interface { ports: mechanism::ports(&["theta"], &["u"]), ..interface })
+    }
+}
+
+struct At<S>([S; 3]);
+
+impl<S: Scalar> Plant<S> for At<S> {
+    fn start(&self) -> Vec<S> {
+        self.0[1..].to_vec()
+    }
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        dx[0] = at.x[1];
+        dx[1] = at.u[0] - self.0[0] * at.x[0].sin() + at.w[0];
+    }
+}
+
+impl OwnModel for Pendulum {
+    fn interface(&self) -> &Interface {
+        &self.0
+    }
+    fn plant<S: Scalar>(&self, parameters: &[S]) -> Result<impl Plant<S> + use<S>, Failure> {
+        Ok(At(parameters.try_into().expect("one parameter and two start values")))
+    }
+}
+
+#[test]
+fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_text() {
+    let own: Arc<dyn Model> = Arc::new(Own(Pendulum::new()));
+    let text = equations(
+        r#"
+        states = { theta = "rad", dtheta = "rad/s" }
+        inputs = { u = "N m" }
+        parameters = { d = "N m" }
+        constants = { J = "1 kg m2" }
+        start = { theta = "0.5" }
+        der = { theta = "dtheta", dtheta = "J*dtheta' = u - d*sin(theta)" }
+        "#,
+    );
+    let names: Vec<String> = own.interface().ports.iter().map(ToString::to_string).collect();
+    assert_eq!(names, ["joint:theta", "process:theta", "actuator:u", "sensor:theta", "sensor:dtheta"]);
+    let signals = ["theta", "dtheta"];
+    let both = |given: &[(&str, f64)], effects: &[(&str, &str)]| {
+        let [a, b] = [&own, &text].map(|model| pushed(&with(model, effects), given, &signals).0);
+        apart(&a, &b)
+    };
+    assert!(both(&[("d", 4.0)], &[]) < 1e-8);
+    assert!(both(&[("d", 4.0), ("e0.c", 0.05)], &[("coulomb-friction", "joint:theta")]) < 1e-7);
+
+    let at = OperatingPoint { parameters: &[4.0, 0.0, 0.0], states: &[0.3, 0.0], inputs: &[0.0], at_rest: true };
+    let local = own.local(&at).expect("it has equations").expect("it is defined");
+    assert!((local.slopes[(1, 0)] + 4.0 * 0.3_f64.cos()).abs() < 1e-14 && local.slopes[(1, 2)] == 1.0);
+    assert_eq!(own.start_values(at.parameters), Some(vec![0.0, 0.0]));
+
+    let case = Case::default();
+    let job = Job { case: &case, parameters: &[4.0, 0.01, 0.0], signals: &[0], horizon: 2.0 };
+    let (analysis, tangents) = own.tangents(&job, &[vec![0.0, 1.0, 0.0]]).expect("it has them").expect("it simulates");
+    // A small swing is 0.01 cos(2 t), and so is its slope by the start value but for 1e-4 of it.
+    assert!((analysis.trace("theta").at(2.0) - 0.01 * 4.0_f64.cos()).abs() < 1e-6);
+    assert!((tangents[0].trace("theta").at(2.0) - 4.0_f64.cos()).abs() < 1e-3);
 }

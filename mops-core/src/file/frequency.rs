@@ -35,7 +35,7 @@ pub(super) fn read(
     let mut responses = Vec::new();
     for (signal, table) in &section.responses.0 {
         let place = entry(node, "responses", signal);
-        let values = values(&place, table, file)?;
+        let (values, unit) = values(&place, table, file)?;
         if values.len() != frequencies.len() {
             let fact = format!(
                 "the response has {} samples, the frequency `{column}` has {}",
@@ -51,7 +51,7 @@ pub(super) fn read(
                 .key_diagnostic(format!("every sample of `{signal}` is a gap"))
                 .with_help("take other columns"));
         }
-        responses.push(ResponseData { signal: signal.clone(), frequencies, values });
+        responses.push(ResponseData { signal: signal.clone(), frequencies, values, unit });
     }
     let measured = Measured { responses, role: section.role, ..Measured::default() };
     Ok(CaseDraft { name, parameters: section.parameters.0, measured: Some(measured), ..CaseDraft::default() })
@@ -86,18 +86,42 @@ fn frequencies<'t>(
     Ok(column.values.iter().map(|f| f * factor).collect())
 }
 
-/// Real and imaginary parts.
-fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Vec<[f64; 2]>, Diagnostic> {
+/// The unit that the header gives a real or imaginary part or a magnitude; `None` for 1, which is that of the model.
+fn unit_of(place: &Node<'_>, file: &DataFile, name: &str, unit: Option<&str>) -> Result<Option<Unit>, Diagnostic> {
+    let Some(unit) = unit else { return Ok(None) };
+    let parsed = Unit::parse(unit).map_err(|_| {
+        let source = &file.source.name;
+        place
+            .diagnostic(format!("the header of {source} gives `{name}` the unit `{unit}`, which is not known"))
+            .with_help(
+                "a response is in dB, in the unit of the output over that of the input, or has no unit in the header",
+            )
+    })?;
+    Ok((parsed.factor_to(&Unit::one()) != Some(1.0)).then_some(parsed))
+}
+
+type Values = (Vec<[f64; 2]>, Option<Unit>);
+
+/// Real and imaginary parts, and their unit.
+fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Values, Diagnostic> {
     let at = |key: &str| place.child(key).expect("it was just read");
     match (&table.real, &table.imaginary, &table.magnitude, &table.phase) {
         (Some(real), Some(imaginary), None, None) => {
+            let names = (real, imaginary);
             let real = column_at(&at("real"), file, real)?;
             let imaginary = column_at(&at("imaginary"), file, imaginary)?;
-            Ok(real.values.iter().zip(imaginary.values).map(|(&re, &im)| [re, im]).collect())
+            let unit = unit_of(&at("real"), file, names.0, real.unit)?;
+            if unit != unit_of(&at("imaginary"), file, names.1, imaginary.unit)? {
+                return Err(place
+                    .key_diagnostic(format!("`{}` and `{}` are not in the same unit", names.0, names.1))
+                    .with_help("correct the units in the header of the file"));
+            }
+            Ok((real.values.iter().zip(imaginary.values).map(|(&re, &im)| [re, im]).collect(), unit))
         }
         (None, None, Some(magnitude), Some(phase)) => {
             let size = column_at(&at("magnitude"), file, magnitude)?;
             let decibel = table.decibel || size.unit == Some("dB");
+            let in_unit = if decibel { None } else { unit_of(&at("magnitude"), file, magnitude, size.unit)? };
             let angle = column_at(&at("phase"), file, phase)?;
             let unit = match angle.unit {
                 Some(unit) => unit_of_header(&at("phase"), file, phase, unit, "phase")?,
@@ -113,7 +137,7 @@ fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Ve
                 let (sin, cos) = (angle * factor).sin_cos();
                 [size * cos, size * sin]
             };
-            Ok(size.values.iter().zip(angle.values).map(polar).collect())
+            Ok((size.values.iter().zip(angle.values).map(polar).collect(), in_unit))
         }
         _ => Err(place
             .key_diagnostic("a frequency response has a real and an imaginary part, or magnitude and phase".to_owned())
@@ -157,6 +181,21 @@ mod tests {
         for (a, b) in polar[0].values.iter().zip([parts[0].values[0], parts[0].values[2]]) {
             assert!((a[0] - b[0]).abs() < 1e-12 && (a[1] - b[1]).abs() < 1e-12, "{a:?} {b:?}");
         }
+    }
+
+    #[test]
+    fn the_unit_of_a_magnitude_is_kept_unless_it_is_one_or_decibel() {
+        let unit = |header: &str, decibel: bool| {
+            let data = format!("f [Hz],m [{header}],p [deg]\n1,20,90\n").leak();
+            let polar = format!(
+                "frequency = 'f'\nresponses = {{ y = {{ magnitude = 'm', phase = 'p', decibel = {decibel} }} }}"
+            );
+            responses(&polar, data).map(|responses| responses[0].unit.as_ref().map(ToString::to_string))
+        };
+        assert_eq!(unit("mrad/(N m)", false), Ok(Some("mrad/(N m)".to_owned())));
+        assert_eq!((unit("1", false), unit("dB", false), unit("volts", true)), (Ok(None), Ok(None), Ok(None)));
+        let unknown = unit("volts", false).unwrap_err();
+        assert!(unknown.contains("gives `m` the unit `volts`, which is not known"), "{unknown}");
     }
 
     #[test]

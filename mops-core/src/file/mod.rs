@@ -1,6 +1,7 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
 //! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
 
+mod effects;
 mod entries;
 mod experiment;
 mod frequency;
@@ -142,8 +143,9 @@ fn kind<'t, 'k, K>(
                 .with_help(help));
         };
         if found.is_some() {
+            let article = if what.starts_with('e') { "an" } else { "a" };
             return Err(value
-                .key_diagnostic(format!("a {what} is of one kind, but two are named"))
+                .key_diagnostic(format!("{article} {what} is of one kind, but two are named"))
                 .with_help("remove one"));
         }
         found = Some((kind, value));
@@ -158,6 +160,9 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diag
     let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
     let mut model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
+    if let Some(place) = node.child("effects") {
+        model = effects::add(catalogue, model, common.effects, &place)?;
+    }
     if let Some(section) = common.linearise {
         let place = node.child("linearise").expect("it was just read");
         let linearised = Linearised::new(model.into(), &section.into()).map_err(|mistake| place.locate(&mistake))?;

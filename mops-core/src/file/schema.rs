@@ -1,15 +1,19 @@
 //! The JSON schema of study files, made from the types that read them, and the manual pages made from it.
 
+use std::sync::Arc;
+
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
 use super::entries::Entries;
 use super::sections::{
-    CaseOptions, CriterionCommon, ExperimentSection, ModelCommon, SolverCommon, StudySection, TunerSection,
+    CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection,
+    TunerSection,
 };
 use super::tasks::{DiagnosisSection, ExcitationSection, SensitivitySection, SweepSection};
 use crate::catalogue::Catalogue;
+use crate::effect::Effect;
 use crate::unit::Quantity;
 
 /// The schema of a type, complete in itself.
@@ -39,7 +43,7 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
         "required": ["study", "models"],
         "properties": {
             "study": value(schema_of::<StudySection>()),
-            "models": named(one_kind(value(schema_of::<ModelCommon>()), models, true)),
+            "models": named(one_kind(with_effects(value(schema_of::<ModelCommon>()), catalogue), models, true)),
             "tuners": value(schema_of::<Entries<TunerSection>>()),
             "cases": named(case),
             "experiments": value(schema_of::<Entries<ExperimentSection>>()),
@@ -51,6 +55,20 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "diagnosis": value(schema_of::<DiagnosisSection>()),
         },
     })
+}
+
+/// The keys of a model, with the effects of the catalogue by their names.
+fn with_effects(mut common: Value, catalogue: &Catalogue) -> Value {
+    let section = schema_of::<EffectSection>().to_value();
+    let kind = |effect: &Arc<dyn Effect>| {
+        let mut schema = section.clone();
+        schema["description"] = json!(format!("{} `{}`", effect.about(), effect.formula()));
+        (effect.name().to_owned(), schema)
+    };
+    let kinds = catalogue.effects.iter().map(kind).collect();
+    let one = one_kind(json!({ "type": "object", "additionalProperties": false }), kinds, true);
+    common["properties"]["effects"]["additionalProperties"] = one;
+    common
 }
 
 /// A table with any names, each of the given schema.

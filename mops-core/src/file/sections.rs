@@ -38,10 +38,25 @@ pub(super) struct ModelCommon {
     /// Makes it the linearisation of the model, to be read by criteria of linear systems:
     /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`; `{}` for all of them.
     pub linearise: Option<LineariseSection>,
+    /// Physical effects at places of the model, by names of your choice: `arm = { coulomb-friction = { place = "joint:phi" } }`
+    /// adds the parameter `arm.c`. `mops list` names the effects, `mops check` the places.
+    #[serde(default)]
+    pub effects: Entries<Entries<EffectSection>>,
 }
 
 impl ModelCommon {
-    pub const KEYS: &[&str] = &["parameters", "linearise"];
+    pub const KEYS: &[&str] = &["parameters", "linearise", "effects"];
+}
+
+/// Where an effect acts. Its strengths are parameters of the model, which tuners, cases and `parameters` set; where nothing
+/// does they are neutral, and the effect is not there.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct EffectSection {
+    /// The place: `joint:NAME`, `process:NAME`, `actuator:NAME` or `sensor:NAME`.
+    pub place: String,
+    /// A second place, for effects that need one: what an actuator's ripple turns with, the joint that drag comes from.
+    pub companion: Option<String>,
 }
 
 /// Where a model is linearised, and between what.
@@ -243,7 +258,8 @@ pub(super) struct ResponseTable {
     pub real: Option<String>,
     /// Column of the imaginary part.
     pub imaginary: Option<String>,
-    /// Column of the magnitude: in dB where its header or `decibel` says so, else a factor.
+    /// Column of the magnitude: in dB where its header or `decibel` says so, else in the unit of its header, else in that of
+    /// the output over that of the input.
     pub magnitude: Option<String>,
     /// Column of the phase: in the unit of its header, else deg.
     pub phase: Option<String>,

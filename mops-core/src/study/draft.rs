@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use super::{Objective, Study, Task, TasksDraft};
+use crate::catalogue::Catalogue;
 use crate::criterion::{CriterionSpec, Usage};
 use crate::experiment::{Input, ResponseData, Role};
 use crate::model::Model;
+use crate::placement::EffectDraft;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 
@@ -103,6 +105,16 @@ pub struct ModelDraft {
     pub model: Box<dyn Model>,
     /// Values that hold unless a tuner or a case sets the parameter.
     pub parameters: Vec<(String, Quantity)>,
+}
+
+impl ModelDraft {
+    /// Adds effects at places of the model; each strength is a parameter `name.strength`.
+    ///
+    /// # Errors
+    /// As [`Catalogue::with_effects`].
+    pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectDraft]) -> Result<Self, Mistake> {
+        Ok(Self { model: catalogue.with_effects(self.model.into(), effects)?, ..self })
+    }
 }
 
 impl<M: Model + 'static> From<M> for ModelDraft {

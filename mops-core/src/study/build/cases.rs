@@ -4,7 +4,7 @@ use super::Models;
 use super::values::{check_horizon, converted, in_range, signal_names};
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::experiment::{Channel, Experiment, Input};
+use crate::experiment::{Channel, Experiment, Input, ResponseData};
 use crate::model::{AnalysisKind, Parameter, Variable};
 use crate::study::draft::{CaseDraft, ChannelDraft, Measured, Mistake};
 use crate::unit::Unit;
@@ -31,7 +31,7 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
     let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
     let horizon = draft.horizon.or(end);
     check_horizon(draft.horizon)?;
-    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon })
+    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon, begins: 0.0 })
 }
 
 fn build_input(
@@ -113,10 +113,34 @@ fn build_experiment(
             return Err(Mistake::new(&response.signal, fact).with_help(help).within("responses"));
         }
     }
+    let responses = draft.responses.iter().map(|response| build_response(response, models));
+    let responses = responses.collect::<Result<_, _>>()?;
     if channels.is_empty() && draft.responses.is_empty() {
         return Err(Mistake::new("channels", "the experiment measures nothing").with_help("name at least one channel"));
     }
-    Ok(Experiment { channels, responses: draft.responses.clone(), role: draft.role })
+    Ok(Experiment { channels, responses, role: draft.role })
+}
+
+/// A measured frequency response in the units of the model that it fits.
+fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData, Mistake> {
+    let Some(unit) = &draft.unit else { return Ok(draft.clone()) };
+    let linear = models.iter().map(|(_, model)| model.interface()).filter(|i| i.analysis == AnalysisKind::Linear);
+    let ratios = linear.flat_map(|interface| {
+        let outputs = interface.signals.iter().filter(|v| v.name == draft.signal);
+        outputs.flat_map(|output| {
+            interface.inputs.iter().map(|input| Unit::product(&[(&output.unit, 1), (&input.unit, -1)]))
+        })
+    });
+    let ratios: Vec<Unit> = ratios.collect();
+    let factor = ratios.iter().find_map(|ratio| unit.factor_to(ratio)).ok_or_else(|| {
+        let wanted = ratios.first().map_or_else(String::new, ToString::to_string);
+        let fact = format!("the response is measured in `{unit}`, that of the model is in `{wanted}`");
+        Mistake::new(&draft.signal, fact)
+            .with_help("take other columns, or correct the unit in the header of the file")
+            .within("responses")
+    })?;
+    let values = draft.values.iter().map(|value| value.map(|part| part * factor)).collect();
+    Ok(ResponseData { values, unit: None, ..draft.clone() })
 }
 
 fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {

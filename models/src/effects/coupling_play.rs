@@ -1,0 +1,53 @@
+//! A coupling with play.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{NOT_NEGATIVE, clamp};
+
+/// `coupling-play`.
+pub struct CouplingPlay;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    gap: S,
+}
+
+impl Definition for CouplingPlay {
+    const NAME: &'static str = "coupling-play";
+    const ABOUT: &'static str =
+        "Play in a declared elastic coupling of two joints: within the gap it transmits nothing.";
+    const FORMULA: &'static str = "k clamp(q - q2, -gap/2, gap/2), and its reaction at the companion joint, which a \
+                                   coupling -k (q - q2) with play lacks";
+    const SOURCE: &'static str =
+        "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
+    const CLASS: EffectClass = EffectClass::Elastic;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "stiffness of the coupling that has play", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::shape(
+            "gap",
+            "width of the gap",
+            Dimension::POSITION,
+            NOT_NEGATIVE,
+            Trials::Scaled(&[0.002, 0.01, 0.05, 0.2]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], gap: s[1] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        let half = self.gap * 0.5;
+        self.k * clamp(at.q - at.other, -half, half)
+    }
+
+    fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
+        -self.value(at, z)
+    }
+}

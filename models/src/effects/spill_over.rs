@@ -1,0 +1,66 @@
+//! Spilling above a level, into another store.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::Definition;
+use super::terms::{ANY, NOT_NEGATIVE, power};
+
+/// `spill-over`.
+pub struct SpillOver;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    k: S,
+    level: S,
+    n: S,
+    share: S,
+}
+
+impl Definition for SpillOver {
+    const NAME: &'static str = "spill-over";
+    const ABOUT: &'static str = "Outflow over an edge above a level, of which a share runs into another store.";
+    const FORMULA: &'static str = "-k max(x - level, 0)^n, and share times as much into the companion process";
+    const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
+    const CLASS: EffectClass = EffectClass::Flow;
+    const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const COMPANION: Option<PortKind> = Some(PortKind::Process);
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT),
+        Strength::shape(
+            "level",
+            "level of the edge",
+            Dimension::POSITION,
+            ANY,
+            Trials::Within(&[0.5, 0.7, 0.85, 0.95]),
+        ),
+        Strength::shape(
+            "n",
+            "power: 1 a plain edge, 3/2 a rectangular weir",
+            Dimension::ONE,
+            [1.0, 2.5],
+            Trials::Plain(&[1.0, 1.5]),
+        )
+        .kept(),
+        Strength::shape(
+            "share",
+            "share that runs into the companion, times the ratio of the areas where the equations are of levels",
+            Dimension::ONE,
+            NOT_NEGATIVE,
+            Trials::Plain(&[0.3, 1.0]),
+        ),
+    ];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { k: s[0], level: s[1], n: s[2], share: s[3] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.k * power(at.q - self.level, self.n)
+    }
+
+    fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
+        -self.share * self.value(at, z)
+    }
+}

@@ -1,0 +1,279 @@
+//! What holds for every effect of the catalogue.
+
+mod simulated;
+
+use std::collections::BTreeSet;
+
+use mops_core::{Acting, Along, At, Effect, EffectClass, PortKind, Scalar, Strength, Trials};
+
+use super::effects;
+
+/// Numbers between 0 and 1 that fill it evenly: the fractional parts of multiples of the golden section.
+struct Even(f64);
+
+impl Even {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = (self.0 + 0.618_033_988_749_895).fract();
+        low + (high - low) * self.0
+    }
+}
+
+/// Everything that an effect can see, and its states: one number each.
+const SEEN: [&str; 11] =
+    ["value", "q", "v", "a", "mobility", "other", "other speed", "z1", "z2", "memory 1", "memory 2"];
+
+/// A place at which every quantity has some value.
+fn place(even: &mut Even) -> [f64; 11] {
+    SEEN.map(|name| match name {
+        "mobility" => even.between(0.5, 2.0),
+        "z1" | "z2" => even.between(-0.9, 0.9),
+        // The second is a time that has passed.
+        "memory 2" => even.between(-2.0, 0.2),
+        _ => even.between(-2.0, 2.0),
+    })
+}
+
+fn at<S: Scalar>(seen: &[S; 11]) -> At<'static, S> {
+    let [value, q, v, a, mobility, other, other_speed, ..] = *seen;
+    At { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[] }
+}
+
+/// What the effect gives at a place: its value, its delay, the four numbers of dry friction, the rates of its states.
+fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn Acting<S>, seen: &[S; 11]) -> Vec<S> {
+    let at = at(seen);
+    let z = &seen[7..7 + effect.states()];
+    let mut all = vec![if effect.memory() > 0 {
+        acting.recall(&at, &seen[9..9 + effect.memory()])
+    } else {
+        acting.value(&at, z)
+    }];
+    all.extend(acting.delay());
+    if let Some(friction) = acting.friction(&at, z) {
+        all.extend(friction.sliding);
+        all.extend(friction.limit);
+    }
+    let mut dz = vec![S::from(0.0); effect.states()];
+    acting.rates(&at, z, &mut dz);
+    all.extend(dz);
+    all
+}
+
+/// Some value within the bounds.
+fn strength(of: &Strength, even: &mut Even) -> f64 {
+    match of.bounds {
+        [low, high] if high.is_finite() => low + (high.min(low + 3.0) - low) * even.between(0.2, 0.8),
+        [low, _] if low.is_finite() => even.between(0.3, 1.5),
+        _ => even.between(-1.5, 1.5),
+    }
+}
+
+fn strengths(effect: &dyn Effect, even: &mut Even) -> Vec<f64> {
+    effect.strengths().iter().map(|of| strength(of, even)).collect()
+}
+
+fn at_joints(effect: &dyn Effect) -> bool {
+    effect.ports().contains(&PortKind::Joint)
+}
+
+#[test]
+fn names_are_unique_and_in_kebab_case() {
+    let names: BTreeSet<&str> = effects().iter().map(|e| e.name()).collect();
+    assert_eq!(names.len(), effects().len());
+    let plain = |name: &&str| name.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !name.starts_with('-');
+    assert!(names.iter().all(plain), "{names:?}");
+}
+
+#[test]
+fn every_effect_says_what_it_is_and_where_it_comes_from() {
+    for effect in effects() {
+        for text in [effect.about(), effect.formula(), effect.source()] {
+            assert!(!text.is_empty() && !text.contains("  "), "{}: {text}", effect.name());
+        }
+        assert!(effect.about().ends_with('.'), "{}", effect.name());
+        assert!(effect.source().contains(['1', '2']), "{} has a year in its source", effect.name());
+        assert!(!effect.ports().is_empty(), "{}", effect.name());
+    }
+}
+
+#[test]
+fn the_first_strength_alone_is_neutral_somewhere_and_within_its_bounds() {
+    for effect in effects() {
+        let [first, shapes @ ..] = effect.strengths() else { panic!("{} has no strength", effect.name()) };
+        let neutral = first.neutral.expect("the first strength makes it vanish");
+        assert!(first.bounds[0] <= neutral && neutral <= first.bounds[1], "{}", effect.name());
+        assert!(shapes.iter().all(|shape| shape.neutral.is_none()), "{}", effect.name());
+        let names: BTreeSet<&str> = effect.strengths().iter().map(|s| s.name).collect();
+        assert_eq!(names.len(), effect.strengths().len(), "{}", effect.name());
+    }
+}
+
+#[test]
+fn first_trials_are_few_and_allowed() {
+    for effect in effects() {
+        let mut count = 1;
+        for of in effect.strengths() {
+            match of.trials {
+                Trials::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
+                Trials::Plain(values) => {
+                    assert!(values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]), "{}", effect.name());
+                    count *= values.len();
+                }
+                Trials::Scaled(values) | Trials::Within(values) => count *= values.len(),
+                Trials::Frequencies | Trials::Moments(_) => {}
+            }
+        }
+        assert!(count <= 44, "{}: {count}", effect.name());
+    }
+}
+
+#[test]
+fn a_neutral_effect_changes_no_bit() {
+    let mut even = Even(0.1);
+    for effect in effects() {
+        for _ in 0..50 {
+            let mut s = strengths(effect.as_ref(), &mut even);
+            s[0] = effect.strengths()[0].neutral.expect("the first strength makes it vanish");
+            let (acting, seen) = (effect.act(&s), place(&mut even));
+            let all = answer(effect.as_ref(), acting.as_ref(), &seen);
+            if effect.ports().iter().any(|port| matches!(port, PortKind::Actuator | PortKind::Sensor)) {
+                assert_eq!(all[0].to_bits(), seen[0].to_bits(), "{} {s:?} {seen:?}", effect.name());
+            } else {
+                assert_eq!(all[0], 0.0, "{} {s:?} {seen:?}", effect.name());
+            }
+            assert_eq!(acting.delay().unwrap_or(0.0), 0.0, "{}", effect.name());
+            if let Some(friction) = acting.friction(&at(&seen), &[]) {
+                assert_eq!((friction.sliding, friction.limit), ([0.0; 2], [0.0; 2]), "{}", effect.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn what_takes_energy_gives_none() {
+    let mut even = Even(0.2);
+    let dissipative = |e: &&_| -> bool {
+        let e: &std::sync::Arc<dyn Effect> = e;
+        e.class() == EffectClass::Dissipative && at_joints(e.as_ref()) && e.states() == 0
+    };
+    for effect in effects().iter().filter(dissipative) {
+        for _ in 0..200 {
+            let acting = effect.act(&strengths(effect.as_ref(), &mut even));
+            let at = at(&place(&mut even));
+            assert!(acting.value(&at, &[]) * at.v <= 0.0, "{} {at:?}", effect.name());
+            let Some(friction) = acting.friction(&at, &[]) else { continue };
+            assert!(friction.sliding.iter().all(|force| *force >= 0.0), "{} {at:?}", effect.name());
+            let rest = acting.friction(&At { v: 0.0, ..at }, &[]).expect("it has friction");
+            let holds = rest.limit.iter().zip(rest.sliding).all(|(limit, sliding)| *limit >= sliding);
+            assert!(holds, "{} {at:?}", effect.name());
+        }
+    }
+}
+
+#[test]
+fn friction_with_states_takes_energy_over_a_cycle() {
+    for effect in effects().iter().filter(|e| e.class() == EffectClass::Dissipative && e.states() > 0) {
+        let acting = effect.act(&strengths(effect.as_ref(), &mut Even(0.3)));
+        let (mut z, mut dz) = ([0.0], [0.0]);
+        let (mut work, h) = (0.0, 1e-4);
+        // q = sin t over three turns, of which the last counts.
+        for step in 0..(6.0 * std::f64::consts::PI / h) as usize {
+            let t = step as f64 * h;
+            let mut seen = [0.0; 11];
+            (seen[1], seen[2]) = (t.sin(), t.cos());
+            let at = at(&seen);
+            acting.rates(&at, &z, &mut dz);
+            if t > 4.0 * std::f64::consts::PI {
+                work += acting.value(&at, &z) * at.v * h;
+            }
+            z[0] += h * dz[0];
+        }
+        assert!(work < -0.1, "{} {work}", effect.name());
+    }
+}
+
+#[test]
+fn odd_effects_are_odd() {
+    let odd = ["viscous-friction", "quadratic-drag", "cubic-drag", "power-friction", "quadratic-loss"];
+    let passing = ["input-saturation", "input-dead-zone", "quadratic-input", "sensor-saturation"];
+    let mut even = Even(0.4);
+    for effect in effects().iter().filter(|e| odd.contains(&e.name()) || passing.contains(&e.name())) {
+        let acting = effect.act(&strengths(effect.as_ref(), &mut even));
+        for _ in 0..50 {
+            let seen = place(&mut even);
+            let there = acting.value(&at(&seen), &[]);
+            assert_eq!(there, -acting.value(&at(&seen.map(|x| -x)), &[]), "{}", effect.name());
+        }
+    }
+}
+
+/// Value of what an effect answers, with one of its strengths or of what it sees moved.
+fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 11], index: usize, by: f64) -> Vec<f64> {
+    let (mut s, mut seen) = (s.to_vec(), *seen);
+    if index < s.len() {
+        s[index] += by;
+    } else {
+        seen[index - s.len()] += by;
+    }
+    answer(effect, effect.act(&s).as_ref(), &seen)
+}
+
+#[test]
+fn tangents_are_those_of_differences() {
+    let mut even = Even(0.5);
+    for effect in effects() {
+        for _ in 0..30 {
+            let (s, seen) = (strengths(effect.as_ref(), &mut even), place(&mut even));
+            for index in 0..s.len() + seen.len() - 1 {
+                let lifted = |i: usize, x: f64| if i == index { Along::variable(x, 0) } else { Along::from(x) };
+                let with: Vec<Along> = s.iter().enumerate().map(|(i, &x)| lifted(i, x)).collect();
+                let sees: [Along; 11] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
+                let exact = answer(effect.as_ref(), effect.act_along(&with).as_ref(), &sees);
+                let plain = answer(effect.as_ref(), effect.act(&s).as_ref(), &seen);
+                let [up, down] = [1e-6, -1e-6].map(|by| moved(effect.as_ref(), &s, &seen, index, by));
+                for (k, exact) in exact.iter().enumerate() {
+                    assert_eq!(exact.value, plain[k], "{}: tangents change no value", effect.name());
+                    let difference = (up[k] - down[k]) / 2e-6;
+                    let agree = (exact.tangent[0] - difference).abs() < 1e-5 * (1.0 + difference.abs());
+                    // A quantisation has steps; what rounds the value has no slope but that of the step.
+                    let stairs = effect.name().ends_with("quantisation") && index == s.len();
+                    assert!(agree || stairs, "{} {index} {} {difference} {s:?}", effect.name(), exact.tangent[0]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_catalogue_has_the_effects_that_engineers_name() {
+    let named = "coulomb-friction stribeck-friction stiction viscous-friction quadratic-drag cubic-stiffness \
+                 linear-stiffness sensor-dead-zone sensor-bias sensor-gain sensor-delay sensor-lag sensor-drift input-delay \
+                 input-saturation input-dead-zone input-gain input-bias actuator-lag backlash cogging constant-force \
+                 flexible-mode overflow leak periodic-disturbance radiation-loss mass-loss bouc-wen wind-gust";
+    let all = effects();
+    for name in named.split_whitespace() {
+        assert!(all.iter().any(|e| e.name() == name), "{name}");
+    }
+}
+
+#[test]
+fn play_keeps_its_output_until_the_gap_is_crossed() {
+    let play = effects().into_iter().find(|e| e.name() == "backlash").expect("it is there").act(&[0.4]);
+    let mut memory = [f64::NAN];
+    let follow = |value: f64, memory: &mut [f64; 1]| {
+        let at = at(&[value, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        play.remember(&at, memory);
+        play.recall(&at, memory)
+    };
+    let output = [0.0, 0.1, 0.3, 1.0, 0.7, 0.5, -1.0].map(|u| follow(u, &mut memory));
+    for (found, expected) in output.into_iter().zip([0.0, 0.0, 0.1, 0.8, 0.8, 0.7, -0.8]) {
+        assert!((found - expected).abs() < 1e-15, "{output:?}");
+    }
+}
+
+#[test]
+fn a_gust_pushes_as_long_and_as_hard_as_its_integral_says() {
+    let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").act(&[3.0, 0.7, 0.45]);
+    let h = 1e-4;
+    let push: f64 = (0..20_000).map(|k| gust.value(&At { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
+    assert!((push - 3.0 * 0.45 / 2.0).abs() < 1e-9, "{push}");
+}

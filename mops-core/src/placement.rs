@@ -1,0 +1,133 @@
+//! Effects at places of a model, as they are written down.
+
+use std::sync::Arc;
+
+use crate::catalogue::Catalogue;
+use crate::diagnostic::suggestion;
+use crate::effect::Placement;
+use crate::model::{Interface, Model};
+use crate::port::Port;
+use crate::study::Mistake;
+
+/// Makes a model with effects of a model that has ports: the seam to the simulation, which core does not know.
+pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, Mistake>;
+
+/// An effect at a place of a model, as it is written down: nothing checked yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EffectDraft {
+    /// Its name in the model: its strengths are the parameters `name.strength`.
+    pub name: String,
+    /// The kind of effect.
+    pub kind: String,
+    /// The place that it acts at, as `joint:phi`.
+    pub place: String,
+    /// A second place, where the effect needs one.
+    pub companion: Option<String>,
+}
+
+impl EffectDraft {
+    /// An effect of a kind at a place.
+    pub fn new(name: impl Into<String>, kind: impl Into<String>, place: impl Into<String>) -> Self {
+        Self { name: name.into(), kind: kind.into(), place: place.into(), companion: None }
+    }
+
+    /// With a second place.
+    #[must_use]
+    pub fn with_companion(self, place: impl Into<String>) -> Self {
+        Self { companion: Some(place.into()), ..self }
+    }
+
+    /// The effect and the ports that are meant.
+    fn placement(&self, catalogue: &Catalogue, model: &Interface) -> Result<Placement, Mistake> {
+        if self.name.is_empty() || !self.name.chars().all(|c| c.is_alphanumeric() || "_-".contains(c)) {
+            return Err(Mistake::here(format!("an effect cannot be called `{}`", self.name))
+                .with_help("a name is made of letters, digits, `_` and `-`"));
+        }
+        let effect = catalogue.effects.iter().find(|effect| effect.name() == self.kind).ok_or_else(|| {
+            Mistake::new(&self.kind, format!("there is no effect `{}`", self.kind))
+                .with_help(suggestion(&self.kind, catalogue.effects.iter().map(|effect| effect.name())))
+        })?;
+        let port = |key: &str, text: &str| Port::named(text, model).map_err(|m| m.within(key).within(&self.kind));
+        Ok(Placement {
+            name: self.name.clone(),
+            effect: Arc::clone(effect),
+            port: port("place", &self.place)?,
+            companion: self.companion.as_deref().map(|text| port("companion", text)).transpose()?,
+        })
+    }
+}
+
+impl Catalogue {
+    /// A model with effects at its places; each strength is a parameter `name.strength`, neutral unless it is set.
+    ///
+    /// # Errors
+    /// A kind of effect, or a place, that there is not; an effect that does not act there. The mistake stands under the
+    /// effect's name.
+    pub fn with_effects(&self, model: Arc<dyn Model>, effects: &[EffectDraft]) -> Result<Box<dyn Model>, Mistake> {
+        let placement = |draft: &EffectDraft| {
+            draft.placement(self, model.interface()).map_err(|mistake| mistake.within(&draft.name))
+        };
+        let placements = effects.iter().map(placement).collect::<Result<Vec<_>, _>>()?;
+        let augment = self.augment.ok_or_else(|| Mistake::here("this catalogue has no simulation of effects"))?;
+        augment(model, placements)
+    }
+}
+
+impl Interface {
+    /// The ports that effects act at: a joint stands for the equation of its speed.
+    pub fn places(&self) -> impl Iterator<Item = &Port> {
+        self.ports.iter().filter(|port| port.kind(&self.ports).is_some())
+    }
+}
+
+impl Port {
+    /// The port of a model that is called so, as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn named(text: &str, model: &Interface) -> Result<Self, Mistake> {
+        if let Some(port) = model.ports.iter().find(|port| port.to_string() == text) {
+            return Ok(port.clone());
+        }
+        if model.ports.is_empty() {
+            return Err(Mistake::here("this model has no places for effects: it does not open its equations")
+                .with_help("remove `effects`, or take a model of its equations (`mops describe equations`)"));
+        }
+        let names: Vec<String> = model.places().map(ToString::to_string).collect();
+        // A kind alone, or a name alone, is not far from what was meant.
+        let meant: Vec<&str> = names.iter().filter(|n| n.split(':').any(|part| part == text)).map(|n| &**n).collect();
+        let help = if meant.is_empty() {
+            suggestion(text, names.iter().map(String::as_str))
+        } else {
+            format!("such as {}", meant.join(", "))
+        };
+        Err(Mistake::here(format!("the model has no place `{text}`")).with_help(help))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_found_by_its_kind_and_name() {
+        let port = Port::Actuator { input: "u".into() };
+        let model =
+            Interface { ports: vec![port.clone(), Port::Sensor { output: "theta".into() }], ..Interface::default() };
+        assert_eq!(Port::named("actuator:u", &model), Ok(port));
+        let wrong = |text: &str| Port::named(text, &model).unwrap_err().help.unwrap();
+        assert_eq!(wrong("sensor:thta"), "did you mean `sensor:theta`?");
+        assert_eq!(wrong("theta"), "such as sensor:theta");
+        assert!(Port::named("joint:phi", &Interface::default()).unwrap_err().message.contains("no places"));
+    }
+
+    #[test]
+    fn an_effect_that_is_not_there_is_a_mistake_at_its_kind() {
+        let catalogue = Catalogue::default();
+        let draft = EffectDraft::new("arm", "coulomb-friction", "joint:phi");
+        let mistake = draft.placement(&catalogue, &Interface::default()).err().unwrap();
+        assert_eq!(mistake.path, ["coulomb-friction"]);
+        let draft = EffectDraft::new("arm.c", "coulomb-friction", "joint:phi");
+        assert!(draft.placement(&catalogue, &Interface::default()).err().unwrap().path.is_empty());
+    }
+}

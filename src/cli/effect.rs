@@ -1,0 +1,94 @@
+//! The manual page of an effect that a model may lack.
+
+use mops_core::{Dimension, Effect, PortKind, Scope, Strength};
+
+use super::tables::number;
+
+/// Its definition, formula, places, strengths and source.
+pub(super) fn page(effect: &dyn Effect) -> String {
+    let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
+    let mut page = format!("{}\n\n{}\n\n    {}\n\n", effect.name(), effect.about(), effect.formula());
+    page += &format!("Class: {}. Acts at: {}", effect.class().name(), places.join("; "));
+    if let Some(companion) = effect.companion() {
+        page += &format!(". Companion: {}", place(companion));
+    }
+    page += ".\n";
+    if effect.states() > 0 {
+        let free = if effect.free_start() { ", with a free start value in each experiment" } else { "" };
+        page += &format!("States of its own: {}{free}.\n", effect.states());
+    }
+    page += "\nStrengths:\n";
+    for strength in effect.strengths() {
+        page += &format!("  {} ({})\n      {}\n", strength.name, facts(strength), strength.about);
+    }
+    page + &format!("\nSource: {}.\n", effect.source())
+}
+
+fn place(kind: PortKind) -> &'static str {
+    match kind {
+        PortKind::Joint => "a joint (q its position, v its speed; added to its equation, positive forward)",
+        PortKind::Process => "a state of first order (x; added to its equation)",
+        PortKind::Actuator => "an actuator (u the command)",
+        PortKind::Sensor => "a sensor (y the signal)",
+    }
+}
+
+fn facts(strength: &Strength) -> String {
+    let mut facts = vec![unit(strength.dimension)];
+    match strength.bounds {
+        [low, high] if low.is_finite() && high.is_finite() => {
+            facts.push(format!("from {} to {}", number(low), number(high)));
+        }
+        [low, _] if low.is_finite() => facts.push(format!("at least {}", number(low))),
+        _ => facts.push("of either sign".into()),
+    }
+    match strength.neutral {
+        Some(neutral) if neutral.is_finite() => facts.push(format!("neutral at {}", number(neutral))),
+        Some(_) => facts.push("neutral at infinity".into()),
+        None => {}
+    }
+    if strength.fixed {
+        facts.push("kept as tried".into());
+    }
+    if strength.scope == Scope::Experiment {
+        facts.push("one for each experiment".into());
+    }
+    facts.join(", ")
+}
+
+/// The powers of the units at the place, in words.
+fn unit(dimension: Dimension) -> String {
+    let powers = [
+        ("what it adds", dimension.output),
+        ("position", dimension.position),
+        ("speed", dimension.speed),
+        ("value", dimension.value),
+        ("s", dimension.time),
+    ];
+    let text = |sign: i8| {
+        let of = powers.iter().filter(|(_, power)| power.signum() == sign);
+        let of =
+            of.map(|(name, power)| if power.abs() > 1 { format!("{name}^{}", power.abs()) } else { (*name).into() });
+        of.collect::<Vec<String>>()
+    };
+    let (above, below) = (text(1), text(-1));
+    let above = if above.is_empty() { "1".into() } else { above.join(" ") };
+    if below.is_empty() {
+        return format!("unit {above}");
+    }
+    format!("unit {above}/{}", if below.len() > 1 { format!("({})", below.join(" ")) } else { below[0].clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit;
+    use mops_core::Dimension;
+
+    #[test]
+    fn a_unit_is_spelt_out_as_powers() {
+        assert_eq!(unit(Dimension::ONE), "unit 1");
+        assert_eq!(unit(Dimension::OUTPUT.over(Dimension::SPEED.power(2))), "unit what it adds/speed^2");
+        let mass = Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME);
+        assert_eq!(unit(mass), "unit what it adds s/speed");
+    }
+}

@@ -1,0 +1,151 @@
+//! Effects that a study declares at places of its model.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use mops::{EffectDraft, ModelDraft};
+use serde_json::Value;
+
+/// A torsion pendulum, `w'' = -4 th`, with what the tests put under `effects` and `tuners`.
+const STUDY: &str = r#"[study]
+name = "torsion"
+task = "calibration"
+
+[models.rig.equations]
+states     = { th = "rad", w = "rad/s" }
+inputs     = { u = "N m" }
+parameters = { J = "kg m2", k = "N m/rad" }
+start      = { th = "0.5 rad" }
+der        = { th = "w", w = "J*w' = u - k*th" }
+
+[models.rig]
+parameters.J = 1.0
+EFFECTS
+
+[tuners]
+TUNERS
+
+[experiments.swing]
+file     = "swing.csv"
+channels = { th = { column = "th", noise = 1e-3 } }
+
+[criteria]
+th = { fit = { signal = "th" }, demand = 1e-3 }
+"#;
+
+/// The torsion pendulum with dry friction `c` (N m): half swings about `c/k` and `-c/k` in turn (den Hartog, Mechanical
+/// Vibrations, section 8.6).
+fn swing(c: f64, t: f64) -> f64 {
+    let (angular, offset) = (2.0, c / 4.0);
+    let half = (t * angular / PI).floor();
+    let sign = if half % 2.0 == 0.0 { 1.0 } else { -1.0 };
+    let amplitude = 0.5 - (2.0 * half + 1.0) * offset;
+    sign * offset + amplitude * (angular * t).cos()
+}
+
+/// Runs the study on a recording with dry friction 0.15 N m; the result.
+fn run(effects: &str, tuners: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let mut csv = String::from("t[s],th[rad]\n");
+    for k in 0..=100 {
+        let t = 0.05 * f64::from(k);
+        writeln!(csv, "{t},{:.12}", swing(0.15, t)).unwrap();
+    }
+    std::fs::write(folder.path().join("swing.csv"), csv).unwrap();
+    let study = STUDY.replace("EFFECTS", effects).replace("TUNERS", tuners);
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    result(folder.path())
+}
+
+fn result(folder: &Path) -> Value {
+    let mut command = cargo_bin_cmd!("mops");
+    let output = command.args(["run", "study.toml", "--json", "--out", "out"]).current_dir(folder).output().unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+#[test]
+fn the_strength_of_a_declared_effect_is_a_tuner_like_any_other() {
+    let found = run(
+        "effects.bearing = { coulomb-friction = { place = \"joint:th\" } }",
+        "k = { start = 3.7, min = 1.0, max = 9.0 }\n\"bearing.c\" = { start = 0.05, min = 0.0, max = 1.0 }",
+    );
+    let value = |name: &str| {
+        let tuners = found["tuners"].as_array().unwrap();
+        tuners.iter().find(|tuner| tuner["name"] == name).unwrap()["value"].as_f64().unwrap()
+    };
+    assert!((value("bearing.c") - 0.15).abs() < 1e-6, "{found:#}");
+    assert!((value("k") - 4.0).abs() < 1e-5, "{found:#}");
+}
+
+#[test]
+fn a_strength_that_nothing_sets_changes_no_bit() {
+    let tuners = "k = { start = 3.7, min = 1.0, max = 9.0 }";
+    let without = run("", tuners);
+    let with = run(
+        "effects = { bearing = { coulomb-friction = { place = \"joint:th\" } }, air = { viscous-friction = { place = \"joint:th\" } } }",
+        tuners,
+    );
+    assert_eq!(with["tuners"], without["tuners"]);
+    assert_eq!(with["criteria"], without["criteria"]);
+    assert_eq!(with["evaluations"], without["evaluations"]);
+}
+
+#[test]
+fn parameters_and_cases_set_strengths_too() {
+    let effects =
+        "effects.bearing = { coulomb-friction = { place = \"joint:th\" } }\nparameters.\"bearing.c\" = \"0.15 N m\"";
+    let found = run(effects, "k = { start = 4.0, min = 1.0, max = 9.0 }");
+    assert!(found["worst_scaled"].as_f64().unwrap() < 1e-3, "{found:#}");
+}
+
+#[test]
+fn in_rust_a_model_takes_its_effects_by_the_same_names() {
+    let catalogue = mops::catalogue();
+    let plain = || {
+        let kind = catalogue.models.iter().find(|kind| kind.name == "furuta").unwrap();
+        ModelDraft { model: kind.default_model().unwrap(), parameters: Vec::new() }
+    };
+    let friction = |name: &str, place: &str| [EffectDraft::new(name, "coulomb-friction", place)];
+    let draft = plain().with_effects(&catalogue, &friction("arm", "joint:phi")).unwrap();
+    // More effects go beside those that are there.
+    let draft = draft.with_effects(&catalogue, &friction("swing", "joint:theta")).unwrap();
+    let names: Vec<&str> = draft.model.interface().parameters.iter().map(|p| &*p.variable.name).collect();
+    assert_eq!(names[names.len() - 2..], ["arm.c", "swing.c"]);
+    let taken = draft.with_effects(&catalogue, &friction("arm", "joint:theta")).err().unwrap();
+    assert_eq!(taken.to_string(), "arm: the model has a parameter `arm.c` already; give the effect another name");
+}
+
+#[test]
+fn check_and_describe_tell_the_places() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("swing.csv"), "t[s],th[rad]\n0,0.5\n1,0.4\n2,0.3\n3,0.2\n").unwrap();
+    let study = STUDY.replace("EFFECTS", "").replace("TUNERS", "k = { start = 4.0, min = 1.0, max = 9.0 }");
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let print = |arguments: &[&str]| {
+        let output = cargo_bin_cmd!("mops").args(arguments).current_dir(folder.path()).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let checked = print(&["check", "study.toml"]);
+    for place in ["joint:th", "actuator:u", "sensor:th", "sensor:w"] {
+        assert!(checked.contains(place), "{place} in\n{checked}");
+    }
+    assert!(!checked.contains("process:"), "the joint stands for the equation of its speed\n{checked}");
+    assert!(print(&["describe", "furuta"]).contains("joint:theta"));
+    assert!(!print(&["describe", "pid-loop"]).contains("laces for effects"));
+}
+
+#[test]
+fn editors_are_told_the_effects_and_what_each_needs() {
+    let output = cargo_bin_cmd!("mops").arg("schema").output().unwrap();
+    let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let named = &schema["properties"]["models"]["additionalProperties"]["properties"]["effects"];
+    assert!(named["description"].as_str().unwrap().contains("arm.c"), "{named:#}");
+    let effect = &named["additionalProperties"];
+    assert_eq!(effect["additionalProperties"], false);
+    let friction = &effect["properties"]["coulomb-friction"];
+    assert_eq!(friction["required"], serde_json::json!(["place"]), "{friction:#}");
+    assert!(friction["description"].as_str().unwrap().contains("sgn(v)"), "{friction:#}");
+}
