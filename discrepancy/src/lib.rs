@@ -2,6 +2,7 @@
 //! physical effect that the model lacks, and reports the error before and after.
 
 mod base;
+mod brute_force;
 mod candidate;
 pub mod dev;
 mod diagnosis;
@@ -15,6 +16,7 @@ mod trajectory;
 mod variant;
 mod windows;
 
+pub use brute_force::{BruteForce, brute_force};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
     StrengthValue, Unexplained, Verdict,

@@ -51,6 +51,8 @@ pub(crate) struct Judgement {
 pub(crate) struct Row {
     /// Name of the case.
     pub name: String,
+    /// Its plant.
+    pub plant: String,
     /// What is missing.
     pub kind: Kind,
     /// Size asked for; 0 where nothing is missing.
@@ -75,7 +77,10 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     };
     let true_one = |named: &Named| truth.effects.iter().any(|effect| is(effect, named));
     let alike = |named: &Named| {
-        truth.equivalents.iter().any(|(class, place)| names(class, &[]).contains(&named.0.as_str()) && *place == named.1)
+        truth
+            .equivalents
+            .iter()
+            .any(|(class, place)| names(class, &[]).contains(&named.0.as_str()) && *place == named.1)
     };
     let same = |named: &Named| true_one(named) || alike(named);
     let placed = |place: &String| {
@@ -125,6 +130,7 @@ impl Row {
         });
         Self {
             name: trial.name.clone(),
+            plant: trial.plant.clone(),
             kind,
             size,
             truth: truth.collect(),
@@ -136,8 +142,8 @@ impl Row {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::diagnosis::made_up;
     use super::*;
+    use crate::diagnosis::made_up;
 
     fn truth(class: &str, place: &str, verdict: &'static str) -> Truth {
         let name = place.split_once(':').unwrap().1;

@@ -54,6 +54,12 @@ impl Plan {
         all.into_iter().map(|(_, wish)| wish).collect()
     }
 
+    /// The size asked for that is nearest to one reached.
+    pub fn nearest(&self, reached: f64) -> f64 {
+        let off = |size: &f64| (size / reached).ln().abs();
+        self.sizes.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(reached)
+    }
+
     /// The case; `None` where no plant reaches the size with a sensible strength. Effects, then sizes take turns, so that
     /// every effect comes at every size; the plant is drawn among those that the effect fits.
     pub fn make(&self, wish: &Wish) -> Option<Trial> {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use mops_core::file::{self, Files};
 use mops_core::{Catalogue, Study, Watch};
-use mops_discrepancy::{Diagnosis, Verdict};
+use mops_discrepancy::{Diagnosis, Verdict, brute_force};
 
 use crate::solve::{Options, solve};
 
@@ -66,6 +66,30 @@ impl Tools<'_> {
     }
 }
 
+impl Tools<'_> {
+    /// What brute force says, on one thread: the model refitted with every effect in turn, and the least BIC believed.
+    ///
+    /// # Errors
+    /// The study cannot be treated: why.
+    pub fn brute_force(&self, study: &Study) -> Result<Answer, String> {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
+        let begun = Instant::now();
+        let done = threads.install(|| brute_force(study, &self.catalogue.effects)).map_err(|why| why.message)?;
+        let found: Vec<(Named, f64)> = done.best.into_iter().map(|best| (best, f64::NAN)).collect();
+        Ok(Answer {
+            verdict: if found.is_empty() { Verdict::None } else { Verdict::Effect },
+            probability: f64::NAN,
+            p_value: f64::NAN,
+            set: found.iter().map(|(named, _)| named.clone()).collect(),
+            found,
+            strengths: Vec::new(),
+            unexplained_at: None,
+            simulations: done.simulations,
+            seconds: begun.elapsed().as_secs_f64(),
+        })
+    }
+}
+
 /// An effect or what counts as one, and its place.
 pub(crate) type Named = (String, String);
 
@@ -102,9 +126,10 @@ impl Answer {
         let mut set: Vec<Named> = itself.chain(rivals).collect();
         set.sort();
         set.dedup();
-        let strengths = found.iter().enumerate().flat_map(|(i, f)| {
-            f.strengths.iter().map(move |s| (i, s.name.clone(), s.value, s.interval95))
-        });
+        let strengths = found
+            .iter()
+            .enumerate()
+            .flat_map(|(i, f)| f.strengths.iter().map(move |s| (i, s.name.clone(), s.value, s.interval95)));
         Self {
             verdict: diagnosis.verdict,
             probability: diagnosis.probability,
