@@ -648,6 +648,11 @@ fn effects_that_are_not_there_or_do_not_fit() {
                 "a companion that is not wanted",
                 "arm = { coulomb-friction = { place = \"joint:phi\", companion = \"actuator:u\" } }",
             ),
+            effect("a companion that is missing", "ripple = { torque-ripple = { place = \"actuator:u\" } }"),
+            effect(
+                "a companion of the wrong sort",
+                "ripple = { torque-ripple = { place = \"actuator:u\", companion = \"sensor:theta\" } }",
+            ),
             effect(
                 "a misspelt companion",
                 "arm = { coulomb-friction = { place = \"joint:phi\", companion = \"actuator:v\" } }",

@@ -1,1 +1,270 @@
 //! The whole way from a study to a diagnosis.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use mops_core::{Effect, Mistake, Study, Watch};
+
+use crate::base;
+use crate::diagnosis::{Diagnosis, Found, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict};
+use crate::fit::dot;
+use crate::repaired::Calibrated;
+use crate::screen::Screened;
+use crate::search::{Limits, Round, Search, Trial};
+use crate::subject::Subject;
+use crate::weigh::{Dispersion, by_chance, criterion, probabilities};
+
+/// What a diagnosis is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Largest number of effects that are added.
+    pub max_effects: usize,
+    /// Probability of adding an effect where nothing is missing.
+    pub level: f64,
+    /// Seed of the random starts.
+    pub seed: u64,
+}
+
+/// Residuals, in units of the noise, above which the best model does not explain the data.
+const UNEXPLAINED: f64 = 1.1;
+
+/// Finds what the model of a calibration study lacks.
+///
+/// # Errors
+/// A study that cannot be diagnosed, a model that cannot be fitted at all, or an interruption.
+pub fn diagnose(
+    study: &Study,
+    effects: &[Arc<dyn Effect>],
+    options: &Options,
+    watch: &dyn Watch,
+) -> Result<Diagnosis, Mistake> {
+    let subject = Subject::new(study)?;
+    let simulations = AtomicUsize::new(0);
+    let limits = Limits { refits: 10, finalists: 5 };
+    let search = Search { subject: &subject, effects, limits, simulations: &simulations };
+    let lost = || {
+        Mistake::new("tuners", "the declared model cannot be simulated from anywhere near the start values")
+            .with_help("`mops simulate` shows what happens there; start nearer to what is plausible")
+    };
+    watch.stage("fit of the declared model", 0.02);
+    let calibrated = base::fit(&subject, options.seed, &simulations).ok_or_else(lost)?;
+    let declared = search.declared(&calibrated).ok_or_else(lost)?;
+    let before = search.calibrate(&declared, &[]).ok_or_else(lost)?;
+
+    let mut rounds: Vec<Round<'_>> = Vec::new();
+    let mut p_value = 1.0;
+    let base = search.over_or_in_windows(&declared);
+    let mut current = base;
+    #[allow(clippy::cast_precision_loss)]
+    for k in 0..options.max_effects {
+        if watch.wants_stop() {
+            return Err(Mistake::here("the diagnosis was interrupted"));
+        }
+        watch.stage(&format!("search for effect {}", k + 1), 0.1 + 0.7 * k as f64 / options.max_effects as f64);
+        let Some(round) = search.round(&current) else { break };
+        let Some(best) = round.trials.first() else { break };
+        let dispersion = Dispersion::of(best);
+        let worth = (best.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
+        let gain = criterion(&current, &dispersion) - criterion(best, &dispersion) + worth;
+        let chance = by_chance(gain, round.directions);
+        if k == 0 {
+            p_value = chance;
+        }
+        if chance > options.level {
+            rounds.push(round);
+            break;
+        }
+        current = search.over_or_in_windows(best);
+        rounds.push(round);
+    }
+    watch.stage("what can be left out", 0.82);
+    let mut last = search.over_whole(&current).unwrap_or(current);
+    if last.added.len() > 1 {
+        last = search.pruned(last, options.level);
+    }
+    let (last, held) = search.without_declared(last);
+    watch.stage("the repaired model", 0.9);
+    let after = search.calibrate(&last, &held).ok_or_else(lost)?;
+
+    let verdict = match (last.added.is_empty(), last.fitted.normalised() > UNEXPLAINED) {
+        (_, true) => Verdict::Unexplained,
+        (true, false) => Verdict::None,
+        (false, false) => Verdict::Effect,
+    };
+    let ranking = ranking(&rounds, &last);
+    let dispersion = Dispersion::of(&last);
+    let found: Vec<Found> =
+        (0..last.added.len()).map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion)).collect();
+    let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
+    let removed = held.iter().map(|k| crate::diagnosis::Removed { term: names(k), place: String::new() }).collect();
+    let probability = match verdict {
+        Verdict::None => 1.0 - 0.5 * (1.0 - p_value).max(0.0),
+        Verdict::Effect => found.iter().map(|f| f.probability).product(),
+        Verdict::Unexplained => 0.9,
+    };
+    Ok(Diagnosis {
+        verdict,
+        probability,
+        p_value,
+        found,
+        removed,
+        ranked: ranking,
+        unexplained: None,
+        next_experiment: None,
+        before: before.errors(&subject.measurements),
+        after: after.errors(&subject.measurements),
+        parameters: moves(&subject, &before, &after),
+        noticeable: Vec::new(),
+        evidence: Vec::new(),
+        predictions: predictions(&subject, &before, &after),
+        notes: subject.notes.clone(),
+        starts: starts(&subject, &after),
+        simulations: simulations.load(Ordering::Relaxed),
+    })
+}
+
+/// Candidates by probability: those found first, then what else was fitted in each round.
+fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
+    let mut ranked: Vec<Ranked> = Vec::new();
+    let mut seen: Vec<(String, String)> = Vec::new();
+    for round in rounds {
+        let Some(best) = round.trials.first() else { continue };
+        let dispersion = Dispersion::of(best);
+        let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+        let probabilities = probabilities(&criteria);
+        for (trial, probability) in round.trials.iter().zip(probabilities) {
+            let Some(a) = trial.added.last() else { continue };
+            let key = (a.candidate.effect.name().to_owned(), a.candidate.place());
+            if seen.contains(&key) {
+                continue;
+            }
+            seen.push(key.clone());
+            let screened = round.screened.iter().find(|s| s.added.candidate.is(&a.candidate));
+            let parameters = &mops_core::Model::interface(trial.variant.model.as_ref()).parameters;
+            let first = trial.variant.first[trial.added.len() - 1];
+            let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
+                name: s.name.to_owned(),
+                value: a.strengths[k],
+                unit: parameters[first + k].variable.unit.to_string(),
+                std_error: None,
+                interval95: None,
+            });
+            ranked.push(Ranked {
+                effect: key.0,
+                place: key.1,
+                class: a.candidate.effect.class().name().to_owned(),
+                probability,
+                bic_gain: (round.before - criterion(trial, &Dispersion::WHITE)) / dispersion.weight(),
+                strengths: strengths.collect(),
+                absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
+                normalised: [Some(trial.fitted.normalised()), None],
+                fitted: true,
+            });
+        }
+    }
+    let is_found =
+        |r: &Ranked| last.added.iter().any(|a| a.candidate.effect.name() == r.effect && a.candidate.place() == r.place);
+    let (mut found, mut others): (Vec<Ranked>, Vec<Ranked>) = ranked.into_iter().partition(is_found);
+    others.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    found.append(&mut others);
+    found
+}
+
+/// What is said of an effect that was added.
+fn found(
+    index: usize,
+    last: &Trial<'_>,
+    after: &Calibrated,
+    rounds: &[Round<'_>],
+    ranking: &[Ranked],
+    dispersion: &Dispersion,
+) -> Found {
+    let a = &last.added[index];
+    let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
+    let own = ranking.iter().find(|r| r.effect == effect.name() && r.place == place);
+    let round = rounds
+        .iter()
+        .find(|round| round.trials.first().and_then(|t| t.added.last()).is_some_and(|b| b.candidate.is(&a.candidate)));
+    let mut rivals = Vec::new();
+    if let Some(round) = round {
+        let best = &round.trials[0];
+        let of = Dispersion::of(best);
+        let least = criterion(best, &of);
+        let screened = |t: &Trial<'_>| -> Option<&Screened> {
+            let last = t.added.last()?;
+            round.screened.iter().find(|s| s.added.candidate.is(&last.candidate))
+        };
+        let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &of)).collect();
+        let shares = probabilities(&criteria);
+        for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
+            let Some(b) = trial.added.last().filter(|_| value - least < 6.0) else { continue };
+            let likeness = match (screened(best), screened(trial)) {
+                (Some(x), Some(y)) => dot(&x.direction, &y.direction).abs(),
+                _ => f64::NAN,
+            };
+            rivals.push(Rival {
+                effect: b.candidate.effect.name().to_owned(),
+                place: b.candidate.place(),
+                probability,
+                bic_behind: value - least,
+                likeness,
+            });
+        }
+    }
+    let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
+    Found {
+        effect: effect.name().to_owned(),
+        name: format!("{tail}-{}", effect.name()),
+        companion: a.candidate.companion.as_ref().map(ToString::to_string),
+        class: effect.class().name().to_owned(),
+        formula: effect.formula().to_owned(),
+        strengths: after.strengths(index, &last.variant, dispersion.repeats),
+        probability: own.map_or(1.0, |r| r.probability),
+        bic_gain: own.map_or(f64::NAN, |r| r.bic_gain),
+        indistinguishable: rivals,
+        place,
+    }
+}
+
+fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<ParameterMove> {
+    let one = |(k, &tuner): (usize, &usize)| {
+        let tuner = &subject.study.tuners[tuner];
+        let variance = after.covariance[(k, k)] * after.square;
+        ParameterMove {
+            name: tuner.name.clone(),
+            unit: tuner.unit.to_string(),
+            before: before.tuners[k],
+            after: after.tuners[k],
+            std_error: (variance > 0.0).then(|| variance.sqrt()),
+        }
+    };
+    subject.globals.iter().enumerate().map(one).collect()
+}
+
+fn predictions(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<Prediction> {
+    let mut all = Vec::new();
+    for (index, m) in subject.measurements.iter().enumerate() {
+        for (k, s) in m.series.iter().enumerate() {
+            all.push(Prediction {
+                experiment: m.name.clone(),
+                role: m.role,
+                signal: s.name.clone(),
+                unit: s.unit.clone(),
+                noise: s.noise,
+                times: s.times.clone(),
+                measured: s.values.clone(),
+                before: before.experiments[index].predicted[k].clone(),
+                after: after.experiments[index].predicted[k].clone(),
+            });
+        }
+    }
+    all
+}
+
+/// Start values of every experiment in the repaired model.
+fn starts(subject: &Subject, after: &Calibrated) -> Vec<(String, String, f64)> {
+    let of = |(m, said): (&crate::subject::Measurement, &crate::repaired::Prognosis)| {
+        said.starts.iter().map(|(name, value)| (m.name.clone(), name.clone(), *value)).collect::<Vec<_>>()
+    };
+    subject.measurements.iter().zip(&after.experiments).flat_map(of).collect()
+}

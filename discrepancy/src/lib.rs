@@ -4,19 +4,31 @@
 mod base;
 mod brute_force;
 mod candidate;
-pub mod dev;
+mod diagnose;
 mod diagnosis;
+mod family;
 mod fit;
+mod gaussian;
+mod held_out;
 mod hygiene;
+mod locate;
+#[cfg(test)]
+mod locate_tests;
+mod repaired;
 mod screen;
 mod search;
 mod subject;
+#[cfg(test)]
+mod testing;
 mod trace_of;
 mod trajectory;
+mod unknown;
 mod variant;
+mod weigh;
 mod windows;
 
 pub use brute_force::{BruteForce, brute_force};
+pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
     StrengthValue, Unexplained, Verdict,

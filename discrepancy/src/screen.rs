@@ -36,6 +36,8 @@ pub struct Screened {
     pub absorbed: f64,
     /// Its trace with that taken out, of length 1.
     pub direction: Vec<f64>,
+    /// Directions that were looked in, as many as independent ones: neighbouring shapes look alike.
+    pub directions: f64,
 }
 
 impl Scene {
@@ -126,6 +128,9 @@ fn best_of(
         (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
     let mut best: Option<Screened> = None;
     let combinations = sizes.combinations(effect);
+    let resolved = effect.strengths().iter().filter(|s| s.trials == mops_core::Trials::Frequencies);
+    let resolved = resolved.map(|s| sizes.values(s.dimension, s.trials, s.bounds).len()).max().unwrap_or(0);
+    let periods = u32::try_from(resolved).unwrap_or(u32::MAX);
     // Combinations that differ in what each experiment has of its own come together.
     let shared = |c: &[f64]| -> Vec<u64> {
         c.iter().enumerate().filter(|(k, _)| !own.contains(k)).map(|(_, v)| v.to_bits()).collect()
@@ -191,6 +196,7 @@ fn best_of(
             gain,
             absorbed: 1.0 - rest / size,
             direction: left.iter().map(|l| l / length).collect(),
+            directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),
         });
     }
     best

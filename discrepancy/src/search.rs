@@ -3,15 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Role, Trials};
+use mops_core::{Effect, Model, Role, Trials};
 use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Piece, Point};
+use crate::fit::{Fit, Fitted, Piece};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
+use crate::weigh::{Dispersion, by_chance};
 use crate::windows::cut;
 
 /// Residuals, in units of the noise, up to which a linear view of them is trusted.
@@ -34,14 +35,10 @@ pub struct Trial<'a> {
 /// What the search is asked.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Largest number of effects added.
-    pub effects: usize,
     /// Candidates that are fitted in each round.
     pub refits: usize,
     /// Those of them that are fitted to the end.
     pub finalists: usize,
-    /// Fall of the sum of squares, per the dispersion of the residuals, below which nothing is added.
-    pub least_gain: f64,
 }
 
 /// The search in a subject.
@@ -62,6 +59,10 @@ pub struct Round<'a> {
     pub screened: Vec<Screened>,
     /// As fitted, best first.
     pub trials: Vec<Trial<'a>>,
+    /// Directions that were looked in, as many as independent ones.
+    pub directions: f64,
+    /// The criterion of what the round began with.
+    pub before: f64,
 }
 
 impl<'a> Search<'a> {
@@ -195,7 +196,19 @@ impl<'a> Search<'a> {
             .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
             .collect();
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        Some(Round { screened, trials })
+        if from.windows > 1 {
+            // Windows forgive what whole records do not: these decide, where they can be fitted.
+            let wholes: Vec<Trial<'a>> = trials[..trials.len().min(self.limits.finalists)]
+                .par_iter()
+                .filter_map(|t| self.over_whole(t))
+                .collect();
+            if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
+                trials = wholes;
+                trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            }
+        }
+        let directions = screened.iter().map(|s| s.directions).sum();
+        Some(Round { screened, trials, directions, before: from.score() })
     }
 
     /// Fits a variant from where another ended.
@@ -205,6 +218,103 @@ impl<'a> Search<'a> {
         let locals = own.iter().zip(&from.fitted.point.locals);
         let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
         self.trial(added, tuners, locals, from.windows, iterations)
+    }
+
+    /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
+    /// linear view, else in windows.
+    pub fn over_or_in_windows(&self, trial: &Trial<'a>) -> Trial<'a> {
+        let whole = if trial.windows == 1 { self.again(trial) } else { self.over_whole(trial) };
+        match whole {
+            Some(whole) if whole.fitted.normalised() < NEARLY_LINEAR => whole,
+            Some(whole) => {
+                let windows = self.in_windows(whole);
+                // A trial that was in windows stays there: a fit of whole records that failed has nothing to tell.
+                if trial.windows > 1 && trial.fitted.normalised() <= windows.fitted.normalised() {
+                    return self.again(trial).unwrap_or(windows);
+                }
+                windows
+            }
+            None => self.again(trial).expect("it was fitted before"),
+        }
+    }
+
+    /// The same trial once more.
+    pub fn again(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        let variant = Variant::new(self.subject, &trial.added);
+        let fit = Fit {
+            subject: self.subject,
+            model: Arc::clone(&variant.model) as Arc<dyn Model>,
+            globals: trial.fit.globals.clone(),
+            pieces: trial.fit.pieces.clone(),
+            simulations: self.simulations,
+        };
+        let (added, fitted) = (trial.added.clone(), trial.fitted.clone());
+        Some(Trial { added, windows: trial.windows, fit, variant, fitted })
+    }
+
+    /// The trial without effects that the others make superfluous.
+    pub fn pruned(&self, mut trial: Trial<'a>, level: f64) -> Trial<'a> {
+        let mut index = 0;
+        while trial.added.len() > 1 && index < trial.added.len() {
+            let mut added = trial.added.clone();
+            added.remove(index);
+            let tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            let own = self.pieces(trial.windows);
+            let locals = own.iter().zip(&trial.fitted.point.locals);
+            let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
+            let Some(without) = self.trial(&added, &tuners, locals, trial.windows, 40) else {
+                index += 1;
+                continue;
+            };
+            let dispersion = Dispersion::of(&trial);
+            let loss = (without.fitted.chi2 - trial.fitted.chi2) / dispersion.weight();
+            if by_chance(loss, 30.0) > level {
+                trial = without;
+                index = 0;
+            } else {
+                index += 1;
+            }
+        }
+        trial
+    }
+
+    /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that
+    /// may be zero, and are no larger than their uncertainty.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn without_declared(&self, trial: Trial<'a>) -> (Trial<'a>, Vec<usize>) {
+        let mut held = Vec::new();
+        let mut trial = trial;
+        if trial.added.is_empty() {
+            return (trial, held);
+        }
+        for k in 0..self.subject.globals.len() {
+            let global = &trial.fit.globals[k];
+            let value = trial.fitted.point.globals[k];
+            let error = trial.fitted.covariance[(k, k)].max(0.0).sqrt();
+            let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
+            let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
+            if !(zero && (at_least || value.abs() < 2.0 * error)) {
+                continue;
+            }
+            let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            tuners[k] = global.bounds[0].max(0.0);
+            let own = self.pieces(trial.windows);
+            let locals: Vec<Vec<f64>> = own
+                .iter()
+                .zip(&trial.fitted.point.locals)
+                .map(|(piece, values)| values[..piece.locals.len()].to_vec())
+                .collect();
+            let all: Vec<usize> = held.iter().copied().chain([k]).collect();
+            let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
+            let Some(fitted) = made.0.solve(made.1, 40) else { continue };
+            let weight = Dispersion::of(&trial).weight();
+            if (fitted.chi2 - trial.fitted.chi2) / weight < (fitted.count as f64).ln() {
+                held = all;
+                let (added, windows) = (trial.added.clone(), trial.windows);
+                trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
+            }
+        }
+        (trial, held)
     }
 
     fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
@@ -275,9 +385,4 @@ impl<'a> Trial<'a> {
         let names = self.added.iter().map(|a| format!("{} at {}", a.candidate.effect.name(), a.candidate.place()));
         names.collect::<Vec<_>>().join(" + ")
     }
-}
-
-/// The point of a fit with other globals.
-pub fn with_globals(point: &Point, globals: Vec<f64>) -> Point {
-    Point { globals, locals: point.locals.clone() }
 }

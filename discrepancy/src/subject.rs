@@ -93,9 +93,11 @@ impl Subject {
             .with_help("keep one model in the study"));
         }
         let (name, model) = &study.models[index];
-        if model.ported().is_none() {
+        if model.ported().is_none() && model.augmented().is_none() {
             let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
-            return Err(Mistake::new("models", fact).with_help("`mops describe KIND` says which places a model has"));
+            return Err(
+                Mistake::new("models", fact).with_help("`mops check` tells which places the models of a study have")
+            );
         }
         let globals: Vec<usize> = (0..study.tuners.len())
             .filter(|&i| study.tuners[i].case.is_none() && study.tuners[i].active && study.tuners[i].tie.is_none())

@@ -121,16 +121,18 @@ impl Trajectory {
     /// What a signal at the nodes, in a column (inputs, then forces), adds to the residuals.
     pub fn response(&self, column: usize, signal: &[f64]) -> Vec<f64> {
         let n = self.moments.first().map_or(0, |m| m.x.len());
-        let mut states = Vec::with_capacity(self.knots.len());
-        let mut x = DVector::zeros(n);
-        states.push(x.clone());
-        let mut next = DVector::zeros(n);
-        for (interval, f) in self.intervals.iter().zip(signal.chunks(2)) {
-            next.gemv(1.0, &interval.transition, &x, 0.0);
-            next.axpy(f[0], &interval.gains[0].column(column), 1.0);
-            next.axpy(f[1], &interval.gains[1].column(column), 1.0);
-            std::mem::swap(&mut x, &mut next);
-            states.push(x.clone());
+        // The states at the knots, one after the other; at rest until the signal begins.
+        let mut states = vec![0.0; n * self.knots.len()];
+        let begin = signal.iter().position(|&f| f != 0.0).unwrap_or(signal.len()) / 2;
+        for (k, interval) in self.intervals.iter().enumerate().skip(begin) {
+            let (done, next) = states.split_at_mut(n * (k + 1));
+            let next = &mut next[..n];
+            for (gain, &f) in interval.gains.iter().zip(&signal[2 * k..2 * k + 2]) {
+                next.iter_mut().zip(gain.column(column).iter()).for_each(|(x, g)| *x += f * g);
+            }
+            for (slopes, &x) in interval.transition.as_slice().chunks_exact(n.max(1)).zip(&done[n * k..]) {
+                next.iter_mut().zip(slopes).for_each(|(next, slope)| *next += slope * x);
+            }
         }
         let mut residuals = Vec::new();
         for ((samples, &row), noise) in self.samples.iter().zip(&self.rows).zip(&self.noise) {
@@ -139,7 +141,7 @@ impl Trajectory {
                 let m = &self.moments[node];
                 let mut y = 0.0;
                 for i in 0..n {
-                    y += m.c[(row, i)] * states[knot][i];
+                    y += m.c[(row, i)] * states[n * knot + i];
                 }
                 (y + m.d[(row, column)] * signal[node]) / noise
             }));
@@ -202,4 +204,75 @@ fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
         sum = &sum * &sum;
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicUsize;
+
+    use mops_core::{Hold, Input, Job, Model};
+
+    use crate::testing::{Record, fitted, subject};
+
+    const OSCILLATOR: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "N" }
+    parameters = { m = "kg", d = "N s/m", k = "N/m", bias = { unit = "N", default = 0 } }
+    der        = { x = "v", v = "m*v' = u + bias - d*v - k*x - 3*k*x^3" }
+    outputs    = { a = { value = "(u - d*v - k*x - 3*k*x^3)/m", unit = "m/s^2" } }
+    "#;
+
+    fn record(names: &[&'static str], amplitude: f64, step: f64) -> Record {
+        let times: Vec<f64> = (0..200).map(|k| f64::from(k) * step).collect();
+        let values = times.iter().map(|t| amplitude * (3.0 * t).sin()).collect();
+        let input = Input::Sampled { times: times.clone(), values, hold: Hold::First };
+        let signals = names.iter().map(|&name| (name, vec![0.0; 200], 0.5)).collect();
+        Record { inputs: vec![("u", input)], times, signals }
+    }
+
+    #[test]
+    fn a_unit_force_moves_an_oscillator_at_rest_as_the_closed_form_says() {
+        // m x'' + k x = 1 from rest: x = (1 - cos(w t))/k, w^2 = k/m = 4; coarse steps of 0.2 rad.
+        let subject = subject(OSCILLATOR, &[2.0, 0.0, 8.0, 0.0, 0.0, 0.0], 2, vec![record(&["x", "a"], 0.0, 0.1)]);
+        let simulations = AtomicUsize::new(0);
+        let (_, _, _, scene) = fitted(&subject, &simulations);
+        let along = &scene.trajectories[0];
+        let unit = vec![1.0; along.moments.len()];
+        let response = along.response(along.inputs(), &unit);
+        for k in 0..200_u32 {
+            let t = 0.1 * f64::from(k);
+            let x = (1.0 - (2.0 * t).cos()) / 8.0 / 0.5;
+            assert!((response[k as usize] - x).abs() < 1e-5, "{t}: {} {x}", response[k as usize]);
+        }
+        // The pulse of one interval: nothing before it.
+        let mut pulse = vec![0.0; along.moments.len()];
+        pulse[200] = 1.0;
+        pulse[201] = 1.0;
+        let response = along.response(along.inputs(), &pulse);
+        assert!(response[..=100].iter().all(|&r| r == 0.0) && response[101] > 0.0);
+    }
+
+    #[test]
+    fn a_constant_force_along_a_nonlinear_motion_has_the_tangent_of_the_simulation() {
+        let truth = [2.0, 0.8, 8.0, 0.5, 0.3, -0.2];
+        let subject = subject(OSCILLATOR, &truth, 2, vec![record(&["x", "v", "a"], 6.0, 0.02)]);
+        let simulations = AtomicUsize::new(0);
+        let (fit, variant, mut at, _) = fitted(&subject, &simulations);
+        at.point.globals = truth[..4].to_vec();
+        at.point.locals = vec![truth[4..].to_vec()];
+        let along = super::Trajectory::new(&fit, &variant.model, 0, &at.point).expect("it simulates");
+        let unit = vec![1.0; along.moments.len()];
+        let response = along.response(along.inputs(), &unit);
+        let piece = &fit.pieces[0];
+        let job = Job { case: &piece.case, parameters: &truth, signals: &[0, 1, 2], horizon: piece.horizon };
+        let seed = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+        let (_, tangents) = variant.model.tangents(&job, &[seed]).expect("exact").expect("it simulates");
+        for (s, response) in piece.series.iter().zip(response.chunks(200)) {
+            let expected = tangents[0].trace(&s.name).sample(&s.times);
+            for ((r, e), t) in response.iter().zip(&expected).zip(&s.times) {
+                // The sample at the start has no node before it.
+                assert!(*t == 0.0 || (r * s.noise - e).abs() < 2e-3 * (1.0 + e.abs()), "{} {t}: {r} {e}", s.name);
+            }
+        }
+    }
 }

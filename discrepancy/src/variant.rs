@@ -38,8 +38,11 @@ impl Variant {
     /// # Panics
     /// If an effect does not fit its place: candidates do.
     pub fn new(subject: &Subject, added: &[Added]) -> Self {
-        let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("effect{}", i + 1)));
+        let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
         let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
+        let samples = |m: &crate::subject::Measurement| m.series.iter().map(|s| s.times.len()).max().unwrap_or(0);
+        let longest = subject.measurements.iter().map(samples).max().unwrap_or(0);
+        let model = model.with_step_limit(4000 + 6 * longest);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();
         for a in added {

@@ -18,9 +18,11 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// The search itself, over the effects that the task leaves.
-fn search(study: &Study, options: &Options, _watch: &dyn Watch) -> Result<Diagnosis, Unsuitable> {
-    let _effects = effects(&study.tasks.diagnosis, &options.effects)?;
-    Err(Unsuitable(Mistake::here("the search for missing effects is not there yet")))
+fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, Unsuitable> {
+    let task = &study.tasks.diagnosis;
+    let effects = effects(task, &options.effects)?;
+    let asked = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed };
+    mops_discrepancy::diagnose(study, &effects, &asked, watch).map_err(Unsuitable)
 }
 
 /// The effects that the task leaves. N.B.: names in a study file were checked when it was read.

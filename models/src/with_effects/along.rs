@@ -76,16 +76,15 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
         let plant = f64::open(open, &job.parameters[..self.own()])?;
-        let (of, own) = (self.model.interface(), self.model.equation_states().len());
-        let mut dynamics = Driven::new(of, own, plant, self.actors(&acting, own, job.parameters), job);
+        let mut dynamics = self.driven(plant, &acting, job, job.parameters);
         let start = dynamics.start(job.parameters)?;
         let mut looks = Looks { times, next: 0, found: Vec::with_capacity(times.len()) };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
-        integrate(&mut dynamics, 0.0, end, start, &open.tolerance(), &mut looks)?;
+        integrate(&mut dynamics, 0.0, end, start, &self.tolerance(open), &mut looks)?;
 
         let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
         let plant = Along::open(open, &parameters[..self.own()])?;
-        let mut tangent = Driven::new(of, own, plant, self.actors(&acting, own, &parameters), job);
+        let mut tangent = self.driven(plant, &acting, job, &parameters);
         tangent.start(&parameters)?;
         let ports = self.model.interface().ports.iter();
         let forces = ports.filter(|port| matches!(port, Port::Process { .. })).count();

@@ -21,8 +21,15 @@ pub(super) struct Actor<S> {
 }
 
 impl WithEffects {
-    /// The effects of these indices; their states stand behind the `own` of the plant.
-    pub(super) fn actors<S: Opening>(&self, acting: &[usize], own: usize, parameters: &[S]) -> Vec<Actor<S>> {
+    /// The plant with the effects of these indices.
+    pub(super) fn driven<'a, S: Opening>(
+        &self,
+        plant: Box<dyn Plant<S> + 'a>,
+        acting: &[usize],
+        job: &Job<'a>,
+        parameters: &[S],
+    ) -> Driven<'a, S> {
+        let own = self.model.equation_states().len();
         let mut states = own;
         let actor = |&index: &usize| {
             let (effect, place) = (&self.placements[index].effect, self.places[index]);
@@ -37,7 +44,8 @@ impl WithEffects {
                 inertial: effect.is_inertial(),
             }
         };
-        acting.iter().map(actor).collect()
+        let actors = acting.iter().map(actor).collect();
+        Driven::new(self.model.interface(), own, plant, actors, job)
     }
 }
 

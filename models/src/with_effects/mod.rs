@@ -26,6 +26,7 @@ pub struct WithEffects {
     placements: Vec<Placement>,
     places: Vec<Place>,
     interface: Interface,
+    max_steps: usize,
 }
 
 /// Where an effect acts, as indices; and where its strengths and start values stand among the parameters.
@@ -106,7 +107,19 @@ impl WithEffects {
             }
             places.push(Place { site: sites.0, companion: sites.1, strengths, starts });
         }
-        Ok(Self { model, placements, places, interface })
+        Ok(Self { model, placements, places, interface, max_steps: usize::MAX })
+    }
+
+    /// Fails simulations that need more steps: effects at strengths that make them stiff.
+    #[must_use]
+    pub fn with_step_limit(mut self, max_steps: usize) -> Self {
+        self.max_steps = max_steps;
+        self
+    }
+
+    fn tolerance(&self, open: &dyn mops_core::Open) -> Tolerance {
+        let tolerance = open.tolerance();
+        Tolerance { max_steps: tolerance.max_steps.min(self.max_steps), ..tolerance }
     }
 
     /// The model without effects.
@@ -135,13 +148,11 @@ impl WithEffects {
         let open = self.model.ported().expect("looked at when it was made");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let own = self.model.equation_states().len();
-        let actors = self.actors(&acting, own, parameters);
-        let mut dynamics = Driven::new(self.model.interface(), own, plant, actors, job);
+        let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
-        let recording = record(&mut dynamics, start, job.horizon, &open.tolerance(), &signals, &output)?;
+        let recording = record(&mut dynamics, start, job.horizon, &self.tolerance(open), &signals, &output)?;
         Ok(dynamics.remembered(recording, &signals))
     }
 }

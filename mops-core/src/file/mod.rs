@@ -152,7 +152,13 @@ fn kind<'t, 'k, K>(
     }
     found.ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(name_of).collect();
-        node.key_diagnostic(format!("the {what} has no kind")).with_help(format!("name one of: {}", names.join(", ")))
+        // Long lists are a page of their own.
+        let help = if names.len() > 40 {
+            "`mops list` has their names".to_owned()
+        } else {
+            format!("name one of: {}", names.join(", "))
+        };
+        node.key_diagnostic(format!("the {what} has no kind")).with_help(help)
     })
 }
 

@@ -41,8 +41,14 @@ pub(super) fn answer(
 }
 
 fn text(replies: &[Reply]) -> String {
+    let beside = |reply: &Reply| reply.brute.as_ref().map_or_else(String::new, brute);
     let rows = replies.iter().map(|reply| match &reply.said {
-        Err(why) => vec![reply.name.clone(), format!("failed: {why}")],
+        Err(why) => {
+            let mut cells = vec![reply.name.clone(), "failed".to_owned(), String::new(), why.clone()];
+            cells.resize(8, String::new());
+            cells.push(beside(reply));
+            cells
+        }
         Ok(said) => {
             let found = said.answer.found.iter().map(|((effect, place), _)| format!("{effect} at {place}"));
             let found = found.chain(said.answer.unexplained_at.iter().map(|place| format!("at {place}")));
@@ -59,12 +65,12 @@ fn text(replies: &[Reply]) -> String {
                 errors(1),
                 format!("{:.1}", said.answer.seconds),
                 said.answer.simulations.to_string(),
-                reply.brute.as_ref().map_or_else(String::new, brute),
+                beside(reply),
             ]
         }
     });
-    let beside = if replies.iter().any(|reply| reply.brute.is_some()) { "brute force" } else { "" };
-    let header = ["case", "verdict", "probability", "found", "error before", "after", "seconds", "simulations", beside];
+    let title = if replies.iter().any(|reply| reply.brute.is_some()) { "brute force" } else { "" };
+    let header = ["case", "verdict", "probability", "found", "error before", "after", "seconds", "simulations", title];
     table(&header, &[2, 6, 7], rows.collect())
 }
 

@@ -1,0 +1,160 @@
+//! The repaired model: its parameters from calibration data alone, its errors on every experiment.
+
+use mops_core::Role;
+use nalgebra::DMatrix;
+
+use crate::base;
+use crate::diagnosis::{ExperimentError, StrengthValue};
+use crate::fit::{Fit, Fitted, Point};
+use crate::search::{Search, Trial};
+use crate::subject::Measurement;
+use crate::variant::{Added, Variant, problem};
+
+/// A model that was fitted to calibration data alone, and its predictions everywhere.
+pub struct Calibrated {
+    /// Its effects.
+    pub added: Vec<Added>,
+    /// Values of the tuners of the study.
+    pub tuners: Vec<f64>,
+    /// Covariance of these, then of the strengths in the order of [`Calibrated::free`], for residuals of size 1.
+    pub covariance: DMatrix<f64>,
+    /// Mean square of the residuals on calibration data, at least 1.
+    pub square: f64,
+    /// For each strength that was fitted the effect and its index there.
+    pub free: Vec<(usize, usize)>,
+    /// For each experiment: predicted outputs by series, and the values of the model's locals.
+    pub experiments: Vec<Prognosis>,
+}
+
+/// What a model says of an experiment.
+pub struct Prognosis {
+    /// Predicted samples of each series.
+    pub predicted: Vec<Vec<f64>>,
+    /// Start values: name of the parameter, value.
+    pub starts: Vec<(String, f64)>,
+}
+
+impl Search<'_> {
+    /// Fits the effects and the tuners to calibration data, from where a trial over all data ended, and the start values of
+    /// the other experiments with these.
+    pub fn calibrate(&self, trial: &Trial<'_>, held: &[usize]) -> Option<Calibrated> {
+        let subject = self.subject;
+        let pieces = base::pieces(subject, |role| role == Role::Calibration);
+        let of_trial = |measurement: usize, count: usize| {
+            let piece = trial.fit.pieces.iter().position(|p| p.measurement == measurement && trial.windows == 1)?;
+            Some(trial.fitted.point.locals[piece][..count].to_vec())
+        };
+        let mut locals = base::first_locals(&pieces);
+        for (piece, locals) in pieces.iter().zip(&mut locals) {
+            if let Some(known) = of_trial(piece.measurement, piece.locals.len()) {
+                *locals = known;
+            }
+        }
+        let tuners = &trial.fitted.point.globals[..subject.globals.len()];
+        let (fit, point, variant) = problem(subject, &trial.added, pieces, tuners, locals, held, self.simulations);
+        let fitted = fit.solve(point, 80)?;
+        let mut added = trial.added.clone();
+        let mut free = Vec::new();
+        for (index, a) in added.iter_mut().enumerate() {
+            let strengths = a.candidate.effect.strengths();
+            let only = a.candidate.only;
+            let piece = fit.pieces.iter().position(|p| Some(p.measurement) == only).unwrap_or(0);
+            a.strengths = variant.strengths(&fit, &fitted.point, index, strengths.len(), piece);
+            let shared = |k: &usize| strengths[*k].scope == mops_core::Scope::Study && !strengths[*k].fixed;
+            free.extend((0..strengths.len()).filter(shared).map(|k| (index, k)));
+        }
+        let tuners = fitted.point.globals[..subject.globals.len()].to_vec();
+        let mut experiments = Vec::new();
+        for (index, measurement) in subject.measurements.iter().enumerate() {
+            let known = fit.pieces.iter().position(|p| p.measurement == index);
+            experiments.push(match known {
+                Some(piece) => prognosis(&fit, &fitted.point, piece, measurement)?,
+                None => self.forecast(&added, &tuners, index, of_trial(index, measurement.locals.len()))?,
+            });
+        }
+        #[allow(clippy::cast_precision_loss)]
+        let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
+        Some(Calibrated { added, tuners, covariance: fitted.covariance, square, free, experiments })
+    }
+
+    /// Start values of an experiment with everything else held, and what the model then says.
+    fn forecast(&self, added: &[Added], tuners: &[f64], index: usize, from: Option<Vec<f64>>) -> Option<Prognosis> {
+        let measurement = &self.subject.measurements[index];
+        let mut best: Option<(f64, Prognosis)> = None;
+        let pieces = || base::pieces(self.subject, |_| true).into_iter().filter(|p| p.measurement == index).collect();
+        let first: Vec<f64> = measurement.locals.iter().map(|l| l.start).collect();
+        for start in [from, Some(first)].into_iter().flatten() {
+            let held: Vec<usize> = (0..tuners.len()).collect();
+            let made = problem(self.subject, added, pieces(), tuners, vec![start], &held, self.simulations);
+            let (mut fit, point, _): (Fit<'_>, Point, Variant) = made;
+            for (global, &value) in fit.globals.iter_mut().zip(&point.globals) {
+                global.bounds = [value; 2];
+            }
+            let solved: Option<Fitted> = fit.solve(point, 60);
+            let Some(fitted) = solved else { continue };
+            if best.as_ref().is_none_or(|(chi2, _)| fitted.chi2 < *chi2) {
+                best = Some((fitted.chi2, prognosis(&fit, &fitted.point, 0, measurement)?));
+            }
+        }
+        best.map(|(_, prognosis)| prognosis)
+    }
+}
+
+fn prognosis(fit: &Fit<'_>, point: &Point, piece: usize, measurement: &Measurement) -> Option<Prognosis> {
+    let residuals = fit.residuals(piece, point, false)?.r;
+    let mut at = 0;
+    let predicted = measurement.series.iter().map(|s| {
+        let part = &residuals[at..at + s.times.len()];
+        at += s.times.len();
+        part.iter().zip(&s.values).map(|(r, y)| y + r * s.noise).collect()
+    });
+    let predicted = predicted.collect();
+    let names = &fit.model.interface().parameters;
+    let locals = fit.pieces[piece].locals.iter().zip(&point.locals[piece]);
+    let starts = locals.map(|(local, &value)| (names[local.parameter].variable.name.clone(), value)).collect();
+    Some(Prognosis { predicted, starts })
+}
+
+impl Calibrated {
+    /// Its errors on every experiment.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn errors(&self, measurements: &[Measurement]) -> Vec<ExperimentError> {
+        let error = |(m, said): (&Measurement, &Prognosis)| {
+            let (mut sum, mut count) = (0.0, 0);
+            let channels = m.series.iter().zip(&said.predicted).map(|(s, predicted)| {
+                let square: f64 = predicted.iter().zip(&s.values).map(|(p, y)| (p - y).powi(2)).sum();
+                sum += square / s.noise.powi(2);
+                count += s.values.len();
+                (s.name.clone(), (square / s.values.len().max(1) as f64).sqrt())
+            });
+            let channels = channels.collect();
+            ExperimentError {
+                name: m.name.clone(),
+                role: m.role,
+                channels,
+                normalised: (sum / count.max(1) as f64).sqrt(),
+            }
+        };
+        measurements.iter().zip(&self.experiments).map(error).collect()
+    }
+
+    /// The strengths of an effect, with what the data say of them; `repeats` samples are worth one.
+    pub fn strengths(&self, index: usize, variant: &Variant, repeats: f64) -> Vec<StrengthValue> {
+        let a = &self.added[index];
+        let parameters = &mops_core::Model::interface(variant.model.as_ref()).parameters;
+        let one = |(k, strength): (usize, &mops_core::Strength)| {
+            let place = self.free.iter().position(|&f| f == (index, k));
+            let variance = place.map(|place| self.covariance[(self.tuners.len() + place, self.tuners.len() + place)]);
+            let error = variance.map(|v| (v * self.square * repeats).sqrt()).filter(|e| e.is_finite() && *e > 0.0);
+            let value = a.strengths[k];
+            StrengthValue {
+                name: strength.name.to_owned(),
+                value,
+                unit: parameters[variant.first[index] + k].variable.unit.to_string(),
+                std_error: error,
+                interval95: error.map(|e| [value - 1.96 * e, value + 1.96 * e]),
+            }
+        };
+        a.candidate.effect.strengths().iter().enumerate().map(one).collect()
+    }
+}

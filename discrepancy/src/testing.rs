@@ -1,0 +1,136 @@
+//! Subjects for tests: a model from text, and records that the test computes by itself.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{
+    Case, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale, Study, Task, Tasks, Tuner,
+    Unit, stream,
+};
+use mops_models::equations::EquationsOptions;
+use rand_distr::{Distribution, Normal};
+
+use crate::base::{first_locals, pieces};
+use crate::fit::{Fit, Fitted};
+use crate::screen::Scene;
+use crate::subject::{Local, Measurement, Series, Subject};
+use crate::variant::{Variant, problem};
+
+/// A measured experiment.
+pub struct Record {
+    /// Inputs by name.
+    pub inputs: Vec<(&'static str, Input)>,
+    /// Times of all samples, s.
+    pub times: Vec<f64>,
+    /// Signals: name, samples, noise.
+    pub signals: Vec<(&'static str, Vec<f64>, f64)>,
+}
+
+/// A subject with every parameter of the model unknown, those at the end named in `starts` for each record.
+pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Record>) -> Subject {
+    let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
+    let model: Arc<dyn Model> = Arc::from(options.build().expect("it is a model"));
+    let globals = parameters.len() - starts;
+    let tuner = |(k, &start): (usize, &f64)| Tuner {
+        name: model.interface().parameters[k].variable.name.clone(),
+        parameter: model.interface().parameters[k].variable.name.clone(),
+        start,
+        bounds: [start - 10.0 * start.abs(), start + 10.0 * start.abs()],
+        scale: Scale::Linear,
+        grid: Grid::Continuous,
+        unit: Unit::one(),
+        case: None,
+        active: true,
+        tie: None,
+    };
+    let source = |(k, &value): (usize, &f64)| {
+        if k < globals { ParameterSource::Tuner { tuner: k, factor: 1.0 } } else { ParameterSource::Constant(value) }
+    };
+    let local = |k: usize| Local { parameter: k, bounds: [-100.0, 100.0], start: parameters[k], scale: 0.1 };
+    let (mut measurements, mut jobs, mut cases) = (Vec::new(), Vec::new(), Vec::new());
+    for (index, record) in records.into_iter().enumerate() {
+        let inputs = record.inputs.into_iter().map(|(name, input)| (name.to_owned(), input)).collect();
+        let case = Case { name: format!("record {index}"), inputs, ..Case::default() };
+        let horizon = record.times[record.times.len() - 1];
+        let series = record.signals.into_iter().map(|(name, values, noise)| Series {
+            signal: model.interface().signals.iter().position(|s| s.name == name).expect("the model has it"),
+            name: name.to_owned(),
+            unit: String::new(),
+            times: record.times.clone(),
+            values,
+            noise,
+        });
+        measurements.push(Measurement {
+            name: case.name.clone(),
+            role: Role::Calibration,
+            case: case.clone(),
+            job: index,
+            locals: (globals..parameters.len()).map(local).collect(),
+            series: series.collect(),
+            horizon,
+        });
+        let parameters = parameters.iter().enumerate().map(source).collect();
+        jobs.push(JobPlan { model: 0, case: index, parameters, signals: Vec::new(), horizon });
+        cases.push(case);
+    }
+    let study = Study {
+        name: "test".to_owned(),
+        task: Task::Diagnosis,
+        objective: Objective::default(),
+        seed: 1,
+        models: vec![("plant".to_owned(), Arc::clone(&model))],
+        cases,
+        tuners: parameters[..globals].iter().enumerate().map(tuner).collect(),
+        rows: Vec::new(),
+        jobs,
+        tasks: Tasks::default(),
+        warnings: Vec::new(),
+        notes: Vec::new(),
+    };
+    Subject { study: Arc::new(study), model, globals: (0..globals).collect(), measurements, notes: Vec::new() }
+}
+
+/// The subject's model fitted to its records, and what a screening sees of it.
+pub fn fitted<'a>(subject: &'a Subject, simulations: &'a AtomicUsize) -> (Fit<'a>, Variant, Fitted, Scene) {
+    let pieces = pieces(subject, |_| true);
+    let locals = first_locals(&pieces);
+    let (fit, point, variant) = problem(subject, &[], pieces, &subject.start(), locals, &[], simulations);
+    let fitted = fit.solve(point, 60).expect("it simulates");
+    let scene = Scene::new(&fit, &variant.model, &fitted).expect("it simulates");
+    (fit, variant, fitted, scene)
+}
+
+/// White noise.
+pub fn white(label: &str, size: f64, count: usize) -> Vec<f64> {
+    let normal = Normal::new(0.0, size).expect("it is positive");
+    let mut random = stream(7, label);
+    (0..count).map(|_| normal.sample(&mut random)).collect()
+}
+
+/// States at evenly spaced times by the classical Runge-Kutta method, 20 steps between samples.
+pub fn integrated<const N: usize>(
+    rates: impl Fn(f64, &[f64; N]) -> [f64; N],
+    start: [f64; N],
+    step: f64,
+    count: usize,
+) -> Vec<[f64; N]> {
+    const PARTS: u32 = 20;
+    let h = step / f64::from(PARTS);
+    let mut x = start;
+    let mut all = vec![x];
+    for k in 1..count {
+        for part in 0..PARTS {
+            #[allow(clippy::cast_precision_loss)]
+            let t = (k - 1) as f64 * step + f64::from(part) * h;
+            let moved = |by: f64, slope: &[f64; N]| std::array::from_fn(|i| x[i] + by * slope[i]);
+            // Just inside the step, so that what jumps at its ends is taken from within.
+            let k1 = rates(t + 1e-3 * h, &x);
+            let k2 = rates(t + 0.5 * h, &moved(0.5 * h, &k1));
+            let k3 = rates(t + 0.5 * h, &moved(0.5 * h, &k2));
+            let k4 = rates(t + (1.0 - 1e-3) * h, &moved(h, &k3));
+            x = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        }
+        all.push(x);
+    }
+    all
+}

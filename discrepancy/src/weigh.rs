@@ -1,0 +1,96 @@
+//! Weighing fitted models against each other: what correlated residuals are worth, and how likely chance is.
+
+use crate::search::Trial;
+
+/// What the residuals of the best model tell of the data: the error model that all candidates share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dispersion {
+    /// Mean square of the residuals, at least 1.
+    pub square: f64,
+    /// Samples that are worth one: `(1 + r)/(1 - r)` with the correlation r of neighbours, at least 1.
+    ///
+    /// Source: G. Box, G. Jenkins, G. Reinsel, Time Series Analysis, 3rd edition (1994), section 2.1.5, for a first-order
+    /// autoregression.
+    pub repeats: f64,
+}
+
+impl Dispersion {
+    /// White residuals of the size of the noise.
+    pub const WHITE: Self = Self { square: 1.0, repeats: 1.0 };
+
+    /// Of what a model leaves.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn of(trial: &Trial<'_>) -> Self {
+        let Some(all) = trial.fit.all(&trial.fitted.point, false) else { return Self::WHITE };
+        let square = (trial.fitted.chi2 / trial.fitted.count.max(1) as f64).max(1.0);
+        let (mut product, mut power, mut pairs) = (0.0, 0.0, 0.0);
+        for (piece, residuals) in trial.fit.pieces.iter().zip(&all) {
+            let mut at = 0;
+            for s in &piece.series {
+                let r = &residuals.r[at..at + s.times.len()];
+                at += s.times.len();
+                product += r.windows(2).map(|w| w[0] * w[1]).sum::<f64>();
+                power += r.iter().map(|r| r * r).sum::<f64>();
+                pairs += r.len() as f64;
+            }
+        }
+        let r = if power > 0.0 { product / power } else { 0.0 };
+        // What noise alone would show does not count.
+        let r = if r < 3.0 / pairs.max(1.0).sqrt() { 0.0 } else { r.min(0.99) };
+        Self { square, repeats: (1.0 + r) / (1.0 - r) }
+    }
+
+    /// How many units of the sum of squares count as one.
+    pub fn weight(&self) -> f64 {
+        self.square * self.repeats
+    }
+}
+
+/// Minus twice the logarithm of the evidence of a model, by the Bayesian information criterion; rarer effects pay a little
+/// more, as physicists think of the common ones first.
+///
+/// Source: G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978) 461.
+#[allow(clippy::cast_precision_loss)]
+pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
+    let rarity: f64 = trial.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
+    let worth = (trial.fitted.count as f64 / dispersion.repeats).max(2.0);
+    trial.fitted.chi2 / dispersion.weight() + trial.unknowns() as f64 * worth.ln() + 2.0 * rarity
+}
+
+/// Probabilities of models from their criteria, lower being better.
+pub fn probabilities(criteria: &[f64]) -> Vec<f64> {
+    let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
+    let weights: Vec<f64> = criteria.iter().map(|c| (-0.5 * (c - best)).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|w| if sum > 0.0 { w / sum } else { 0.0 }).collect()
+}
+
+/// Probability that the best of a screening of so many directions gains as much by chance: `1 - (1 - exp(-gain/2))^n`.
+///
+/// The gain of one direction is chi-squared of one degree of freedom, of which half the mass is cut off by the sign of the
+/// strength; `exp(-gain/2)` bounds its tail.
+pub fn by_chance(gain: f64, directions: f64) -> f64 {
+    if gain <= 0.0 {
+        return 1.0;
+    }
+    -((directions * (-(-0.5 * gain).exp()).ln_1p()).exp_m1())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_that_do_as_well_share_the_probability_and_six_points_leave_a_twentieth() {
+        let p = probabilities(&[10.0, 10.0, 16.0]);
+        assert_eq!(p[0], p[1]);
+        assert!((p[2] / p[0] - (-3.0_f64).exp()).abs() < 1e-12 && (p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_best_of_many_directions_gains_by_chance() {
+        assert!((by_chance(2.0 * 100.0_f64.ln(), 1.0) - 0.01).abs() < 1e-12);
+        assert!((by_chance(2.0 * 10_000.0_f64.ln(), 100.0) - 0.01).abs() < 1e-4);
+        assert_eq!(by_chance(0.0, 10.0), 1.0);
+    }
+}
