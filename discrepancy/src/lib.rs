@@ -2,6 +2,7 @@
 //! physical effect that the model lacks, and reports the error before and after.
 
 mod base;
+mod brute_force;
 mod candidate;
 mod diagnose;
 mod diagnosis;
@@ -27,6 +28,7 @@ mod variant;
 mod weigh;
 mod windows;
 
+pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,

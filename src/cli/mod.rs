@@ -1,5 +1,6 @@
 //! The command line: what can be typed, and which file does it.
 
+mod bench;
 mod check;
 mod data;
 mod describe;
@@ -71,6 +72,8 @@ enum Command {
     Linearise(linearise::Arguments),
     /// Show what is in a data file: columns, units, ranges, gaps, sample time, noise.
     Data(data::Arguments),
+    /// Measure how well mops does what it says, over many cases whose truth is known.
+    Bench(bench::Arguments),
     /// Print the JSON schema of study files, for completion in an editor.
     Schema,
     /// Print a completion script for a shell.
@@ -116,6 +119,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),
         Command::Linearise(arguments) => linearise::linearise(catalogue, &arguments),
         Command::Data(arguments) => data::data(&arguments),
+        Command::Bench(arguments) => bench::bench(catalogue, &arguments),
         Command::Schema => schema::schema(catalogue),
         Command::Completions { shell } => {
             let mut script = Vec::new();

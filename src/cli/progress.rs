@@ -21,6 +21,17 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);
         let style = "{bar:30} {pos}/{len} evaluations, at most {eta} left, {msg}";
         bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
+        Self::with(bar, "interrupted: writing the best point so far; again to end at once")
+    }
+
+    /// The same for a benchmark, which keeps the cases that are done.
+    pub fn of_cases(shown: bool) -> Self {
+        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(None, target);
+        Self::with(bar, "interrupted: the cases so far count; again to end at once")
+    }
+
+    fn with(bar: ProgressBar, heard: &'static str) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
         // Where a handler cannot be set, Ctrl-C ends the program as usual.
@@ -28,7 +39,7 @@ impl Progress {
             if flag.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("interrupted: writing the best point so far; again to end at once");
+            eprintln!("{heard}");
         });
         Self { bar, interrupted, staged: AtomicBool::new(false) }
     }

@@ -26,6 +26,7 @@ pub fn shipped() -> Vec<Shipped> {
         study!("multi-model"),
         study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),
         study!("furuta-calibration-2-joint", "data/horizontal.csv", "data/upright.csv"),
+        study!("furuta-discrepancy", "data/horizontal.csv", "data/pushed.csv", "data/upright.csv"),
         study!("furuta-swing", "data/horizontal.csv", "data/upright.csv"),
         study!("pole-placement-retuning"),
         study!("step-identification", "data/step.csv", "data/sine.csv"),

@@ -2,6 +2,8 @@
 
 #[path = "../furuta-calibration/generate.rs"]
 mod furuta_calibration;
+#[path = "../furuta-discrepancy/generate.rs"]
+mod furuta_discrepancy;
 #[path = "../furuta-swing/generate.rs"]
 mod furuta_swing;
 
@@ -25,5 +27,12 @@ fn the_recordings_of_the_calibrations_are_what_the_generator_makes() {
 fn the_recordings_of_furuta_swing_are_what_the_generator_makes() {
     for (name, seed, start) in furuta_swing::RECORDINGS {
         check("furuta-swing", name, &furuta_swing::recording(seed, start));
+    }
+}
+
+#[test]
+fn the_recordings_of_furuta_discrepancy_are_what_the_test_bed_makes() {
+    for (name, seed, duration, start) in furuta_discrepancy::RECORDINGS {
+        check("furuta-discrepancy", name, &furuta_discrepancy::recording(seed, duration, start));
     }
 }

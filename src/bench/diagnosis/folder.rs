@@ -1,0 +1,138 @@
+//! Folders of cases by others: `case.json` with a plant's equations, and its data; answers in the same form.
+
+mod answer;
+mod declared;
+mod matching;
+
+use std::path::{Path, PathBuf};
+
+use mops_core::Unit;
+use mops_core::file::Files;
+
+use super::tool::{Answer, Tools};
+use crate::bench::each;
+use answer::{answer, predictions};
+use declared::Declared;
+
+/// A folder of cases.
+pub(crate) struct Cases {
+    /// The folders of the cases, by name.
+    folders: Vec<PathBuf>,
+}
+
+/// What is left behind of a case.
+pub(crate) struct Reply {
+    /// The case.
+    pub name: String,
+    /// The study, a file that runs by itself.
+    pub study: String,
+    /// The answer, the tables of predictions by file; or why there is none.
+    pub said: Result<Said, String>,
+    /// What brute force says, where it was asked.
+    pub brute: Option<Result<Answer, String>>,
+}
+
+/// An answer.
+pub(crate) struct Said {
+    /// As a file.
+    pub json: String,
+    /// Data files, and the outputs predicted for them.
+    pub predictions: Vec<(String, String)>,
+    /// In short.
+    pub answer: Answer,
+    /// Errors by experiment, before and after.
+    pub errors: Vec<(String, [f64; 2])>,
+}
+
+/// Data files of a case; the ones its declaration names, and no other.
+struct Data<'a> {
+    folder: &'a Path,
+    declared: &'a Declared,
+}
+
+impl Files for Data<'_> {
+    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
+        let name = Path::new(path).file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        let named = self.declared.files.iter().any(|file| file == name);
+        if !named {
+            return Err(std::io::ErrorKind::NotFound.into());
+        }
+        let bytes = std::fs::read(self.folder.join(name))?;
+        Ok(String::from_utf8(bytes)
+            .map_or_else(std::string::FromUtf8Error::into_bytes, |text| without_odd_units(&text)))
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+impl Cases {
+    /// Looks for them: folders with a `case.json`.
+    ///
+    /// # Errors
+    /// The folder cannot be read, or has none.
+    pub fn find(folder: &Path) -> Result<Self, String> {
+        let shown = folder.display();
+        let entries = std::fs::read_dir(folder).map_err(|error| format!("{shown} cannot be read: {error}"))?;
+        let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        folders.retain(|path| path.join("case.json").is_file());
+        folders.sort();
+        if folders.is_empty() {
+            return Err(format!("{shown} has no folders with a case.json"));
+        }
+        Ok(Self { folders })
+    }
+
+    /// Diagnoses all of them.
+    pub fn run(&self, tools: Tools<'_>, jobs: usize, against: bool) -> Vec<Reply> {
+        each(&self.folders, jobs, tools.watch, |folder| {
+            let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+            let text = std::fs::read_to_string(folder.join("case.json")).map_err(|error| error.to_string());
+            let declared = text.and_then(|text| Declared::read(&text));
+            let study = declared.and_then(|declared| Ok((declared.study(&name, folder)?, declared)));
+            let (study, declared) = match study {
+                Ok(read) => read,
+                Err(why) => return Some(Reply { name, study: String::new(), said: Err(why), brute: None }),
+            };
+            let guarded = std::panic::AssertUnwindSafe(|| diagnosed(&name, &study, &declared, folder, tools));
+            let said = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
+            let brute = against.then(|| {
+                let read = tools.study(&format!("{name}.toml"), &study, &Data { folder, declared: &declared })?;
+                tools.brute_force(&read)
+            });
+            Some(Reply { name, study, said, brute })
+        })
+    }
+}
+
+fn diagnosed(name: &str, text: &str, declared: &Declared, folder: &Path, tools: Tools<'_>) -> Result<Said, String> {
+    let study = tools.study(&format!("{name}.toml"), text, &Data { folder, declared })?;
+    let times: Vec<(String, Vec<f64>)> = study.cases.iter().filter_map(times).collect();
+    let (diagnosis, seconds) = tools.diagnose(study)?;
+    let after = |name: &str| diagnosis.after.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.normalised);
+    Ok(Said {
+        json: answer(name, declared, &diagnosis, seconds),
+        predictions: predictions(declared, &diagnosis, &times),
+        errors: diagnosis.before.iter().map(|e| (e.name.clone(), [e.normalised, after(&e.name)])).collect(),
+        answer: Answer::of(&diagnosis, seconds),
+    })
+}
+
+/// A data file whose header has no units that are none: its numbers count as they stand.
+fn without_odd_units(text: &str) -> Vec<u8> {
+    let (header, rows) = text.split_once('\n').unwrap_or((text, ""));
+    let cells =
+        header.split(',').map(|cell| match cell.trim().strip_suffix(']').and_then(|cell| cell.split_once('[')) {
+            Some((name, unit)) if Unit::parse(unit).is_err() => name,
+            _ => cell,
+        });
+    format!("{}\n{rows}", cells.collect::<Vec<_>>().join(",")).into_bytes()
+}
+
+/// Name and sample times of an experiment.
+fn times(case: &mops_core::Case) -> Option<(String, Vec<f64>)> {
+    let channels = &case.experiment.as_ref()?.channels;
+    let channel = channels.iter().max_by_key(|channel| channel.times.len())?;
+    Some((case.name.clone(), channel.times.clone()))
+}

@@ -1,0 +1,108 @@
+//! What the test bed and the catalogue call the same things.
+
+use std::f64::consts::TAU;
+
+use mops_testbed::TrueEffect;
+
+/// Kinds of effect in the catalogue that are this effect of the test bed.
+pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n str> {
+    match class {
+        "input-quadratic" => vec!["quadratic-input"],
+        "rate-limit" => vec!["input-rate-limit"],
+        "dahl" => vec!["dahl-friction"],
+        "cubic-damping" => vec!["cubic-drag"],
+        "hidden-thermal-mass" => vec!["hidden-store"],
+        "constant-heat-gain" => vec!["constant-force"],
+        // The same formula, for angles and for lengths.
+        "cogging" => vec!["cogging", "position-ripple"],
+        "sensor-dead-zone" if strengths.iter().any(|(name, value)| name == "shifts" && *value == 0.0) => {
+            vec!["sensor-gap"]
+        }
+        same => vec![same],
+    }
+}
+
+/// True strengths under the names of the catalogue, where both have the same meaning.
+pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
+    let of = |name: &str| effect.strengths.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, value)| *value);
+    match effect.class.as_str() {
+        "coulomb-friction" => vec![("c", of("torque"))],
+        "stribeck-friction" => {
+            vec![("c", of("coulomb")), ("rise", of("static") / of("coulomb") - 1.0), ("vs", of("speed"))]
+        }
+        "stiction" => vec![("c", of("static")), ("share", of("coulomb") / of("static"))],
+        "asymmetric-friction" => {
+            let (forward, backward) = (of("forward"), of("backward"));
+            vec![("c", 0.5 * (forward + backward)), ("skew", (forward - backward) / (forward + backward))]
+        }
+        "position-dependent-friction" => vec![("c", of("torque")), ("a", of("depth"))],
+        "dahl" => vec![("c", of("torque")), ("y", of("torque") / of("stiffness"))],
+        "viscous-friction" => vec![("d", of("damping"))],
+        "quadratic-drag" | "cubic-damping" => vec![("k", of("drag"))],
+        "linear-stiffness" => vec![("k", of("stiffness")), ("rest", of("rest"))],
+        "cubic-stiffness" | "quadratic-stiffness" => vec![("k", of("stiffness"))],
+        "cogging" => vec![("a", of("torque")), ("n", of("waves"))],
+        "flexible-mode" => vec![("m", of("mass")), ("w", of("frequency")), ("d", of("damping"))],
+        "bouc-wen" => {
+            // Where z ends: (1/(beta + gamma))^(1/n).
+            let (sum, n) = (of("beta") + of("gamma"), of("power"));
+            let end = sum.powf(-1.0 / n);
+            vec![("c", of("stiffness") * end), ("y", end), ("n", n)]
+        }
+        "constant-force" => vec![("f", of("force"))],
+        "constant-heat-gain" => vec![("f", of("power"))],
+        "periodic-disturbance" => vec![("a", of("amplitude")), ("w", of("frequency"))],
+        "wind-gust" => vec![("a", of("amplitude")), ("from", of("from")), ("length", of("length"))],
+        "mass-loss" => vec![("r", of("rate"))],
+        "leak" => vec![("k", of("flow")), ("hole", of("height"))],
+        "overflow" if of("share") == 0.0 => vec![("level", of("level"))],
+        "linear-loss" => vec![("k", of("flow"))],
+        "radiation-loss" => vec![("k", of("coefficient"))],
+        "hidden-thermal-mass" => vec![("k", of("coupling")), ("tau", of("time"))],
+        "input-delay" | "sensor-delay" => vec![("delay", of("delay"))],
+        "actuator-lag" | "sensor-lag" => vec![("tau", of("time"))],
+        "input-saturation" => vec![("limit", of("limit"))],
+        "input-dead-zone" => vec![("width", of("width"))],
+        "input-bias" | "sensor-bias" => vec![("b", of("bias"))],
+        "input-quadratic" => vec![("a", of("curvature"))],
+        "input-quantisation" | "sensor-quantisation" => vec![("step", of("step"))],
+        "rate-limit" => vec![("rate", of("rate"))],
+        "backlash" if effect.place.starts_with("actuator") => vec![("gap", 2.0 * of("gap"))],
+        "sensor-gain" => vec![("g", of("gain") - 1.0)],
+        "sensor-drift" => vec![("r", of("rate"))],
+        "sensor-dead-zone" => vec![("width", of("width")), ("centre", of("middle"))],
+        "eccentricity" => vec![("a", of("amplitude")), ("phase", of("phase").rem_euclid(TAU))],
+        "cross-talk" => vec![("k", of("share"))],
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names of strengths that the catalogue does not have would never be compared.
+    #[test]
+    fn every_effect_and_every_strength_of_the_test_bed_is_in_the_catalogue() {
+        let catalogue = mops_models::effects::effects();
+        for effect in mops_testbed::effects() {
+            for shifts in [0.0, 1.0] {
+                let told = [("shifts".to_owned(), shifts)];
+                for name in names(effect.name, &told) {
+                    let known = catalogue.iter().find(|e| e.name() == name);
+                    let known = known.unwrap_or_else(|| panic!("no effect `{name}`"));
+                    let truth = TrueEffect {
+                        class: effect.name.into(),
+                        formula: String::new(),
+                        place: "actuator:u".into(),
+                        accepted_places: Vec::new(),
+                        strengths: vec![("share".into(), 0.0)],
+                    };
+                    for (strength, _) in strengths(&truth) {
+                        assert!(known.strengths().iter().any(|s| s.name == strength), "{name} has no `{strength}`");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Every case with its answer as one line of a table.
+
+use super::judge::Row;
+use super::tool::spelt;
+
+const HEADER: [&str; 19] = [
+    "case",
+    "missing",
+    "size",
+    "effects",
+    "places",
+    "verdict",
+    "first",
+    "place",
+    "decision right",
+    "first right",
+    "in set",
+    "set size",
+    "place right",
+    "probability",
+    "probability of first",
+    "p value",
+    "seconds",
+    "simulations",
+    "failure",
+];
+
+/// The cases as CSV.
+pub(crate) fn csv(rows: &[Row]) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(HEADER).expect("memory can be written to");
+    for row in rows {
+        writer.write_record(cells(row)).expect("memory can be written to");
+    }
+    String::from_utf8(writer.into_inner().expect("memory can be written to")).expect("it was made of texts")
+}
+
+fn cells(row: &Row) -> Vec<String> {
+    let joined = |pick: fn(&(String, String)) -> &String| {
+        row.truth.iter().map(|named| pick(named).as_str()).collect::<Vec<_>>().join("+")
+    };
+    let mut cells = vec![
+        row.name.clone(),
+        format!("{:?}", row.kind).to_lowercase(),
+        row.size.to_string(),
+        joined(|named| &named.0),
+        joined(|named| &named.1),
+    ];
+    let (first, judged) = (row.answer.as_ref().ok().and_then(|a| a.first()).cloned(), &row.judgement);
+    let (effect, place) = first.unwrap_or_default();
+    match &row.answer {
+        Ok(a) => cells.extend([
+            spelt(a.verdict).to_owned(),
+            effect,
+            a.unexplained_at.clone().filter(|_| place.is_empty()).unwrap_or(place),
+            judged.decision.to_string(),
+            judged.first.to_string(),
+            judged.in_set.to_string(),
+            a.set.len().to_string(),
+            judged.place.to_string(),
+            a.probability.to_string(),
+            a.found.first().map_or_else(String::new, |(_, p)| p.to_string()),
+            a.p_value.to_string(),
+            format!("{:.3}", a.seconds),
+            a.simulations.to_string(),
+            String::new(),
+        ]),
+        Err(why) => {
+            cells.extend(std::iter::repeat_n(String::new(), HEADER.len() - 6));
+            cells.push(why.clone());
+        }
+    }
+    cells
+}

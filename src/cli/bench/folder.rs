@@ -1,0 +1,86 @@
+//! The answers to a folder of cases, and what of them is printed.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use mops_core::Diagnostic;
+
+use super::super::tables::{number, table};
+use super::super::{Trouble, cannot_write, print};
+use crate::bench::diagnosis::{Answer, Cases, Reply, Tools, spelt};
+
+/// Diagnoses every case of a folder, writes the answers, and prints a line for each.
+pub(super) fn answer(
+    cases: &Path,
+    answers: &Path,
+    tools: Tools<'_>,
+    jobs: usize,
+    against: bool,
+) -> Result<ExitCode, Trouble> {
+    let cases = Cases::find(cases).map_err(Diagnostic::new)?;
+    let replies = cases.run(tools, jobs, against);
+    std::fs::create_dir_all(answers).map_err(cannot_write(answers))?;
+    let write = |name: String, content: &str| {
+        let path = answers.join(name);
+        std::fs::write(&path, content).map_err(cannot_write(&path))
+    };
+    for Reply { name, study, said, .. } in &replies {
+        if !study.is_empty() {
+            write(format!("{name}.toml"), study)?;
+        }
+        let Ok(said) = said else { continue };
+        write(format!("{name}.json"), &said.json)?;
+        for (file, content) in &said.predictions {
+            write(format!("{name}_{file}.csv"), content)?;
+        }
+    }
+    print(&text(&replies));
+    print(&format!("\nanswers, predictions and studies are in {}\n", answers.display()));
+    let failed = replies.iter().any(|reply| reply.said.is_err());
+    Ok(if failed { ExitCode::from(3) } else { ExitCode::SUCCESS })
+}
+
+fn text(replies: &[Reply]) -> String {
+    let beside = |reply: &Reply| reply.brute.as_ref().map_or_else(String::new, brute);
+    let rows = replies.iter().map(|reply| match &reply.said {
+        Err(why) => {
+            let mut cells = vec![reply.name.clone(), "failed".to_owned(), String::new(), why.clone()];
+            cells.resize(8, String::new());
+            cells.push(beside(reply));
+            cells
+        }
+        Ok(said) => {
+            let found = said.answer.found.iter().map(|((effect, place), _)| format!("{effect} at {place}"));
+            let found = found.chain(said.answer.unexplained_at.iter().map(|place| format!("at {place}")));
+            let errors = |which: usize| {
+                let each: Vec<String> = said.errors.iter().map(|(_, pair)| format!("{:.2}", pair[which])).collect();
+                each.join(", ")
+            };
+            vec![
+                reply.name.clone(),
+                spelt(said.answer.verdict).to_owned(),
+                number(said.answer.probability),
+                found.collect::<Vec<_>>().join(" + "),
+                errors(0),
+                errors(1),
+                format!("{:.1}", said.answer.seconds),
+                said.answer.simulations.to_string(),
+                beside(reply),
+            ]
+        }
+    });
+    let title = if replies.iter().any(|reply| reply.brute.is_some()) { "brute force" } else { "" };
+    let header = ["case", "verdict", "probability", "found", "error before", "after", "seconds", "simulations", title];
+    table(&header, &[2, 6, 7], rows.collect())
+}
+
+fn brute(said: &Result<Answer, String>) -> String {
+    match said {
+        Err(why) => why.clone(),
+        Ok(answer) => {
+            let found =
+                answer.first().map_or_else(|| "none".to_owned(), |(effect, place)| format!("{effect} at {place}"));
+            format!("{found}, {:.1} s", answer.seconds)
+        }
+    }
+}

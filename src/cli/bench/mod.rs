@@ -1,0 +1,160 @@
+//! `mops bench diagnosis`: how well missing effects are found, over simulated experiments or a folder of cases.
+
+mod folder;
+mod tables;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand, ValueEnum};
+use mops_core::{Catalogue, Diagnostic, suggestion};
+
+use super::progress::Progress;
+use super::{Trouble, cannot_write, print};
+use crate::bench::diagnosis::{self, Kind, Plan, Tools};
+
+/// What can be said to a benchmark.
+#[derive(Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Find missing effects in simulated experiments: rates, reliability of probabilities, coverage of intervals, time.
+    ///
+    /// The experiments come from a simulator that shares no code with models and effects: plants with drawn parameters,
+    /// effects at drawn places, of a strength at which the refitted base model has the error asked for, in units of the
+    /// noise. Ctrl-C ends the benchmark with what it has.
+    Diagnosis(Diagnosis),
+}
+
+#[derive(Args)]
+struct Diagnosis {
+    /// Cases that lack one effect: effects take turns, then sizes.
+    #[arg(long, default_value_t = 200)]
+    cases: usize,
+    /// Cases that lack two effects.
+    #[arg(long, default_value_t = 20)]
+    two: usize,
+    /// Cases that lack nothing.
+    #[arg(long, default_value_t = 100)]
+    none: usize,
+    /// Cases that lack what no catalogue has.
+    #[arg(long, default_value_t = 20)]
+    outside: usize,
+    /// Plants; all where absent.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    plants: Vec<String>,
+    /// Effects, as the test bed calls them; all where absent.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    effects: Vec<String>,
+    /// Errors of the refitted base model, in units of the noise.
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS", default_values_t = mops_testbed::SIZES)]
+    sizes: Vec<f64>,
+    /// Seed of the cases, and of the diagnosis.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of cases that run at once, each on one thread; all cores where absent.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Folder for a table of all cases and a page.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Put another tool beside the diagnosis.
+    #[arg(long, value_name = "TOOL")]
+    against: Option<Rival>,
+    /// Diagnose the cases of a folder instead: a folder each, with case.json and data.
+    #[arg(long, value_name = "DIR")]
+    folder: Option<PathBuf>,
+    /// Where the answers to these go; `answers` where absent.
+    #[arg(long, value_name = "DIR", requires = "folder")]
+    answers: Option<PathBuf>,
+    /// Show no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Another tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Rival {
+    /// The model refitted with every effect in turn, and the least BIC believed.
+    BruteForce,
+}
+
+pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let What::Diagnosis(arguments) = &arguments.what;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = arguments.jobs.map_or(cores, usize::from);
+    let against = arguments.against.is_some();
+    if let Some(cases) = &arguments.folder {
+        let progress = Progress::of_cases(!arguments.quiet);
+        let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
+        let answers = arguments.answers.as_deref().unwrap_or(Path::new("answers"));
+        let done = folder::answer(cases, answers, tools, jobs, against);
+        progress.finish();
+        return done;
+    }
+    let plan = plan(arguments)?;
+    let progress = Progress::of_cases(!arguments.quiet);
+    let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
+    let results = diagnosis::run(&plan, tools, jobs, against);
+    progress.finish();
+    let text = tables::all(&results);
+    print(&text);
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+        let write = |name: &str, content: String| {
+            let path = folder.join(name);
+            std::fs::write(&path, content).map_err(cannot_write(&path))
+        };
+        write("cases.csv", diagnosis::csv(&results.rows))?;
+        if against {
+            write("brute-force.csv", diagnosis::csv(&results.brute))?;
+        }
+        write("index.html", diagnosis::page(&text, &tables::stated(&results.rows)))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What is asked for, names checked.
+fn plan(arguments: &Diagnosis) -> Result<Plan, Diagnostic> {
+    let all_plants: Vec<&str> = mops_testbed::plants().iter().map(|plant| plant.name).collect();
+    let all_effects: Vec<&str> = mops_testbed::effects().iter().map(|effect| effect.name).collect();
+    let counts = [
+        (Kind::One, arguments.cases),
+        (Kind::Two, arguments.two),
+        (Kind::Nothing, arguments.none),
+        (Kind::Outside, arguments.outside),
+    ];
+    if let Some(size) = arguments.sizes.iter().find(|&&size| !(size > 1.0 && size.is_finite())) {
+        let fact = format!("a base model that lacks something has an error above 1, not {size}");
+        return Err(Diagnostic::new(fact).with_help("`--sizes 20,5,2,1.3`"));
+    }
+    Ok(Plan {
+        plants: chosen(&arguments.plants, &all_plants, "plant")?,
+        effects: chosen(&arguments.effects, &all_effects, "effect")?,
+        sizes: arguments.sizes.clone(),
+        counts,
+        seed: arguments.seed,
+    })
+}
+
+/// The names asked for; all where none are.
+fn chosen(asked: &[String], all: &[&str], what: &str) -> Result<Vec<String>, Diagnostic> {
+    if let Some(unknown) = asked.iter().find(|name| !all.contains(&name.as_str())) {
+        let fact = format!("the test bed has no {what} `{unknown}`");
+        return Err(Diagnostic::new(fact).with_help(suggestion(unknown, all.iter().copied())));
+    }
+    let mut names: Vec<String> =
+        if asked.is_empty() { all.iter().map(|&n| n.to_owned()).collect() } else { asked.to_vec() };
+    let mut seen = Vec::new();
+    names.retain(|name| {
+        !seen.contains(name) && {
+            seen.push(name.clone());
+            true
+        }
+    });
+    Ok(names)
+}
