@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mops_core::{Effect, Mistake, Port, Study, Watch};
+use mops_core::{Effect, Mistake, Port, Role, Study, Watch};
 
 use crate::base;
 use crate::diagnosis::{
-    Diagnosis, Found, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Unexplained, Verdict,
+    Diagnosis, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Unexplained, Verdict,
 };
 use crate::fit::dot;
 use crate::locate::locate;
+use crate::plan::separating;
 use crate::repaired::Calibrated;
 use crate::screen::{Scene, Screened};
 
@@ -32,6 +33,9 @@ pub struct Options {
 
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 const UNEXPLAINED: f64 = 1.1;
+
+/// The same of its forecasts of selection data, with parameters from calibration data: these are uncertain.
+const MISTAKEN: f64 = 1.5;
 
 /// Finds what the model of a calibration study lacks.
 ///
@@ -94,7 +98,9 @@ pub fn diagnose(
     watch.stage("the repaired model", 0.9);
     let mut after = search.calibrate(&last, &held).ok_or_else(lost)?;
 
-    let verdict = match (last.added.is_empty(), last.fitted.normalised() > UNEXPLAINED) {
+    let missed =
+        last.fitted.normalised() > UNEXPLAINED || (!last.added.is_empty() && forecast(&after, &subject) > MISTAKEN);
+    let verdict = match (last.added.is_empty(), missed) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,
@@ -104,7 +110,13 @@ pub fn diagnose(
         unexplained = located.first().and_then(|place| place.stopgap());
         let ports: Vec<Port> = located.iter().map(|l| l.port.clone()).take(2).collect();
         let table = scene.as_ref().and_then(|scene| best_table(&search, &base, scene, &ports));
-        if let Some(table) = table.filter(|table| table.fitted.chi2 < last.fitted.chi2 && table.windows == 1) {
+        let calibrated = table.as_ref().and_then(|table| search.calibrate(table, &[]));
+        let better = |calibrated: &Calibrated, chi2: f64| match forecast(&after, &subject) {
+            now if now > 0.0 => forecast(calibrated, &subject) < now,
+            _ => chi2 < last.fitted.chi2,
+        };
+        let both = table.zip(calibrated).filter(|(table, calibrated)| better(calibrated, table.fitted.chi2));
+        if let Some((table, calibrated)) = both {
             let added = table.added.last().expect("a table was added");
             unexplained = Some(Unexplained {
                 place: added.candidate.place(),
@@ -112,10 +124,7 @@ pub fn diagnose(
                 over: if added.candidate.effect.name().ends_with("speed") { "speed" } else { "position" }.to_owned(),
                 table: points(added),
             });
-            if let Some(with_table) = search.calibrate(&table, &[]) {
-                after = with_table;
-                last = table;
-            }
+            (after, last) = (calibrated, table);
         }
     }
     let is_table = |index: &usize| last.added[*index].candidate.effect.name().starts_with("force-over");
@@ -125,6 +134,16 @@ pub fn diagnose(
         .filter(|index| !is_table(index))
         .map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion))
         .collect();
+    let next_experiment = rounds.iter().zip(&found).find_map(|(round, found)| {
+        let rival = found.indistinguishable.first()?;
+        let trial = |t: &&Trial<'_>| {
+            let last = t.added.last();
+            last.is_some_and(|a| a.candidate.effect.name() == rival.effect && a.candidate.place() == rival.place)
+        };
+        let names =
+            [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
+        separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])
+    });
     let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
     let removed = held.iter().map(|k| crate::diagnosis::Removed { term: names(k), place: String::new() }).collect();
     let probability = match verdict {
@@ -140,17 +159,25 @@ pub fn diagnose(
         removed,
         ranked: ranking,
         unexplained,
-        next_experiment: None,
+        next_experiment,
         before: before.errors(&subject.measurements),
         after: after.errors(&subject.measurements),
         parameters: moves(&subject, &before, &after),
-        noticeable: Vec::new(),
+        noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject) } else { Vec::new() },
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
         notes: subject.notes.clone(),
         starts: starts(&subject, &after),
         simulations: simulations.load(Ordering::Relaxed),
     })
+}
+
+/// Root mean square of the normalised errors on selection data; 0 without such data.
+#[allow(clippy::cast_precision_loss)]
+fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
+    let errors = after.errors(&subject.measurements);
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
@@ -254,6 +281,31 @@ fn found(
         indistinguishable: rivals,
         place,
     }
+}
+
+/// The smallest strengths that would have been noticed, of the effects whose size is one number.
+fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
+    let Some(round) = rounds.first() else { return Vec::new() };
+    let one = |s: &Screened| {
+        let candidate = &s.added.candidate;
+        let strength = &candidate.effect.strengths()[0];
+        let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added));
+        let parameter = &mops_core::Model::interface(model.model.as_ref()).parameters[model.first[0]];
+        Some(Noticeable {
+            effect: candidate.effect.name().to_owned(),
+            place: candidate.place(),
+            strength: StrengthValue {
+                name: strength.name.to_owned(),
+                value: s.noticed.filter(|n| n.is_finite())?,
+                unit: parameter.variable.unit.to_string(),
+                std_error: None,
+                interval95: None,
+            },
+        })
+    };
+    let mut all: Vec<&Screened> = round.screened.iter().filter(|s| s.added.candidate.effect.rarity() == 0).collect();
+    all.sort_by_key(|s| s.added.candidate.place());
+    all.into_iter().filter_map(one).collect()
 }
 
 fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<ParameterMove> {

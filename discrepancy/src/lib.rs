@@ -14,6 +14,7 @@ mod hygiene;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
+mod plan;
 mod repaired;
 mod screen;
 mod search;

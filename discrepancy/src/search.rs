@@ -160,9 +160,10 @@ impl<'a> Search<'a> {
     pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
         let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
         let screened = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene);
-        let mut chosen: Vec<usize> = (0..screened.len().min(self.limits.refits)).collect();
+        let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
+        let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
         // Of every place the best, so that no place is lost for a bad linearisation.
-        for (i, s) in screened.iter().enumerate() {
+        for (i, s) in screened.iter().enumerate().take(gaining) {
             let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
             if chosen.len() < 2 * self.limits.refits
                 && chosen.iter().filter(|k| same(k)).count() < 2
