@@ -102,7 +102,12 @@ impl Family {
         });
         let spacing = 1.0 / counts.iter().max().map_or(1.0, |&n| (n - 1) as f64);
         let lengths = [1.5, 5.0, 20.0, 80.0].map(|l| l * spacing).to_vec();
-        Self { over: Over::Free, columns: first..first + counts.iter().sum::<usize>(), lengths, blocks: blocks.collect() }
+        Self {
+            over: Over::Free,
+            columns: first..first + counts.iter().sum::<usize>(),
+            lengths,
+            blocks: blocks.collect(),
+        }
     }
 
     /// Signals that are a function of an argument, over the range of its values; `None` where that does not change.
@@ -122,7 +127,12 @@ impl Family {
             shares.map(|s| (low + s * (high - low), s)).unzip()
         };
         let lengths = vec![0.2, 0.7, 3.0];
-        Some(Self { over, columns: first..first + knots.len(), lengths, blocks: vec![Block { piece: None, knots, places }] })
+        Some(Self {
+            over,
+            columns: first..first + knots.len(),
+            lengths,
+            blocks: vec![Block { piece: None, knots, places }],
+        })
     }
 
     /// The root of the covariance of the values at the knots for a length.
@@ -187,7 +197,8 @@ mod tests {
     #[test]
     fn a_function_is_linear_between_its_knots() {
         let family = Family::function(Over::Position, [-1.0, 3.0].into_iter(), 2).expect("it changes");
-        let values: Vec<f64> = [0.0; 2].into_iter().chain(family.table(&[0.0; 15]).iter().map(|p| 2.0 * p[0])).collect();
+        let values: Vec<f64> =
+            [0.0; 2].into_iter().chain(family.table(&[0.0; 15]).iter().map(|p| 2.0 * p[0])).collect();
         let looks = [-2.0, -1.0, 0.1, 2.9, 5.0].map(|position| Look { position, ..Look::default() });
         let mut signal = vec![0.0; 5];
         family.add(&values, 0, &looks, &mut signal);

@@ -16,6 +16,7 @@ mod locate_tests;
 mod repaired;
 mod screen;
 mod search;
+mod stopgap;
 mod subject;
 #[cfg(test)]
 mod testing;

@@ -48,11 +48,8 @@ impl Unknown {
         let looks: Vec<Vec<Look>> = (0..spots.len()).map(|piece| looks(spots[piece], piece, fit, scene)).collect();
         let span = |piece: &Piece| [piece.case.begins, piece.case.begins + piece.horizon];
         let spans: Vec<[f64; 2]> = fit.pieces.iter().map(span).collect();
-        let samples: Vec<usize> = fit
-            .pieces
-            .iter()
-            .map(|piece| piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0))
-            .collect();
+        let samples: Vec<usize> =
+            fit.pieces.iter().map(|piece| piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0)).collect();
         let mut families = vec![Family::free(&spans, &samples, FREE, 0)];
         for over in [Over::Position, Over::Speed, Over::Input, Over::Time] {
             let first = families[families.len() - 1].columns.end;
