@@ -14,7 +14,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::{Curve, Evidence, Unexplained};
-use crate::family::Over;
+use crate::family::{Over, thinned};
 use crate::fit::Fit;
 use crate::screen::Scene;
 use crate::unknown::{Term, Unknown};
@@ -138,7 +138,7 @@ fn table(unknown: &Unknown, choice: &Choice) -> Option<Table> {
         over: family.over,
         evidence: choice.evidence,
         share: share(unknown, estimate.coefficients.as_slice(), estimate.freedom),
-        points: family.table(estimate.coefficients.as_slice()),
+        points: thinned(family.table(estimate.coefficients.as_slice())),
     })
 }
 

@@ -151,8 +151,11 @@ fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
         "{}",
         repaired.fitted.normalised()
     );
-    // The spring and a constant apart, which the fit may share out as it likes: the bend of the table is that of the force.
-    let bend = |f: &dyn Fn(usize) -> f64| (1..12).map(|k| f(k + 1) - 2.0 * f(k) + f(k - 1)).collect::<Vec<_>>();
-    let (fitted, true_) = (bend(&|k| unexplained.table[k][1]), bend(&|k| bulge(unexplained.table[k][0])));
-    assert!(fitted.iter().zip(&true_).all(|(f, t)| (f - t).abs() < 0.6), "{fitted:?} {true_:?}");
+    // A line apart, which the spring and a constant share out as they like, the table is the force.
+    let off: Vec<[f64; 2]> = unexplained.table.iter().map(|p| [p[0], p[1] - bulge(p[0])]).collect();
+    let mean = |f: &dyn Fn(&[f64; 2]) -> f64| off.iter().map(f).sum::<f64>() / off.len() as f64;
+    let middle = [mean(&|p| p[0]), mean(&|p| p[1])];
+    let slope = mean(&|p| (p[0] - middle[0]) * (p[1] - middle[1])) / mean(&|p| (p[0] - middle[0]).powi(2));
+    let worst = off.iter().map(|p| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.1 * 4.0, "{worst}: {off:?}");
 }

@@ -122,8 +122,11 @@ impl<S: Scalar> Acting<S> for AtValues<S> {
     }
 }
 
+/// Residuals, in units of the noise, below which no further table is tried.
+const GOOD: f64 = 1.15;
+
 /// The trial with a table at a place, fitted with everything else; and the table. Tried are what explains most and what
-/// comes next, from the linear estimate and from nothing. `None` where no table can be fitted.
+/// comes close, from the linear estimate and from nothing. `None` where no table can be fitted.
 pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> Option<(Trial<'a>, Unexplained)> {
     let scene = crate::screen::Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
     let sizes = sizes(&located.port, &from.variant.model, &from.fit.pieces, &scene.trajectories)?;
@@ -139,9 +142,21 @@ pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> 
         let all: Vec<Added> = from.added.iter().cloned().chain([added]).collect();
         Some((search.from(from, &all, 25)?, table.clone()))
     };
-    let tables: Vec<&Table> = located.tables.iter().filter(known).take(2).collect();
-    let tried = tables.iter().flat_map(|table| [1.0, 0.0].map(|size| fitted(table, size))).flatten();
-    let (trial, table) = tried.min_by(|a, b| a.0.fitted.chi2.total_cmp(&b.0.fitted.chi2))?;
+    let tables: Vec<&Table> = located.tables.iter().filter(known).collect();
+    let near = |table: &&&Table| table.evidence > 0.8 * tables[0].evidence;
+    let mut best: Option<(Trial<'a>, Table)> = None;
+    for table in tables.iter().filter(near).take(2) {
+        for size in [1.0, 0.0] {
+            if best.as_ref().is_some_and(|best| best.0.fitted.normalised() < GOOD) {
+                break;
+            }
+            let Some(next) = fitted(table, size) else { continue };
+            if best.as_ref().is_none_or(|best| next.0.fitted.chi2 < best.0.fitted.chi2) {
+                best = Some(next);
+            }
+        }
+    }
+    let (trial, table) = best?;
     let values = &trial.added.last()?.strengths;
     let unexplained = Unexplained {
         place: located.evidence.place.clone(),
