@@ -6,7 +6,7 @@
 
 use mops_core::{Failure, Job, Port};
 use mops_models::{Moment, WithEffects};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::fit::{Fit, Point};
 
@@ -148,28 +148,6 @@ impl Trajectory {
             }));
         }
         residuals
-    }
-
-    /// The states at the knots for a unit pulse of one node's signal: the columns of what a free force does.
-    pub fn transition(&self, interval: usize) -> &DMatrix<f64> {
-        &self.intervals[interval].transition
-    }
-
-    /// What a constant unit signal over an interval adds to the state at its end.
-    pub fn gain(&self, interval: usize, column: usize) -> DVector<f64> {
-        let [first, second] = &self.intervals[interval].gains;
-        first.column(column) + second.column(column)
-    }
-
-    /// Samples that lie at each knot: series, index of the sample, and the row of the outputs.
-    pub fn samples_at(&self) -> Vec<Vec<(usize, usize, usize)>> {
-        let mut at = vec![Vec::new(); self.knots.len()];
-        for (series, (samples, &row)) in self.samples.iter().zip(&self.rows).enumerate() {
-            for (index, &knot) in samples.iter().enumerate() {
-                at[knot].push((series, index, row));
-            }
-        }
-        at
     }
 }
 
