@@ -3,20 +3,20 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mops_core::{Effect, Mistake, Port, Role, Study, Watch};
+use mops_core::{Effect, Mistake, Role, Study, Watch};
 
 use crate::base;
 use crate::diagnosis::{
-    Diagnosis, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Unexplained, Verdict,
+    Diagnosis, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict,
 };
 use crate::fit::dot;
-use crate::locate::locate;
+use crate::locate::{Located, locate};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
 use crate::screen::{Scene, Screened};
 
 use crate::search::{Limits, Round, Search, Trial};
-use crate::stopgap::{best_table, points};
+use crate::stopgap::stopgap;
 use crate::subject::Subject;
 use crate::weigh::{Dispersion, by_chance, criterion, probabilities};
 
@@ -107,27 +107,21 @@ pub fn diagnose(
     };
     let mut unexplained = None;
     if verdict == Verdict::Unexplained {
-        unexplained = located.first().and_then(|place| place.stopgap());
-        let ports: Vec<Port> = located.iter().map(|l| l.port.clone()).take(2).collect();
-        let table = scene.as_ref().and_then(|scene| best_table(&search, &base, scene, &ports));
-        let calibrated = table.as_ref().and_then(|table| search.calibrate(table, &[]));
-        let better = |calibrated: &Calibrated, chi2: f64| match forecast(&after, &subject) {
-            now if now > 0.0 => forecast(calibrated, &subject) < now,
-            _ => chi2 < last.fitted.chi2,
-        };
-        let both = table.zip(calibrated).filter(|(table, calibrated)| better(calibrated, table.fitted.chi2));
-        if let Some((table, calibrated)) = both {
-            let added = table.added.last().expect("a table was added");
-            unexplained = Some(Unexplained {
-                place: added.candidate.place(),
-                share: unexplained.map_or(f64::NAN, |u| u.share),
-                over: if added.candidate.effect.name().ends_with("speed") { "speed" } else { "position" }.to_owned(),
-                table: points(added),
-            });
-            (after, last) = (calibrated, table);
+        unexplained = located.first().and_then(Located::unexplained);
+        for place in located.iter().take(2) {
+            let Some((table, found)) = stopgap(&search, &base, place) else { continue };
+            let Some(table) = search.over_whole(&table) else { continue };
+            let Some(calibrated) = search.calibrate(&table, &[]) else { continue };
+            let better = match forecast(&after, &subject) {
+                now if now > 0.0 => forecast(&calibrated, &subject) < now,
+                _ => table.fitted.chi2 < last.fitted.chi2,
+            };
+            if better {
+                (after, last, unexplained) = (calibrated, table, Some(found));
+            }
         }
     }
-    let is_table = |index: &usize| last.added[*index].candidate.effect.name().starts_with("force-over");
+    let is_table = |index: &usize| last.added[*index].candidate.effect.name() == "table";
     let ranking = ranking(&rounds, &last);
     let dispersion = Dispersion::of(&last);
     let found: Vec<Found> = (0..last.added.len())

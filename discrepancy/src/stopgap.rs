@@ -1,149 +1,168 @@
-//! The honest stopgap: a force that is a table over position or speed, where no effect of the catalogue explains the data.
+//! A table in place of an effect that nobody knows: linear between points over one thing that its place sees.
 
 use std::sync::Arc;
 
-use mops_core::{Acting, Along, At, Dimension, Effect, EffectClass, Port, PortKind, Scalar, Strength, Trials};
+use mops_core::{Acting, Along, At, Dimension, Effect, EffectClass, PortKind, Scalar, Strength, Trials};
 
-use crate::candidate::{Candidate, Sizes};
-use crate::screen::Scene;
+use crate::candidate::Candidate;
+use crate::diagnosis::Unexplained;
+use crate::family::Over;
+use crate::locate::{Located, Table};
 use crate::search::{Search, Trial};
 use crate::trace_of::sizes;
 use crate::variant::Added;
 
-/// Points of a table.
-pub const POINTS: usize = 13;
-
-/// A force that is straight between its values at evenly spread positions or speeds, and constant beyond them.
-struct ForceTable {
-    over_speed: bool,
+/// The table as an effect: its strengths are the values at the points.
+struct Stopgap {
+    over: Over,
+    kind: [PortKind; 1],
+    points: Vec<f64>,
 }
 
-const fn value(name: &'static str) -> Strength {
-    Strength::signed(name, "force at a point of the table", Dimension::OUTPUT)
+const fn value_at(name: &'static str) -> Strength {
+    let bounds = [f64::NEG_INFINITY, f64::INFINITY];
+    Strength::shape(name, "value at a point of the table", Dimension::OUTPUT, bounds, Trials::Plain(&[0.0]))
 }
 
-/// The strengths of a table over something of this dimension.
-const fn strengths(over: Dimension) -> [Strength; 3 + POINTS] {
-    const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
-    [
-        Strength::signed("share", "1, or 0 for no force", Dimension::ONE).kept(),
-        Strength::shape("from", "first point of the table", over, FREE, Trials::Linear).kept(),
-        Strength::shape("to", "last point of the table", over, FREE, Trials::Linear).kept(),
-        value("f1"),
-        value("f2"),
-        value("f3"),
-        value("f4"),
-        value("f5"),
-        value("f6"),
-        value("f7"),
-        value("f8"),
-        value("f9"),
-        value("f10"),
-        value("f11"),
-        value("f12"),
-        value("f13"),
-    ]
+const VALUES: &[Strength] = &[
+    value_at("y1"),
+    value_at("y2"),
+    value_at("y3"),
+    value_at("y4"),
+    value_at("y5"),
+    value_at("y6"),
+    value_at("y7"),
+    value_at("y8"),
+    value_at("y9"),
+    value_at("y10"),
+    value_at("y11"),
+    value_at("y12"),
+    value_at("y13"),
+    value_at("y14"),
+    value_at("y15"),
+];
+
+impl Stopgap {
+    fn acting<S: Scalar>(&self, values: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtValues {
+            over: self.over,
+            passes: !matches!(self.kind, [PortKind::Joint | PortKind::Process]),
+            points: self.points.clone(),
+            values: values.to_vec(),
+        })
+    }
 }
 
-static OVER_POSITION: [Strength; 3 + POINTS] = strengths(Dimension::POSITION);
-static OVER_SPEED: [Strength; 3 + POINTS] = strengths(Dimension::SPEED);
+impl Effect for Stopgap {
+    fn name(&self) -> &'static str {
+        "table"
+    }
 
-struct AtStrengths<S> {
-    over_speed: bool,
-    share: S,
-    ends: [S; 2],
+    fn about(&self) -> &'static str {
+        "What no effect explains, as a table."
+    }
+
+    fn formula(&self) -> &'static str {
+        "linear between the points of a table"
+    }
+
+    fn source(&self) -> &'static str {
+        "none: it stands for what is not known"
+    }
+
+    fn class(&self) -> EffectClass {
+        if self.over == Over::Time { EffectClass::TimeVarying } else { EffectClass::Bias }
+    }
+
+    fn ports(&self) -> &'static [PortKind] {
+        &[PortKind::Joint, PortKind::Process, PortKind::Actuator, PortKind::Sensor]
+    }
+
+    fn strengths(&self) -> &'static [Strength] {
+        &VALUES[..self.points.len()]
+    }
+
+    fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>> {
+        self.acting(strengths)
+    }
+
+    fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>> {
+        self.acting(strengths)
+    }
+}
+
+/// The table at given values.
+struct AtValues<S> {
+    over: Over,
+    /// Whether a value passes that the table is added to.
+    passes: bool,
+    points: Vec<f64>,
     values: Vec<S>,
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+impl<S: Scalar> Acting<S> for AtValues<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        let x = if self.over_speed { at.v } else { at.q };
-        let last = self.values.len() - 1;
-        let place = (x - self.ends[0]) / (self.ends[1] - self.ends[0]) * last as f64;
-        let force = if place.value() <= 0.0 {
+        let x = match self.over {
+            Over::Position => at.q,
+            Over::Speed => at.v,
+            Over::Input => at.value,
+            Over::Free | Over::Time => S::from(at.t),
+        };
+        let last = self.points.len() - 1;
+        let k = self.points.partition_point(|&p| p <= x.value()).clamp(1, last) - 1;
+        let (from, to) = (self.points[k], self.points[k + 1]);
+        let table = if x.value() <= self.points[0] {
             self.values[0]
-        } else if place.value() >= last as f64 {
+        } else if x.value() >= self.points[last] {
             self.values[last]
         } else {
-            let k = place.value().floor() as usize;
-            self.values[k] + (self.values[k + 1] - self.values[k]) * (place - k as f64)
+            self.values[k] + (self.values[k + 1] - self.values[k]) * ((x - S::from(from)) / S::from(to - from))
         };
-        force * self.share
+        if self.passes { at.value + table } else { table }
     }
 }
 
-impl ForceTable {
-    fn make<S: Scalar>(&self, s: &[S]) -> AtStrengths<S> {
-        AtStrengths { over_speed: self.over_speed, share: s[0], ends: [s[1], s[2]], values: s[3..].to_vec() }
-    }
-}
+/// Residuals, in units of the noise, below which no further table is tried.
+const GOOD: f64 = 1.15;
 
-impl Effect for ForceTable {
-    fn name(&self) -> &'static str {
-        if self.over_speed { "force-over-speed" } else { "force-over-position" }
-    }
-    fn about(&self) -> &'static str {
-        "A force given by a table: what the data show where no known effect explains them."
-    }
-    fn formula(&self) -> &'static str {
-        "straight between f1 to f13 at evenly spread points"
-    }
-    fn source(&self) -> &'static str {
-        "the data"
-    }
-    fn class(&self) -> EffectClass {
-        EffectClass::Gain
-    }
-    fn ports(&self) -> &'static [PortKind] {
-        if self.over_speed { &[PortKind::Joint] } else { &[PortKind::Joint, PortKind::Process] }
-    }
-    fn strengths(&self) -> &'static [Strength] {
-        if self.over_speed { &OVER_SPEED } else { &OVER_POSITION }
-    }
-    fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>> {
-        Box::new(self.make(strengths))
-    }
-    fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>> {
-        Box::new(self.make(strengths))
-    }
-}
-
-/// Fits tables at these places to what a trial leaves, and returns the best trial.
-pub fn best_table<'a>(search: &Search<'a>, from: &Trial<'a>, scene: &Scene, places: &[Port]) -> Option<Trial<'a>> {
-    let interface = search.subject.model.interface();
-    let mut best: Option<Trial<'a>> = None;
-    for port in places {
-        let Some(sizes) = sizes(port, &from.variant.model, &from.fit.pieces, &scene.trajectories) else { continue };
-        for over_speed in [false, true] {
-            let effect: Arc<dyn Effect> = Arc::new(ForceTable { over_speed });
-            if !port.kind(&interface.ports).is_some_and(|kind| effect.ports().contains(&kind)) {
-                continue;
+/// The trial with a table at a place, fitted with everything else; and the table. Tried are what explains most and what
+/// comes close, from the linear estimate and from nothing. `None` where no table can be fitted.
+pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> Option<(Trial<'a>, Unexplained)> {
+    let scene = crate::screen::Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
+    let sizes = sizes(&located.port, &from.variant.model, &from.fit.pieces, &scene.trajectories)?;
+    let ports = &search.subject.model.interface().ports;
+    let kind = located.port.kind(ports)?;
+    // At a sensor nobody tells the rate.
+    let known = |table: &&Table| !(kind == PortKind::Sensor && table.over == Over::Speed);
+    let fitted = |table: &Table, size: f64| {
+        let effect = Stopgap { over: table.over, kind: [kind], points: table.points.iter().map(|p| p[0]).collect() };
+        let candidate = Candidate { effect: Arc::new(effect), port: located.port.clone(), companion: None, only: None };
+        let strengths = table.points.iter().map(|p| size * p[1]).collect();
+        let added = Added { candidate, strengths, own: Vec::new(), sizes };
+        let all: Vec<Added> = from.added.iter().cloned().chain([added]).collect();
+        Some((search.from(from, &all, 25)?, table.clone()))
+    };
+    let tables: Vec<&Table> = located.tables.iter().filter(known).collect();
+    let near = |table: &&&Table| table.evidence > 0.8 * tables[0].evidence;
+    let mut best: Option<(Trial<'a>, Table)> = None;
+    for table in tables.iter().filter(near).take(2) {
+        for size in [1.0, 0.0] {
+            if best.as_ref().is_some_and(|best| best.0.fitted.normalised() < GOOD) {
+                break;
             }
-            let candidate = Candidate { effect, port: port.clone(), companion: None, only: None };
-            let added = Added { strengths: first(&sizes, over_speed), candidate, own: Vec::new(), sizes };
-            let all: Vec<Added> = from.added.iter().cloned().chain([added]).collect();
-            let Some(trial) = search.from(from, &all, 25) else { continue };
-            let trial = if trial.windows > 1 { search.over_whole(&trial).unwrap_or(trial) } else { trial };
-            let rank = |t: &Trial<'_>| (t.windows, t.fitted.chi2);
-            if best.as_ref().is_none_or(|best| rank(&trial) < rank(best)) {
-                best = Some(trial);
+            let Some(next) = fitted(table, size) else { continue };
+            if best.as_ref().is_none_or(|best| next.0.fitted.chi2 < best.0.fitted.chi2) {
+                best = Some(next);
             }
         }
     }
-    best
-}
-
-/// No force, over the range of the motion.
-fn first(sizes: &Sizes, over_speed: bool) -> Vec<f64> {
-    let [low, high] = if over_speed { [-1.7 * sizes.speed, 1.7 * sizes.speed] } else { sizes.range };
-    [1.0, low, high].into_iter().chain([0.0; POINTS]).collect()
-}
-
-/// The points of the table that a trial ends with.
-#[allow(clippy::cast_precision_loss)]
-pub fn points(added: &Added) -> Vec<[f64; 2]> {
-    let s = &added.strengths;
-    let step = (s[2] - s[1]) / (POINTS - 1) as f64;
-    (0..POINTS).map(|k| [s[1] + step * k as f64, s[3 + k]]).collect()
+    let (trial, table) = best?;
+    let values = &trial.added.last()?.strengths;
+    let unexplained = Unexplained {
+        place: located.evidence.place.clone(),
+        share: located.evidence.share,
+        over: table.over.name().to_owned(),
+        table: table.points.iter().zip(values).map(|(p, &y)| [p[0], y]).collect(),
+    };
+    Some((trial, unexplained))
 }

@@ -6,7 +6,7 @@
 
 use mops_core::{Failure, Job, Port};
 use mops_models::{Moment, WithEffects};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::fit::{Fit, Point};
 
@@ -137,7 +137,8 @@ impl Trajectory {
         let mut residuals = Vec::new();
         for ((samples, &row), noise) in self.samples.iter().zip(&self.rows).zip(&self.noise) {
             residuals.extend(samples.iter().map(|&knot| {
-                let node = (2 * knot).saturating_sub(1).min(self.moments.len() - 1);
+                // What jumps at a sample has jumped when it is taken.
+                let node = (2 * knot).min(self.moments.len() - 1);
                 let m = &self.moments[node];
                 let mut y = 0.0;
                 for i in 0..n {
@@ -248,8 +249,10 @@ mod tests {
         for (s, response) in piece.series.iter().zip(response.chunks(200)) {
             let expected = tangents[0].trace(&s.name).sample(&s.times);
             for ((r, e), t) in response.iter().zip(&expected).zip(&s.times) {
-                // The sample at the start has no node before it.
-                assert!(*t == 0.0 || (r * s.noise - e).abs() < 2e-3 * (1.0 + e.abs()), "{} {t}: {r} {e}", s.name);
+                let r = r * s.noise;
+                // The output `a` is taken at a node, a fifth of a step after the sample.
+                let allowed = if s.name == "a" { 2e-2 } else { 1e-5 };
+                assert!((r - e).abs() < allowed * (1.0 + e.abs()), "{} {t}: {r} {e}", s.name);
             }
         }
     }

@@ -11,12 +11,10 @@ use crate::screen::Scene;
 use crate::trace_of::{Spot, spot};
 
 /// Knots of a free signal over all pieces.
-const FREE: usize = 120;
+const FREE: usize = 100;
 
 /// A place with the unknown signals that may act there.
 pub struct Unknown {
-    /// Where it is in each piece; `None` for a sensor without data.
-    spots: Vec<Option<Spot>>,
     /// What it looks like in each piece, at the times of the signal.
     pub looks: Vec<Vec<Look>>,
     /// The families of signals.
@@ -81,7 +79,7 @@ impl Unknown {
             chi2: dot(residuals.as_slice(), residuals.as_slice()),
             freedom: rows.saturating_sub(basis.ncols()).max(1) as f64,
         };
-        Some(Self { spots, looks, families, columns, residuals, normals })
+        Some(Self { looks, families, columns, residuals, normals })
     }
 
     /// What is expected of a sum of families; `None` where a length is too long for the numbers.
