@@ -10,6 +10,7 @@ use crate::diagnosis::{
     Diagnosis, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict,
 };
 use crate::fit::dot;
+use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
@@ -33,6 +34,9 @@ pub struct Options {
 
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 const UNEXPLAINED: f64 = 1.1;
+
+/// Share by which a free signal must lower the error on samples left out to count as something that is missing.
+const FORETOLD: f64 = 0.1;
 
 /// The same of its forecasts of selection data, with parameters from calibration data: these are uncertain.
 const MISTAKEN: f64 = 1.5;
@@ -98,8 +102,9 @@ pub fn diagnose(
     watch.stage("the repaired model", 0.9);
     let mut after = search.calibrate(&last, &held).ok_or_else(lost)?;
 
-    let missed =
-        last.fitted.normalised() > UNEXPLAINED || (!last.added.is_empty() && forecast(&after, &subject) > MISTAKEN);
+    let mut notes = subject.notes.clone();
+    let left = if last.fitted.normalised() > UNEXPLAINED { left(&last, &mut notes) } else { 0.0 };
+    let missed = left > FORETOLD || (!last.added.is_empty() && forecast(&after, &subject) > MISTAKEN);
     let verdict = match (last.added.is_empty(), missed) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
@@ -160,10 +165,27 @@ pub fn diagnose(
         noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject) } else { Vec::new() },
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
-        notes: subject.notes.clone(),
+        notes,
         starts: starts(&subject, &after),
         simulations: simulations.load(Ordering::Relaxed),
     })
+}
+
+/// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out.
+fn left(last: &Trial<'_>, notes: &mut Vec<String>) -> f64 {
+    let model = &last.variant.model;
+    let Some(scene) = Scene::new(&last.fit, model, &last.fitted) else { return 1.0 };
+    let Some(place) = locate(&last.fit, model, &scene).into_iter().next() else { return 0.0 };
+    let gain = predictive_gain(&place, &last.fit, model, &scene);
+    if gain > 0.0 {
+        notes.push(format!(
+            "{:.2} times the noise is left; a free signal at {} would lower the error on samples left out by {:.0} %",
+            last.fitted.normalised(),
+            place.evidence.place,
+            100.0 * gain
+        ));
+    }
+    gain
 }
 
 /// Root mean square of the normalised errors on selection data; 0 without such data.

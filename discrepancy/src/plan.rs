@@ -1,7 +1,7 @@
 //! The experiment that would separate two models which the data cannot tell apart: variations of those there are, judged by
 //! how far the models then differ.
 
-use mops_core::{Case, Input, Job, Model};
+use mops_core::{Case, Input, Job};
 
 use crate::search::Trial;
 
