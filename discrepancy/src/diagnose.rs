@@ -3,14 +3,21 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mops_core::{Effect, Mistake, Study, Watch};
+use mops_core::{Effect, Mistake, Role, Study, Watch};
 
 use crate::base;
-use crate::diagnosis::{Diagnosis, Found, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict};
+use crate::diagnosis::{
+    Diagnosis, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue, Verdict,
+};
 use crate::fit::dot;
+use crate::held_out::predictive_gain;
+use crate::locate::{Located, locate};
+use crate::plan::separating;
 use crate::repaired::Calibrated;
-use crate::screen::Screened;
+use crate::screen::{Scene, Screened};
+
 use crate::search::{Limits, Round, Search, Trial};
+use crate::stopgap::stopgap;
 use crate::subject::Subject;
 use crate::weigh::{Dispersion, by_chance, criterion, probabilities};
 
@@ -27,6 +34,12 @@ pub struct Options {
 
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 const UNEXPLAINED: f64 = 1.1;
+
+/// Share by which a free signal must lower the error on samples left out to count as something that is missing.
+const FORETOLD: f64 = 0.1;
+
+/// The same of its forecasts of selection data, with parameters from calibration data: these are uncertain.
+const MISTAKEN: f64 = 1.5;
 
 /// Finds what the model of a calibration study lacks.
 ///
@@ -54,7 +67,10 @@ pub fn diagnose(
     let mut rounds: Vec<Round<'_>> = Vec::new();
     let mut p_value = 1.0;
     let base = search.over_or_in_windows(&declared);
-    let mut current = base;
+    watch.stage("where the residual comes from", 0.08);
+    let scene = Scene::new(&base.fit, &base.variant.model, &base.fitted);
+    let located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
+    let mut current = search.again(&base).ok_or_else(lost)?;
     #[allow(clippy::cast_precision_loss)]
     for k in 0..options.max_effects {
         if watch.wants_stop() {
@@ -82,19 +98,51 @@ pub fn diagnose(
     if last.added.len() > 1 {
         last = search.pruned(last, options.level);
     }
-    let (last, held) = search.without_declared(last);
+    let (mut last, held) = search.without_declared(last);
     watch.stage("the repaired model", 0.9);
-    let after = search.calibrate(&last, &held).ok_or_else(lost)?;
+    let mut after = search.calibrate(&last, &held).ok_or_else(lost)?;
 
-    let verdict = match (last.added.is_empty(), last.fitted.normalised() > UNEXPLAINED) {
+    let mut notes = subject.notes.clone();
+    let left = if last.fitted.normalised() > UNEXPLAINED { left(&last, &mut notes) } else { 0.0 };
+    let missed = left > FORETOLD || (!last.added.is_empty() && forecast(&after, &subject) > MISTAKEN);
+    let verdict = match (last.added.is_empty(), missed) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,
     };
+    let mut unexplained = None;
+    if verdict == Verdict::Unexplained {
+        unexplained = located.first().and_then(Located::unexplained);
+        for place in located.iter().take(2) {
+            let Some((table, found)) = stopgap(&search, &base, place) else { continue };
+            let Some(table) = search.over_whole(&table) else { continue };
+            let Some(calibrated) = search.calibrate(&table, &[]) else { continue };
+            let better = match forecast(&after, &subject) {
+                now if now > 0.0 => forecast(&calibrated, &subject) < now,
+                _ => table.fitted.chi2 < last.fitted.chi2,
+            };
+            if better {
+                (after, last, unexplained) = (calibrated, table, Some(found));
+            }
+        }
+    }
+    let is_table = |index: &usize| last.added[*index].candidate.effect.name() == "table";
     let ranking = ranking(&rounds, &last);
     let dispersion = Dispersion::of(&last);
-    let found: Vec<Found> =
-        (0..last.added.len()).map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion)).collect();
+    let found: Vec<Found> = (0..last.added.len())
+        .filter(|index| !is_table(index))
+        .map(|index| found(index, &last, &after, &rounds, &ranking, &dispersion))
+        .collect();
+    let next_experiment = rounds.iter().zip(&found).find_map(|(round, found)| {
+        let rival = found.indistinguishable.first()?;
+        let trial = |t: &&Trial<'_>| {
+            let last = t.added.last();
+            last.is_some_and(|a| a.candidate.effect.name() == rival.effect && a.candidate.place() == rival.place)
+        };
+        let names =
+            [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
+        separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])
+    });
     let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
     let removed = held.iter().map(|k| crate::diagnosis::Removed { term: names(k), place: String::new() }).collect();
     let probability = match verdict {
@@ -109,18 +157,43 @@ pub fn diagnose(
         found,
         removed,
         ranked: ranking,
-        unexplained: None,
-        next_experiment: None,
+        unexplained,
+        next_experiment,
         before: before.errors(&subject.measurements),
         after: after.errors(&subject.measurements),
         parameters: moves(&subject, &before, &after),
-        noticeable: Vec::new(),
-        evidence: Vec::new(),
+        noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject) } else { Vec::new() },
+        evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
-        notes: subject.notes.clone(),
+        notes,
         starts: starts(&subject, &after),
         simulations: simulations.load(Ordering::Relaxed),
     })
+}
+
+/// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out.
+fn left(last: &Trial<'_>, notes: &mut Vec<String>) -> f64 {
+    let model = &last.variant.model;
+    let Some(scene) = Scene::new(&last.fit, model, &last.fitted) else { return 1.0 };
+    let Some(place) = locate(&last.fit, model, &scene).into_iter().next() else { return 0.0 };
+    let gain = predictive_gain(&place, &last.fit, model, &scene);
+    if gain > 0.0 {
+        notes.push(format!(
+            "{:.2} times the noise is left; a free signal at {} would lower the error on samples left out by {:.0} %",
+            last.fitted.normalised(),
+            place.evidence.place,
+            100.0 * gain
+        ));
+    }
+    gain
+}
+
+/// Root mean square of the normalised errors on selection data; 0 without such data.
+#[allow(clippy::cast_precision_loss)]
+fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
+    let errors = after.errors(&subject.measurements);
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
@@ -224,6 +297,31 @@ fn found(
         indistinguishable: rivals,
         place,
     }
+}
+
+/// The smallest strengths that would have been noticed, of the effects whose size is one number.
+fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
+    let Some(round) = rounds.first() else { return Vec::new() };
+    let one = |s: &Screened| {
+        let candidate = &s.added.candidate;
+        let strength = &candidate.effect.strengths()[0];
+        let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added));
+        let parameter = &mops_core::Model::interface(model.model.as_ref()).parameters[model.first[0]];
+        Some(Noticeable {
+            effect: candidate.effect.name().to_owned(),
+            place: candidate.place(),
+            strength: StrengthValue {
+                name: strength.name.to_owned(),
+                value: s.noticed.filter(|n| n.is_finite())?,
+                unit: parameter.variable.unit.to_string(),
+                std_error: None,
+                interval95: None,
+            },
+        })
+    };
+    let mut all: Vec<&Screened> = round.screened.iter().filter(|s| s.added.candidate.effect.rarity() == 0).collect();
+    all.sort_by_key(|s| s.added.candidate.place());
+    all.into_iter().filter_map(one).collect()
 }
 
 fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<ParameterMove> {

@@ -82,15 +82,20 @@ pub struct Family {
     blocks: Vec<Block>,
 }
 
-/// Knots of a function of one argument.
-const KNOTS: u32 = 13;
+/// Knots of a function of one argument; of the speed, where they are dense about 0; of the time, of which a function with
+/// many would be free.
+const KNOTS: u32 = 25;
+const SPEEDS: u32 = 14;
+const TIMES: u32 = 13;
+/// Most points of a table.
+const POINTS: u32 = 15;
 
 impl Family {
     /// Signals that are free over time: about `total` knots, shared out among the pieces with these spans, at most
     /// one for two samples.
     #[allow(clippy::cast_precision_loss)]
     pub fn free(spans: &[[f64; 2]], samples: &[usize], total: usize, first: usize) -> Self {
-        let share = (total / spans.len().max(1)).max(12);
+        let share = (total / spans.len().max(1)).max(8);
         let counts: Vec<usize> = samples.iter().map(|n| share.min(n / 2).max(4)).collect();
         let even = |n: usize, [from, to]: [f64; 2]| {
             (0..n).map(move |k| from + (to - from) * k as f64 / (n - 1) as f64).collect()
@@ -102,7 +107,12 @@ impl Family {
         });
         let spacing = 1.0 / counts.iter().max().map_or(1.0, |&n| (n - 1) as f64);
         let lengths = [1.5, 5.0, 20.0, 80.0].map(|l| l * spacing).to_vec();
-        Self { over: Over::Free, columns: first..first + counts.iter().sum::<usize>(), lengths, blocks: blocks.collect() }
+        Self {
+            over: Over::Free,
+            columns: first..first + counts.iter().sum::<usize>(),
+            lengths,
+            blocks: blocks.collect(),
+        }
     }
 
     /// Signals that are a function of an argument, over the range of its values; `None` where that does not change.
@@ -113,16 +123,22 @@ impl Family {
         }
         let (knots, places): (Vec<f64>, Vec<f64>) = if over == Over::Speed && low < 0.0 && high > 0.0 {
             // Friction jumps where the speed changes its sign: an even number of knots, dense about 0.
-            let side = (KNOTS + 1) / 2;
+            let side = SPEEDS / 2;
             let shares = (1..=side).map(|k| f64::from(2 * k - 1) / f64::from(2 * side - 1));
             let back = shares.clone().rev().map(|s| (low * s.powf(1.7), -0.5 * s));
             back.chain(shares.map(|s| (high * s.powf(1.7), 0.5 * s))).unzip()
         } else {
-            let shares = (0..KNOTS).map(|k| f64::from(k) / f64::from(KNOTS - 1));
+            let count = if over == Over::Time { TIMES } else { KNOTS };
+            let shares = (0..count).map(|k| f64::from(k) / f64::from(count - 1));
             shares.map(|s| (low + s * (high - low), s)).unzip()
         };
         let lengths = vec![0.2, 0.7, 3.0];
-        Some(Self { over, columns: first..first + knots.len(), lengths, blocks: vec![Block { piece: None, knots, places }] })
+        Some(Self {
+            over,
+            columns: first..first + knots.len(),
+            lengths,
+            blocks: vec![Block { piece: None, knots, places }],
+        })
     }
 
     /// The root of the covariance of the values at the knots for a length.
@@ -174,6 +190,33 @@ impl Family {
     }
 }
 
+/// A table with at most 15 of its points, more of them where it bends more: the share of points in an interval goes with the
+/// root of the second derivative, which makes the largest error smallest.
+///
+/// Source: C. de Boor, A Practical Guide to Splines (1978), chapter III.
+pub fn thinned(table: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let n = table.len();
+    if n <= POINTS as usize {
+        return table;
+    }
+    let slope = |k: usize| (table[k + 1][1] - table[k][1]) / (table[k + 1][0] - table[k][0]);
+    let bend = |k: usize| if k == 0 || k + 1 >= n { 0.0 } else { (slope(k) - slope(k - 1)).abs() };
+    let bends: Vec<f64> = (0..n - 1).map(|k| (0.5 * (bend(k) + bend(k + 1))).sqrt()).collect();
+    let total: f64 = bends.iter().sum();
+    #[allow(clippy::cast_precision_loss)]
+    let least = if total > 0.0 { 0.5 * total / bends.len() as f64 } else { 1.0 };
+    let mut sums = vec![0.0];
+    for bend in &bends {
+        sums.push(sums[sums.len() - 1] + bend + least);
+    }
+    let step = sums[n - 1] / f64::from(POINTS - 1);
+    let at = |target: f64| {
+        let (k, share) = between(&sums, target);
+        [0, 1].map(|i| table[k][i] + share * (table[k + 1][i] - table[k][i]))
+    };
+    (0..POINTS).map(|k| at(f64::from(k) * step)).collect()
+}
+
 /// The knot before a value, and the share of the way to the next; values outside count as the nearest knot.
 fn between(knots: &[f64], x: f64) -> (usize, f64) {
     let k = knots.partition_point(|&knot| knot <= x).clamp(1, knots.len() - 1) - 1;
@@ -187,13 +230,24 @@ mod tests {
     #[test]
     fn a_function_is_linear_between_its_knots() {
         let family = Family::function(Over::Position, [-1.0, 3.0].into_iter(), 2).expect("it changes");
-        let values: Vec<f64> = [0.0; 2].into_iter().chain(family.table(&[0.0; 15]).iter().map(|p| 2.0 * p[0])).collect();
+        let values: Vec<f64> =
+            [0.0; 2].into_iter().chain(family.table(&[0.0; 27]).iter().map(|p| 2.0 * p[0])).collect();
         let looks = [-2.0, -1.0, 0.1, 2.9, 5.0].map(|position| Look { position, ..Look::default() });
         let mut signal = vec![0.0; 5];
         family.add(&values, 0, &looks, &mut signal);
         for (s, expected) in signal.iter().zip([-2.0, -2.0, 0.2, 5.8, 6.0]) {
             assert!((s - expected).abs() < 1e-12, "{signal:?}");
         }
+    }
+
+    #[test]
+    fn a_thinned_table_keeps_its_ends_and_its_points_where_it_bends() {
+        let bump = |x: f64| (-((x - 0.3) / 0.1).powi(2)).exp();
+        let table: Vec<[f64; 2]> = (0..=40).map(|k| f64::from(k) / 40.0).map(|x| [x, bump(x)]).collect();
+        let few = thinned(table);
+        assert_eq!((few.len(), few[0][0], few[14][0]), (15, 0.0, 1.0));
+        let near = few.iter().filter(|p| (p[0] - 0.3).abs() < 0.2).count();
+        assert!(near >= 8, "{few:?}");
     }
 
     #[test]

@@ -92,8 +92,6 @@ pub struct Fitted {
     pub count: usize,
     /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1.
     pub covariance: DMatrix<f64>,
-    /// Which globals ended at a bound.
-    pub at_bound: Vec<bool>,
 }
 
 impl Fitted {
@@ -317,9 +315,7 @@ impl Fit<'_> {
         }
         let held = self.held(&point, &normal.gradient);
         let covariance = self.covariance(&point, &normal, &held);
-        let at_bound =
-            (0..self.globals.len()).map(|k| held[k] || self.globals[k].bounds.contains(&point.globals[k])).collect();
-        Some(Fitted { chi2: normal.chi2, count, covariance, at_bound, point })
+        Some(Fitted { chi2: normal.chi2, count, covariance, point })
     }
 
     /// Covariance of the globals for residuals of size 1, the locals eliminated.

@@ -182,7 +182,8 @@ mod tests {
         let (matrix, pull) = normals.whitened(&prior);
         let (q, diagonal, off) = SymmetricTridiagonal::new(matrix).unpack();
         let pull = q.tr_mul(&pull);
-        let of = |v: f64| normals.likelihood(&diagonal, &off, &pull, v) - normals.likelihood(&diagonal, &off, &pull, 0.0);
+        let of =
+            |v: f64| normals.likelihood(&diagonal, &off, &pull, v) - normals.likelihood(&diagonal, &off, &pull, 0.0);
         let full = |v: f64| {
             let shaped = &columns * &root;
             let covariance = DMatrix::identity(7, 7) + &shaped * shaped.transpose() * v;

@@ -34,9 +34,8 @@ pub fn predictive_gain(located: &Located, fit: &Fit<'_>, model: &WithEffects, sc
         let folds = folds(fit);
         let (mut with, mut without) = (0.0, 0.0);
         for fold in 0..FOLDS {
-            let rows = |kept: bool| -> Vec<usize> {
-                (0..folds.len()).filter(|&i| (folds[i] == fold) != kept).collect()
-            };
+            let rows =
+                |kept: bool| -> Vec<usize> { (0..folds.len()).filter(|&i| (folds[i] == fold) != kept).collect() };
             let (seen, left) = (rows(true), rows(false));
             with += error(&design, &residuals, signals, &seen, &left)?;
             without += error(&basis, &residuals, 0, &seen, &left)?;

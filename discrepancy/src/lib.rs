@@ -14,9 +14,11 @@ mod hygiene;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
+mod plan;
 mod repaired;
 mod screen;
 mod search;
+mod stopgap;
 mod subject;
 #[cfg(test)]
 mod testing;

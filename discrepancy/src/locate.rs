@@ -14,7 +14,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::diagnosis::{Curve, Evidence, Unexplained};
-use crate::family::Over;
+use crate::family::{Over, thinned};
 use crate::fit::Fit;
 use crate::screen::Scene;
 use crate::unknown::{Term, Unknown};
@@ -37,7 +37,7 @@ pub struct Located {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Of what.
-    pub over: &'static str,
+    pub over: Over,
     /// Logarithm of the marginal likelihood over that of the model without it.
     pub evidence: f64,
     /// Share of the residual above the noise that it explains.
@@ -53,8 +53,7 @@ const SAME: f64 = 0.5;
 pub fn locate(fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Vec<Located> {
     let ports = &model.model().interface().ports;
     let places: Vec<&Port> = ports.iter().filter(|port| port.kind(ports).is_some()).collect();
-    let mut all: Vec<Located> =
-        places.into_par_iter().filter_map(|port| located(port, fit, model, scene)).collect();
+    let mut all: Vec<Located> = places.into_par_iter().filter_map(|port| located(port, fit, model, scene)).collect();
     let best = all.iter().map(|l| l.evidence.evidence).fold(0.0, f64::max);
     let first = all.iter().position(|l| l.evidence.evidence > best - SAME);
     let first = first.map(|first| all.remove(first));
@@ -73,13 +72,13 @@ impl Located {
         self.variance
     }
 
-    /// The stopgap: a table over what explains most.
-    pub fn stopgap(&self) -> Option<Unexplained> {
+    /// A table over what explains most, to first order.
+    pub fn unexplained(&self) -> Option<Unexplained> {
         let table = self.tables.first()?;
         Some(Unexplained {
             place: self.evidence.place.clone(),
             share: self.evidence.share,
-            over: table.over.to_owned(),
+            over: table.over.name().to_owned(),
             table: table.points.clone(),
         })
     }
@@ -136,10 +135,10 @@ fn table(unknown: &Unknown, choice: &Choice) -> Option<Table> {
     let estimate = unknown.normals.estimate(&unknown.prior(&choice.terms)?, choice.variance)?;
     let family = &unknown.families[choice.terms[0].family];
     Some(Table {
-        over: family.over.name(),
+        over: family.over,
         evidence: choice.evidence,
         share: share(unknown, estimate.coefficients.as_slice(), estimate.freedom),
-        points: family.table(estimate.coefficients.as_slice()),
+        points: thinned(family.table(estimate.coefficients.as_slice())),
     })
 }
 

@@ -25,6 +25,9 @@ pub struct Scene {
     pub basis: Vec<Vec<f64>>,
 }
 
+/// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
+const NOTICED: f64 = 21.0;
+
 /// A screened candidate.
 #[derive(Clone)]
 pub struct Screened {
@@ -34,6 +37,8 @@ pub struct Screened {
     pub gain: f64,
     /// Share of its trace that the unknowns absorb.
     pub absorbed: f64,
+    /// The smallest first strength that would have been noticed, where what it adds is proportional to it.
+    pub noticed: Option<f64>,
     /// Its trace with that taken out, of length 1.
     pub direction: Vec<f64>,
     /// Directions that were looked in, as many as independent ones: neighbouring shapes look alike.
@@ -177,17 +182,18 @@ fn best_of(
         if linear {
             let allowed = |f: f64| f * strengths[0] >= first.bounds[0] && f * strengths[0] <= first.bounds[1];
             if !allowed(factor) {
-                continue;
+                factor = 0.0;
             }
         } else {
             factor = factor.clamp(0.0, 1.5);
         }
         let gain = 2.0 * factor * along - factor * factor * rest;
-        if gain <= 0.0 || best.as_ref().is_some_and(|best| best.gain >= gain) {
+        if best.as_ref().is_some_and(|best| best.gain >= gain) {
             continue;
         }
         let mut strengths = strengths.clone();
-        if linear {
+        let noticed = linear.then(|| strengths[0].abs() * (NOTICED / rest).sqrt());
+        if linear && factor != 0.0 {
             strengths[0] *= factor;
         }
         let length = rest.sqrt();
@@ -195,6 +201,7 @@ fn best_of(
             added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
             gain,
             absorbed: 1.0 - rest / size,
+            noticed,
             direction: left.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),
         });

@@ -160,9 +160,10 @@ impl<'a> Search<'a> {
     pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
         let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
         let screened = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene);
-        let mut chosen: Vec<usize> = (0..screened.len().min(self.limits.refits)).collect();
+        let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
+        let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
         // Of every place the best, so that no place is lost for a bad linearisation.
-        for (i, s) in screened.iter().enumerate() {
+        for (i, s) in screened.iter().enumerate().take(gaining) {
             let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
             if chosen.len() < 2 * self.limits.refits
                 && chosen.iter().filter(|k| same(k)).count() < 2
@@ -184,17 +185,14 @@ impl<'a> Search<'a> {
                 self.from(from, &added, 5)
             })
             .collect();
-        // Those that lead after a few steps go on to the end.
-        let mut order: Vec<usize> = (0..started.len()).collect();
-        order.sort_by(|&a, &b| started[a].score().total_cmp(&started[b].score()));
-        let leading = &order[..order.len().min(self.limits.finalists)];
-        let mut trials: Vec<Trial<'a>> = started
-            .into_iter()
-            .enumerate()
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .filter_map(|(i, trial)| if leading.contains(&i) { trial.continued(self) } else { Some(trial) })
-            .collect();
+        // Those that lead after a few steps go on, and the best of them to the end.
+        let mut trials = started;
+        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
+            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            let rest = trials.split_off(trials.len().min(count));
+            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
+            trials.extend(rest);
+        }
         trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
@@ -361,9 +359,9 @@ impl<'a> Trial<'a> {
         self
     }
 
-    /// Fitted to the end.
-    fn continued(self, _: &Search<'a>) -> Option<Self> {
-        let fitted = self.fit.solve(self.fitted.point.clone(), 40)?;
+    /// Fitted further.
+    fn continued(self, iterations: usize) -> Option<Self> {
+        let fitted = self.fit.solve(self.fitted.point.clone(), iterations)?;
         Some(Self { fitted, ..self }.read())
     }
 
@@ -378,11 +376,5 @@ impl<'a> Trial<'a> {
     pub fn score(&self) -> f64 {
         let rarity: f64 = self.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
         self.fitted.chi2 + self.unknowns() as f64 * (self.fitted.count as f64).ln() + 2.0 * rarity
-    }
-
-    /// Its effects in short.
-    pub fn name(&self) -> String {
-        let names = self.added.iter().map(|a| format!("{} at {}", a.candidate.effect.name(), a.candidate.place()));
-        names.collect::<Vec<_>>().join(" + ")
     }
 }

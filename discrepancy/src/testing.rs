@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
 use mops_core::{
-    Case, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale, Study, Task, Tasks, Tuner,
-    Unit, stream,
+    Case, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale, Study, Task, Tasks,
+    Tuner, Unit, stream,
 };
 use mops_models::equations::EquationsOptions;
 use rand_distr::{Distribution, Normal};

@@ -1,6 +1,6 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Effect, Port, PortKind};
+use mops_core::{Acting, At, Effect, Port};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
@@ -257,9 +257,9 @@ fn signal(
     Some((column, signal))
 }
 
-/// Moves the states of an effect from one node to the next, in four steps of the classical Runge-Kutta method.
+/// Moves the states of an effect from one node to the next, in two steps of the classical Runge-Kutta method.
 fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &mut [f64]) {
-    const PARTS: u32 = 4;
+    const PARTS: u32 = 2;
     let between = |s: f64| {
         let mix = |a: f64, b: f64| a + s * (b - a);
         At {
@@ -276,21 +276,25 @@ fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &m
     };
     let h = (to.t - from.t) / f64::from(PARTS);
     let n = z.len();
-    let mut k = vec![vec![0.0; n]; 4];
+    // Effects have few states: nothing is allocated here, where screening spends its time.
+    let mut k = [[0.0; MOST_STATES]; 4];
     for part in 0..PARTS {
         let s = |c: f64| (f64::from(part) + c) / f64::from(PARTS);
         for (stage, c) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
-            let moved: Vec<f64> =
-                (0..n).map(|i| if stage == 0 { z[i] } else { z[i] + c * h * k[stage - 1][i] }).collect();
-            let mut dz = vec![0.0; n];
-            acting.rates(&between(s(c)), &moved, &mut dz);
-            k[stage] = dz;
+            let mut moved = [0.0; MOST_STATES];
+            for i in 0..n {
+                moved[i] = if stage == 0 { z[i] } else { z[i] + c * h * k[stage - 1][i] };
+            }
+            acting.rates(&between(s(c)), &moved[..n], &mut k[stage][..n]);
         }
         for i in 0..n {
             z[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
         }
     }
 }
+
+/// The largest number of states that an effect may have to be screened.
+const MOST_STATES: usize = 8;
 
 /// What an effect changes at a sensor, in units of the noise.
 fn measured(
@@ -346,14 +350,4 @@ fn measured(
             (value - y[k]) / s.noise
         })
         .collect()
-}
-
-/// Whether a place is a sensor.
-pub fn is_sensor(port: &Port) -> bool {
-    matches!(port, Port::Sensor { .. })
-}
-
-/// The sort of a port, for ranking by place.
-pub fn kind(port: &Port, ports: &[Port]) -> Option<PortKind> {
-    port.kind(ports)
 }

@@ -6,7 +6,7 @@
 
 use mops_core::{Failure, Job, Port};
 use mops_models::{Moment, WithEffects};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::fit::{Fit, Point};
 
@@ -137,7 +137,8 @@ impl Trajectory {
         let mut residuals = Vec::new();
         for ((samples, &row), noise) in self.samples.iter().zip(&self.rows).zip(&self.noise) {
             residuals.extend(samples.iter().map(|&knot| {
-                let node = (2 * knot).saturating_sub(1).min(self.moments.len() - 1);
+                // What jumps at a sample has jumped when it is taken.
+                let node = (2 * knot).min(self.moments.len() - 1);
                 let m = &self.moments[node];
                 let mut y = 0.0;
                 for i in 0..n {
@@ -147,28 +148,6 @@ impl Trajectory {
             }));
         }
         residuals
-    }
-
-    /// The states at the knots for a unit pulse of one node's signal: the columns of what a free force does.
-    pub fn transition(&self, interval: usize) -> &DMatrix<f64> {
-        &self.intervals[interval].transition
-    }
-
-    /// What a constant unit signal over an interval adds to the state at its end.
-    pub fn gain(&self, interval: usize, column: usize) -> DVector<f64> {
-        let [first, second] = &self.intervals[interval].gains;
-        first.column(column) + second.column(column)
-    }
-
-    /// Samples that lie at each knot: series, index of the sample, and the row of the outputs.
-    pub fn samples_at(&self) -> Vec<Vec<(usize, usize, usize)>> {
-        let mut at = vec![Vec::new(); self.knots.len()];
-        for (series, (samples, &row)) in self.samples.iter().zip(&self.rows).enumerate() {
-            for (index, &knot) in samples.iter().enumerate() {
-                at[knot].push((series, index, row));
-            }
-        }
-        at
     }
 }
 
@@ -270,8 +249,10 @@ mod tests {
         for (s, response) in piece.series.iter().zip(response.chunks(200)) {
             let expected = tangents[0].trace(&s.name).sample(&s.times);
             for ((r, e), t) in response.iter().zip(&expected).zip(&s.times) {
-                // The sample at the start has no node before it.
-                assert!(*t == 0.0 || (r * s.noise - e).abs() < 2e-3 * (1.0 + e.abs()), "{} {t}: {r} {e}", s.name);
+                let r = r * s.noise;
+                // The output `a` is taken at a node, a fifth of a step after the sample.
+                let allowed = if s.name == "a" { 2e-2 } else { 1e-5 };
+                assert!((r - e).abs() < allowed * (1.0 + e.abs()), "{} {t}: {r} {e}", s.name);
             }
         }
     }

@@ -11,12 +11,10 @@ use crate::screen::Scene;
 use crate::trace_of::{Spot, spot};
 
 /// Knots of a free signal over all pieces.
-const FREE: usize = 120;
+const FREE: usize = 100;
 
 /// A place with the unknown signals that may act there.
 pub struct Unknown {
-    /// Where it is in each piece; `None` for a sensor without data.
-    spots: Vec<Option<Spot>>,
     /// What it looks like in each piece, at the times of the signal.
     pub looks: Vec<Vec<Look>>,
     /// The families of signals.
@@ -48,11 +46,8 @@ impl Unknown {
         let looks: Vec<Vec<Look>> = (0..spots.len()).map(|piece| looks(spots[piece], piece, fit, scene)).collect();
         let span = |piece: &Piece| [piece.case.begins, piece.case.begins + piece.horizon];
         let spans: Vec<[f64; 2]> = fit.pieces.iter().map(span).collect();
-        let samples: Vec<usize> = fit
-            .pieces
-            .iter()
-            .map(|piece| piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0))
-            .collect();
+        let samples: Vec<usize> =
+            fit.pieces.iter().map(|piece| piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0)).collect();
         let mut families = vec![Family::free(&spans, &samples, FREE, 0)];
         for over in [Over::Position, Over::Speed, Over::Input, Over::Time] {
             let first = families[families.len() - 1].columns.end;
@@ -84,7 +79,7 @@ impl Unknown {
             chi2: dot(residuals.as_slice(), residuals.as_slice()),
             freedom: rows.saturating_sub(basis.ncols()).max(1) as f64,
         };
-        Some(Self { spots, looks, families, columns, residuals, normals })
+        Some(Self { looks, families, columns, residuals, normals })
     }
 
     /// What is expected of a sum of families; `None` where a length is too long for the numbers.

@@ -474,16 +474,22 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+        let remembers = self.actors.iter().any(|actor| !actor.memory.is_empty());
         // What is remembered is moved up to the break, and across it.
-        if self.started {
+        if remembers && self.started {
             self.remember(t, x);
         }
         self.pass(t, x);
-        self.remember(t, x);
+        if remembers {
+            self.remember(t, x);
+        }
+        let first = !std::mem::replace(&mut self.started, true);
+        if !first && self.guards() == 0 {
+            return;
+        }
+        self.settle_contacts(t, x, None);
         let (mut u, mut w) = (Vec::new(), Vec::new());
         let mut dx = vec![S::from(0.0); self.own];
-        self.started = true;
-        self.settle_contacts(t, x, None);
         self.balance(t, x, &mut u, &mut w, &mut dx);
         self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
     }

@@ -1,0 +1,78 @@
+//! The experiment that would separate two models which the data cannot tell apart: variations of those there are, judged by
+//! how far the models then differ.
+
+use mops_core::{Case, Input, Job};
+
+use crate::search::Trial;
+
+/// Factors by which inputs or start values are varied.
+const FACTORS: [f64; 4] = [0.3, 0.5, 2.0, 3.0];
+
+/// What would separate two trials that were fitted to the same data, in words; `None` where no variation does better than
+/// the experiments themselves.
+pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<String> {
+    if a.windows != 1 || b.windows != 1 {
+        return None;
+    }
+    let mut best: Option<(f64, f64, String)> = None;
+    for piece in 0..a.fit.pieces.len() {
+        let name = &a.fit.subject.measurements[a.fit.pieces[piece].measurement].name;
+        let Some(now) = difference(a, b, piece, 1.0, 1.0) else { continue };
+        let driven = !a.fit.pieces[piece].case.inputs.is_empty();
+        for factor in FACTORS {
+            let inputs = driven.then(|| (factor, 1.0, "its inputs"));
+            for (input, start, what) in inputs.into_iter().chain([(1.0, factor, "its start values")]) {
+                let Some(then) = difference(a, b, piece, input, start) else { continue };
+                if then > 1.5 * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
+                    best = Some((then, now, format!("`{name}` again with {what} {factor} times as large")));
+                }
+            }
+        }
+    }
+    let (then, now, what) = best?;
+    Some(format!(
+        "{what}: {} and {} would then differ by {then:.1} times the noise, now by {now:.1}",
+        names[0], names[1]
+    ))
+}
+
+/// Root mean square of the difference of two models in a varied experiment, in units of the noise.
+#[allow(clippy::cast_precision_loss)]
+fn difference(a: &Trial<'_>, b: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<f64> {
+    let [x, y] = [outputs(a, piece, input, start)?, outputs(b, piece, input, start)?];
+    let square: f64 = x.iter().zip(&y).map(|(x, y)| (x - y).powi(2)).sum();
+    let rms = (square / x.len().max(1) as f64).sqrt();
+    rms.is_finite().then_some(rms)
+}
+
+fn outputs(trial: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<Vec<f64>> {
+    let p = &trial.fit.pieces[piece];
+    let mut parameters = trial.fit.parameters(piece, &trial.fitted.point);
+    let own = trial.fit.subject.measurements[p.measurement].locals.len();
+    p.locals[..own].iter().for_each(|local| parameters[local.parameter] *= start);
+    let inputs = p.case.inputs.iter().map(|(name, given)| (name.clone(), scaled(given, input)));
+    let case = Case { inputs: inputs.collect(), ..p.case.clone() };
+    let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
+    signals.sort_unstable();
+    signals.dedup();
+    let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: p.horizon };
+    let analysis = trial.fit.model.analyse(&job).ok()?;
+    let sample = |s: &crate::subject::Series| {
+        let trace = analysis.trace(&s.name).sample(&s.times);
+        trace.into_iter().map(|y| y / s.noise).collect::<Vec<f64>>()
+    };
+    Some(p.series.iter().flat_map(sample).collect())
+}
+
+fn scaled(input: &Input, by: f64) -> Input {
+    match input {
+        Input::Constant(value) => Input::Constant(value * by),
+        Input::Step { time, before, after } => Input::Step { time: *time, before: before * by, after: after * by },
+        Input::Sine { amplitude, frequency, phase, offset } => {
+            Input::Sine { amplitude: amplitude * by, frequency: *frequency, phase: *phase, offset: offset * by }
+        }
+        Input::Sampled { times, values, hold } => {
+            Input::Sampled { times: times.clone(), values: values.iter().map(|v| v * by).collect(), hold: *hold }
+        }
+    }
+}
