@@ -1,0 +1,88 @@
+//! A few cases of the benchmark of the diagnosis: simulated experiments whose truth is known.
+
+use mops::discrepancy::{Diagnosis, Verdict};
+use mops::file::Files;
+use mops::{Options, catalogue};
+use mops_testbed::{Missing, Trial, generate};
+
+/// The data files of a case.
+struct Data<'a>(&'a Trial);
+
+impl Files for Data<'_> {
+    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
+        let file = self.0.files.iter().find(|(name, _)| name == path);
+        Ok(file.expect("the case has it").1.as_bytes().to_vec())
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+/// The first case that there is, over a few seeds.
+fn case(plant: &str, missing: Missing<'_>, size: f64) -> Trial {
+    (1..20).find_map(|seed| generate(plant, missing, size, seed)).expect("some seed makes one")
+}
+
+/// What mops says of a case; with another order of the catalogue and another seed where `shuffled`.
+fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
+    let mut catalogue = catalogue();
+    if shuffled {
+        catalogue.effects.reverse();
+        catalogue.effects.rotate_left(17);
+    }
+    let file = mops::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
+    let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
+    study.seed = if shuffled { 4711 } else { 1 };
+    let options = Options { effects: catalogue.effects, ..Options::default() };
+    let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
+    solved.diagnosis.expect("that was the task")
+}
+
+/// Effects and places found.
+fn found(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
+    diagnosis.found.iter().map(|found| (found.effect.as_str(), found.place.as_str())).collect()
+}
+
+#[test]
+fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
+    for (plant, effect, [name, told]) in [
+        ("servo", "coulomb-friction", ["c", "torque"]),
+        ("spring", "cubic-stiffness", ["k", "stiffness"]),
+        ("tanks", "leak", ["k", "flow"]),
+    ] {
+        let case = case(plant, Missing::Effects(&[effect]), 5.0);
+        let truth = &case.truth.effects[0];
+        let diagnosis = diagnosis(&case, false);
+        assert_eq!(diagnosis.verdict, Verdict::Effect, "{}", case.name);
+        assert_eq!(found(&diagnosis), [(effect, truth.place.as_str())], "{}", case.name);
+        let value = &diagnosis.found[0].strengths[0];
+        let expected = truth.strengths.iter().find(|(n, _)| n == told).expect("it is told").1;
+        assert!(value.name == name && (value.value / expected - 1.0).abs() < 0.2, "{}: {value:?}", case.name);
+        for error in &diagnosis.after {
+            assert!(error.normalised < 1.15, "{}: {} leaves {}", case.name, error.name, error.normalised);
+        }
+    }
+}
+
+#[test]
+fn where_nothing_is_missing_nothing_is_found() {
+    for plant in ["pendulum", "servo"] {
+        let case = case(plant, Missing::Nothing, 0.0);
+        let diagnosis = diagnosis(&case, false);
+        assert_eq!((diagnosis.verdict, found(&diagnosis)), (Verdict::None, Vec::new()), "{}", case.name);
+        assert!(diagnosis.p_value > 0.01, "{}: {}", case.name, diagnosis.p_value);
+    }
+}
+
+#[test]
+fn neither_the_order_of_the_catalogue_nor_the_seed_changes_the_verdict() {
+    for case in [
+        case("servo", Missing::Effects(&["coulomb-friction"]), 5.0),
+        case("axis", Missing::Effects(&["quadratic-drag"]), 2.0),
+        case("pendulum", Missing::Nothing, 0.0),
+    ] {
+        let [one, other] = [false, true].map(|shuffled| diagnosis(&case, shuffled));
+        assert_eq!((one.verdict, found(&one)), (other.verdict, found(&other)), "{}", case.name);
+    }
+}
