@@ -437,8 +437,7 @@ impl<'a> Trial<'a> {
 
     /// Number of unknowns that its effects bring in.
     pub fn unknowns(&self) -> usize {
-        let shared = self.fitted.point.globals.len() - self.fit.subject.globals.len();
-        shared
+        self.fitted.point.globals.len() - self.fit.subject.globals.len()
     }
 
     /// The Bayesian information criterion up to a constant: lower is better; rarer effects pay a little more.
