@@ -130,11 +130,9 @@ pub fn diagnose(
             let mut order: Vec<_> = without.added.clone();
             order.push(last.added[index].clone());
             let same = |t: &Trial<'_>| t.added.last().is_some_and(|a| a.candidate.is(&last.added[index].candidate));
-            if !round.trials.iter().any(same) {
-                if let Some(own) = search.from(&without, &order, 40) {
-                    round.trials.push(own);
-                }
-            }
+            round.trials.retain(|t| !same(t));
+            // The effect itself stands where the whole model ended, not where a new fit from nothing may have stopped.
+            round.trials.extend(search.from(&last, &order, 10));
             let of = Dispersion::of(&last);
             round.trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
             given.push(round);
@@ -166,9 +164,11 @@ pub fn diagnose(
             let Some((table, found)) = stopgap(&search, &base, place) else { continue };
             let Some(table) = search.over_whole(&table) else { continue };
             let Some(calibrated) = search.calibrate(&table, &[]) else { continue };
-            let better = match forecast(&after, &subject) {
-                now if now > 0.0 => forecast(&calibrated, &subject) < now,
-                _ => table.fitted.chi2 < last.fitted.chi2,
+            let now = forecast(&after, &subject);
+            let better = if last.added.is_empty() {
+                table.fitted.chi2 < last.fitted.chi2
+            } else {
+                now > MISTAKEN && forecast(&calibrated, &subject) < now
             };
             if better {
                 (after, last, unexplained) = (calibrated, table, Some(found));
