@@ -13,12 +13,14 @@ use mops_testbed::Trial;
 
 use super::each;
 pub(crate) use folder::{Cases, Reply};
+#[cfg(test)]
+pub(crate) use judge::Judgement;
 pub(crate) use judge::Row;
 pub(crate) use page::page;
 pub(crate) use plan::{Kind, Plan, Wish};
 pub(crate) use statistics::{Bin, Rate, brier, deciles, reliability, uniformity};
 pub(crate) use table::csv;
-pub(crate) use tool::{Answer, Named, Tools, spelt};
+pub(crate) use tool::{Answer, Tools, spelt};
 
 /// What a benchmark over simulated experiments gives.
 pub(crate) struct Results {
