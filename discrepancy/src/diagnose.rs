@@ -76,6 +76,9 @@ pub fn diagnose(
         if watch.wants_stop() {
             return Err(Mistake::here("the diagnosis was interrupted"));
         }
+        if current.added.len() >= options.max_effects {
+            break;
+        }
         watch.stage(&format!("search for effect {}", k + 1), 0.1 + 0.7 * k as f64 / options.max_effects as f64);
         let Some(round) = search.round(&current) else { break };
         let Some(best) = round.trials.first() else { break };
@@ -90,13 +93,59 @@ pub fn diagnose(
             rounds.push(round);
             break;
         }
-        current = search.over_or_in_windows(best);
+        let pairs = if k == 0 && options.max_effects > 1 && best.fitted.normalised() > UNEXPLAINED {
+            watch.stage("pairs of effects", 0.3);
+            search.pairs(&current, &round.screened)
+        } else {
+            Vec::new()
+        };
+        let next = search.over_or_in_windows(best);
+        // A pair is taken where it beats the best single effect with the best that can be added to it.
+        if let Some(pair) = pairs.first() {
+            let second = search.round(&next);
+            let rival = second.as_ref().and_then(|second| second.trials.first());
+            let of = Dispersion::of(pair);
+            let alone = rival.map_or(f64::INFINITY, |rival| criterion(rival, &of)).min(criterion(&next, &of));
+            if criterion(pair, &of) < alone - 2.0 {
+                current = search.over_or_in_windows(pair);
+                rounds.push(round);
+                continue;
+            }
+        }
+        current = next;
         rounds.push(round);
     }
     watch.stage("what can be left out", 0.82);
     let mut last = search.over_whole(&current).unwrap_or(current);
     if last.added.len() > 1 {
         last = search.pruned(last, options.level);
+    }
+    if last.added.len() > 1 && last.windows == 1 {
+        // Each effect once more against its rivals, with the others in: what the ranking tells, and a chance to exchange it.
+        watch.stage("each effect against its rivals", 0.86);
+        let mut given = Vec::new();
+        for index in 0..last.added.len() {
+            let Some(without) = search.without(&last, index) else { continue };
+            let Some(mut round) = search.round(&without) else { continue };
+            let mut order: Vec<_> = without.added.clone();
+            order.push(last.added[index].clone());
+            let same = |t: &Trial<'_>| t.added.last().is_some_and(|a| a.candidate.is(&last.added[index].candidate));
+            if !round.trials.iter().any(same) {
+                if let Some(own) = search.from(&without, &order, 40) {
+                    round.trials.push(own);
+                }
+            }
+            let of = Dispersion::of(&last);
+            round.trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
+            given.push(round);
+        }
+        let of = Dispersion::of(&last);
+        let better = given.iter().filter_map(|round| round.trials.first());
+        let better = better.min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
+        if let Some(better) = better.filter(|b| criterion(b, &of) < criterion(&last, &of) - 6.0 && b.windows == 1) {
+            last = search.again(better).ok_or_else(lost)?;
+        }
+        rounds = given;
     }
     let (mut last, held) = search.without_declared(last);
     watch.stage("the repaired model", 0.9);

@@ -20,7 +20,7 @@ pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<Stri
         let Some(now) = difference(a, b, piece, 1.0, 1.0) else { continue };
         let driven = !a.fit.pieces[piece].case.inputs.is_empty();
         for factor in FACTORS {
-            let inputs = driven.then(|| (factor, 1.0, "its inputs"));
+            let inputs = driven.then_some((factor, 1.0, "its inputs"));
             for (input, start, what) in inputs.into_iter().chain([(1.0, factor, "its start values")]) {
                 let Some(then) = difference(a, b, piece, input, start) else { continue };
                 if then > 1.5 * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {

@@ -37,6 +37,10 @@ pub struct Screened {
     pub gain: f64,
     /// Share of its trace that the unknowns absorb.
     pub absorbed: f64,
+    /// How the residuals pull at it: the scalar product with its direction, turned round.
+    pub pull: f64,
+    /// Whether it has one sign only.
+    pub one_sided: bool,
     /// The smallest first strength that would have been noticed, where what it adds is proportional to it.
     pub noticed: Option<f64>,
     /// Its trace with that taken out, of length 1.
@@ -201,6 +205,8 @@ fn best_of(
             added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
             gain,
             absorbed: 1.0 - rest / size,
+            pull: along / rest.sqrt(),
+            one_sided: first.bounds[0] >= 0.0,
             noticed,
             direction: left.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),

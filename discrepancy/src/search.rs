@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Piece};
+use crate::fit::{Fit, Fitted, Piece, dot};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
@@ -175,12 +175,7 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|i| {
-                let mut last = screened[i].added.clone();
-                let first = &last.candidate.effect.strengths()[0];
-                if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
-                    // From where nothing has changed every step leads downwards.
-                    last.strengths[0] = neutral;
-                }
+                let last = self.from_neutral(&screened[i].added);
                 let added: Vec<Added> = from.added.iter().cloned().chain([last]).collect();
                 self.from(from, &added, 5)
             })
@@ -207,6 +202,82 @@ impl<'a> Search<'a> {
         }
         let directions = screened.iter().map(|s| s.directions).sum();
         Some(Round { screened, trials, directions, before: from.score() })
+    }
+
+    /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when
+    /// another effect is in. Chosen by the normal equations of two traces, then fitted.
+    pub fn pairs(&self, from: &Trial<'a>, screened: &[Screened]) -> Vec<Trial<'a>> {
+        const FEW: usize = 60;
+        let few = &screened[..screened.len().min(FEW)];
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for i in 0..few.len() {
+            for j in i + 1..few.len() {
+                let (a, b) = (&few[i], &few[j]);
+                let dry = dry(&a.added.candidate) && dry(&b.added.candidate);
+                if a.added.candidate.port == b.added.candidate.port && dry {
+                    continue;
+                }
+                let likeness = dot(&a.direction, &b.direction);
+                let rest = 1.0 - likeness * likeness;
+                if rest < 1e-3 {
+                    continue;
+                }
+                let (p, q) = (a.pull, b.pull);
+                let (x, y) = ((p - likeness * q) / rest, (q - likeness * p) / rest);
+                if (a.one_sided && x <= 0.0) || (b.one_sided && y <= 0.0) {
+                    continue;
+                }
+                pairs.push((x * p + y * q, i, j));
+            }
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut chosen: Vec<(usize, usize)> = pairs.iter().take(self.limits.refits).map(|&(_, i, j)| (i, j)).collect();
+        // One and the same effect in two places: joints of a kind have bearings of a kind.
+        let twins = pairs.iter().filter(|&&(_, i, j)| {
+            let (a, b) = (&few[i].added.candidate, &few[j].added.candidate);
+            a.effect.name() == b.effect.name() && a.effect.rarity() == 0
+        });
+        for &(_, i, j) in twins.take(4) {
+            if !chosen.contains(&(i, j)) {
+                chosen.push((i, j));
+            }
+        }
+        let mut trials: Vec<Trial<'a>> = chosen
+            .into_par_iter()
+            .filter_map(|(i, j)| {
+                let added = [&few[i], &few[j]].map(|s| self.from_neutral(&s.added));
+                self.from(from, &[from.added.as_slice(), &added].concat(), 6)
+            })
+            .collect();
+        for (count, iterations) in [(5, 8), (3, 40)] {
+            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            let rest = trials.split_off(trials.len().min(count));
+            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
+            trials.extend(rest);
+        }
+        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        trials
+    }
+
+    /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
+    fn from_neutral(&self, added: &Added) -> Added {
+        let mut added = added.clone();
+        let first = &added.candidate.effect.strengths()[0];
+        if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
+            added.strengths[0] = neutral;
+        }
+        added
+    }
+
+    /// The trial without one of its effects, fitted again.
+    pub fn without(&self, trial: &Trial<'a>, index: usize) -> Option<Trial<'a>> {
+        let mut added = trial.added.clone();
+        added.remove(index);
+        let tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+        let own = self.pieces(trial.windows);
+        let locals = own.iter().zip(&trial.fitted.point.locals);
+        let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
+        self.trial(&added, &tuners, locals, trial.windows, 40)
     }
 
     /// Fits a variant from where another ended.
@@ -254,13 +325,7 @@ impl<'a> Search<'a> {
     pub fn pruned(&self, mut trial: Trial<'a>, level: f64) -> Trial<'a> {
         let mut index = 0;
         while trial.added.len() > 1 && index < trial.added.len() {
-            let mut added = trial.added.clone();
-            added.remove(index);
-            let tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
-            let own = self.pieces(trial.windows);
-            let locals = own.iter().zip(&trial.fitted.point.locals);
-            let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
-            let Some(without) = self.trial(&added, &tuners, locals, trial.windows, 40) else {
+            let Some(without) = self.without(&trial, index) else {
                 index += 1;
                 continue;
             };
@@ -332,6 +397,11 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Whether an effect is dry friction: a joint has one at most.
+fn dry(c: &Candidate) -> bool {
+    c.effect.act(&first_values(c)).friction(&still(), &vec![0.0; c.effect.states()]).is_some()
+}
+
 /// Any strengths: to ask an effect what it is.
 fn first_values(c: &Candidate) -> Vec<f64> {
     c.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect()
@@ -367,8 +437,7 @@ impl<'a> Trial<'a> {
 
     /// Number of unknowns that its effects bring in.
     pub fn unknowns(&self) -> usize {
-        let shared = self.fitted.point.globals.len() - self.fit.subject.globals.len();
-        shared
+        self.fitted.point.globals.len() - self.fit.subject.globals.len()
     }
 
     /// The Bayesian information criterion up to a constant: lower is better; rarer effects pay a little more.

@@ -351,13 +351,13 @@ impl<'a, S: Opening> Driven<'a, S> {
             matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
         };
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
-        if let Some(state) = self.shows[signal] {
-            if self.actors.iter().filter(here).all(simple) {
-                let see = |value: S, actor: &Actor<S>| {
-                    actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
-                };
-                return self.actors.iter().filter(here).fold(x[state], see);
-            }
+        if let Some(state) = self.shows[signal]
+            && self.actors.iter().filter(here).all(simple)
+        {
+            let see = |value: S, actor: &Actor<S>| {
+                actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
+            };
+            return self.actors.iter().filter(here).fold(x[state], see);
         }
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx, .. } = &mut *scratch;
