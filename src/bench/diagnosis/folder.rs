@@ -84,26 +84,32 @@ impl Cases {
         Ok(Self { folders })
     }
 
-    /// Diagnoses all of them.
-    pub fn run(&self, tools: Tools<'_>, jobs: usize, against: bool) -> Vec<Reply> {
+    /// Diagnoses all of them; `leave` gets every reply as soon as it is there.
+    pub fn run(&self, tools: Tools<'_>, jobs: usize, against: bool, leave: impl Fn(&Reply) + Sync) -> Vec<Reply> {
         each(&self.folders, jobs, tools.watch, |folder| {
-            let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-            let text = std::fs::read_to_string(folder.join("case.json")).map_err(|error| error.to_string());
-            let declared = text.and_then(|text| Declared::read(&text));
-            let study = declared.and_then(|declared| Ok((declared.study(&name, folder)?, declared)));
-            let (study, declared) = match study {
-                Ok(read) => read,
-                Err(why) => return Some(Reply { name, study: String::new(), said: Err(why), brute: None }),
-            };
-            let guarded = std::panic::AssertUnwindSafe(|| diagnosed(&name, &study, &declared, folder, tools));
-            let said = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
-            let brute = against.then(|| {
-                let read = tools.study(&format!("{name}.toml"), &study, &Data { folder, declared: &declared })?;
-                tools.brute_force(&read)
-            });
-            Some(Reply { name, study, said, brute })
+            let reply = reply(folder, tools, against);
+            leave(&reply);
+            Some(reply)
         })
     }
+}
+
+fn reply(folder: &Path, tools: Tools<'_>, against: bool) -> Reply {
+    let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let text = std::fs::read_to_string(folder.join("case.json")).map_err(|error| error.to_string());
+    let declared = text.and_then(|text| Declared::read(&text));
+    let study = declared.and_then(|declared| Ok((declared.study(&name, folder)?, declared)));
+    let (study, declared) = match study {
+        Ok(read) => read,
+        Err(why) => return Reply { name, study: String::new(), said: Err(why), brute: None },
+    };
+    let guarded = std::panic::AssertUnwindSafe(|| diagnosed(&name, &study, &declared, folder, tools));
+    let said = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
+    let brute = against.then(|| {
+        let read = tools.study(&format!("{name}.toml"), &study, &Data { folder, declared: &declared })?;
+        tools.brute_force(&read)
+    });
+    Reply { name, study, said, brute }
 }
 
 fn diagnosed(name: &str, text: &str, declared: &Declared, folder: &Path, tools: Tools<'_>) -> Result<Said, String> {
@@ -135,4 +141,50 @@ fn times(case: &mops_core::Case) -> Option<(String, Vec<f64>)> {
     let channels = &case.experiment.as_ref()?.channels;
     let channel = channels.iter().max_by_key(|channel| channel.times.len())?;
     Some((case.name.clone(), channel.times.clone()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cart that pulls a trailer, in units that are partly unknown, with a second output.
+    const CASE: &str = r#"{ "case": "c", "states": [ { "name": "x", "unit": "m" }, { "name": "v", "unit": "m/s" } ],
+        "inputs": [ { "name": "u", "unit": "knots" } ],
+        "outputs": [ { "name": "x", "column": "x_m", "unit": "m", "equals_state": "x", "noise_std": 0.1, "noise_std_total": 0.2 },
+                     { "name": "far", "column": "far_m", "unit": "m", "expression": "2*x", "noise_std_total": 0.2 } ],
+        "equations": [ "m*v' = K*u - b*v", "x' = v" ],
+        "parameters": [ { "name": "m", "unit": "kg", "guess": 2.0, "lower": 0.1, "upper": 10 },
+                        { "name": "b", "unit": "N*s/m", "guess": 1, "lower": 0, "upper": 5 } ],
+        "constants": { "K": 1.5 }, "locations": [ "process:x", "sensor:x", "actuator:u" ],
+        "location_meaning": { "x": "equation of motion of the cart (1st equation)" },
+        "files": [ "calibration.csv", "validation_1.csv" ] }"#;
+    const DATA: &str = "t[s],u[knots],x_m[m],far_m[m]\n0,0,0,0\n0.1,1,0.1,0.2\n0.2,1,0.3,0.6\n0.3,0,0.4,0.8\n";
+
+    #[test]
+    fn a_case_becomes_a_study_that_is_read_and_only_named_files_are_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        for name in ["calibration.csv", "validation_1.csv", "truth.json"] {
+            std::fs::write(folder.join(name), DATA).unwrap();
+        }
+        let declared = Declared::read(CASE).unwrap();
+        let text = declared.study("c", folder).unwrap();
+        let catalogue = crate::catalogue();
+        let tools = Tools { catalogue: &catalogue, watch: &(), seed: 1 };
+        let data = Data { folder, declared: &declared };
+        let study = tools.study("c.toml", &text, &data).unwrap_or_else(|why| panic!("{why}\n{text}"));
+        let ports: Vec<String> = study.models[0].1.interface().ports.iter().map(ToString::to_string).collect();
+        assert!(ports.contains(&"joint:x".to_owned()) && ports.contains(&"sensor:far".to_owned()), "{ports:?}");
+        let experiment = study.cases[1].experiment.as_ref().unwrap();
+        assert_eq!((experiment.role, experiment.channels[0].noise), (mops_core::Role::Selection, Some(0.2)));
+        assert!(data.read("validation_1.csv").is_ok() && data.read("truth.json").is_err());
+    }
+
+    #[test]
+    fn places_are_spelt_as_the_case_spells_them() {
+        let declared = Declared::read(CASE).unwrap();
+        assert_eq!(answer::located("joint:x", &declared.locations), "process:x");
+        assert_eq!(answer::located("sensor:x", &declared.locations), "sensor:x");
+        assert_eq!(answer::located("sensor:far", &declared.locations), "sensor:far");
+    }
 }

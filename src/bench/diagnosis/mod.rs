@@ -13,6 +13,8 @@ use mops_testbed::Trial;
 
 use super::each;
 pub(crate) use folder::{Cases, Reply};
+#[cfg(test)]
+pub(crate) use judge::Judgement;
 pub(crate) use judge::Row;
 pub(crate) use page::page;
 pub(crate) use plan::{Kind, Plan, Wish};

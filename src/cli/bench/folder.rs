@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 use mops_core::Diagnostic;
 
@@ -18,26 +19,35 @@ pub(super) fn answer(
     against: bool,
 ) -> Result<ExitCode, Trouble> {
     let cases = Cases::find(cases).map_err(Diagnostic::new)?;
-    let replies = cases.run(tools, jobs, against);
     std::fs::create_dir_all(answers).map_err(cannot_write(answers))?;
-    let write = |name: String, content: &str| {
-        let path = answers.join(name);
-        std::fs::write(&path, content).map_err(cannot_write(&path))
-    };
-    for Reply { name, study, said, .. } in &replies {
-        if !study.is_empty() {
-            write(format!("{name}.toml"), study)?;
+    let refused = Mutex::new(None);
+    let replies = cases.run(tools, jobs, against, |reply| {
+        if let Err(trouble) = leave(answers, reply) {
+            refused.lock().expect("no thread breaks while it holds it").get_or_insert(trouble);
         }
-        let Ok(said) = said else { continue };
-        write(format!("{name}.json"), &said.json)?;
-        for (file, content) in &said.predictions {
-            write(format!("{name}_{file}.csv"), content)?;
-        }
+    });
+    if let Some(trouble) = refused.into_inner().expect("all threads have ended") {
+        return Err(trouble);
     }
     print(&text(&replies));
     print(&format!("\nanswers, predictions and studies are in {}\n", answers.display()));
     let failed = replies.iter().any(|reply| reply.said.is_err());
     Ok(if failed { ExitCode::from(3) } else { ExitCode::SUCCESS })
+}
+
+/// Writes what there is of a case.
+fn leave(answers: &Path, reply: &Reply) -> Result<(), Trouble> {
+    let write = |name: String, content: &str| {
+        let path = answers.join(name);
+        std::fs::write(&path, content).map_err(cannot_write(&path))
+    };
+    let name = &reply.name;
+    if !reply.study.is_empty() {
+        write(format!("{name}.toml"), &reply.study)?;
+    }
+    let Ok(said) = &reply.said else { return Ok(()) };
+    write(format!("{name}.json"), &said.json)?;
+    said.predictions.iter().try_for_each(|(file, content)| write(format!("{name}_{file}.csv"), content))
 }
 
 fn text(replies: &[Reply]) -> String {

@@ -219,3 +219,46 @@ fn failures(rows: &[Row]) -> String {
     let lines: Vec<String> = failed.map(|(row, why)| format!("{} failed: {why}\n", row.name)).collect();
     lines.concat()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::diagnosis::{Answer, Judgement};
+    use crate::diagnosis::made_up;
+
+    fn row(kind: Kind, right: bool, answer: Result<Answer, String>) -> Row {
+        let judgement = Judgement {
+            verdict: right,
+            decision: right,
+            first: right && kind == Kind::One,
+            in_set: kind == Kind::One,
+            place: right,
+            both: None,
+            covered: Vec::new(),
+        };
+        let truth = vec![("coulomb-friction".to_owned(), "joint:phi".to_owned())];
+        let (size, truth) = if kind == Kind::One { (5.0, truth) } else { (0.0, Vec::new()) };
+        Row { name: "case".into(), plant: "servo".into(), kind, size, truth, answer, judgement }
+    }
+
+    #[test]
+    fn the_tables_give_rates_per_effect_false_alarms_and_what_failed() {
+        let coulomb = || Ok(Answer::of(&made_up::coulomb(), 2.0));
+        let nothing = || Ok(Answer::of(&made_up::nothing(), 1.0));
+        let rows = vec![
+            row(Kind::One, true, coulomb()),
+            row(Kind::One, false, coulomb()),
+            row(Kind::Nothing, true, nothing()),
+            row(Kind::Nothing, false, coulomb()),
+            row(Kind::One, false, Err("it diverges".into())),
+        ];
+        let text = all(&Results { rows, brute: Vec::new(), unmade: 1 });
+        let line =
+            |of: &str| text.lines().find(|line| line.trim().starts_with(of)).unwrap_or_else(|| panic!("{of}: {text}"));
+        let cells: Vec<&str> = line("coulomb-friction").split_whitespace().collect();
+        assert_eq!(cells[1..], ["1/3", "1/3", "3/3", "3.0", "1/3", "1/3"]);
+        assert!(line("nothing missing").contains("50 % (1 to 99) of 2"), "{}", line("nothing missing"));
+        assert!(text.contains("1 cases asked for cannot be made") && text.contains("case failed: it diverges"));
+        assert!(text.contains("probabilities of verdicts: Brier score") && text.contains("distance from uniform"));
+    }
+}

@@ -46,7 +46,7 @@ fn errors(errors: &[ExperimentError]) -> Value {
 }
 
 /// The place as the case spells it: an equation has several names.
-fn located(place: &str, locations: &[String]) -> String {
+pub(super) fn located(place: &str, locations: &[String]) -> String {
     let known = |place: &str| locations.iter().any(|l| l == place);
     let (kind, name) = place.split_once(':').unwrap_or(("", place));
     if !known(place) && ["process", "joint"].contains(&kind) {
