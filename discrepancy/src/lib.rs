@@ -22,6 +22,8 @@ mod stopgap;
 mod subject;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tests;
 mod trace_of;
 mod trajectory;
 mod unknown;

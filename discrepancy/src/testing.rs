@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
 use mops_core::{
-    Case, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale, Study, Task, Tasks,
-    Tuner, Unit, stream,
+    Case, Channel, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale,
+    Study, Task, Tasks, Tuner, Unit, stream,
 };
 use mops_models::equations::EquationsOptions;
 use rand_distr::{Distribution, Normal};
@@ -88,6 +88,39 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         notes: Vec::new(),
     };
     Subject { study: Arc::new(study), model, globals: (0..globals).collect(), measurements, notes: Vec::new() }
+}
+
+/// The study that a subject could have been taken from, with a seed of its own.
+pub fn study(subject: &Subject) -> Study {
+    let mut study = Study::clone(&subject.study);
+    for (index, m) in subject.measurements.iter().enumerate() {
+        let channel = |s: &Series| Channel {
+            signal: s.name.clone(),
+            times: s.times.clone(),
+            values: s.values.clone(),
+            noise: Some(s.noise),
+        };
+        let channels = m.series.iter().map(channel).collect();
+        study.cases[index].experiment = Some(Experiment { channels, role: m.role, ..Experiment::default() });
+        for local in &m.locals {
+            study.jobs[index].parameters[local.parameter] =
+                ParameterSource::Tuner { tuner: study.tuners.len(), factor: 1.0 };
+            let parameter = subject.model.interface().parameters[local.parameter].variable.name.clone();
+            study.tuners.push(Tuner {
+                name: format!("{}/{parameter}", m.name),
+                parameter,
+                start: local.start,
+                bounds: local.bounds,
+                scale: Scale::Linear,
+                grid: Grid::Continuous,
+                unit: Unit::one(),
+                case: Some(index),
+                active: true,
+                tie: None,
+            });
+        }
+    }
+    study
 }
 
 /// The subject's model fitted to its records, and what a screening sees of it.

@@ -153,7 +153,11 @@ pub fn trace(
         return Some(vec![0.0; total]);
     }
     let effect = candidate.effect.as_ref();
-    let acting = effect.act(strengths);
+    // What inertia adds changes the acceleration that it adds to: proportional to the strength only where that is small.
+    let small = if effect.is_inertial() { 1e-6 } else { 1.0 };
+    let mut strengths = strengths.to_vec();
+    strengths[0] *= small;
+    let acting = effect.act(&strengths);
     let here = spot(&candidate.port, model, piece)?;
     let companion = match &candidate.companion {
         Some(port) => Some(spot(port, model, piece)?),
@@ -168,7 +172,8 @@ pub fn trace(
             Some(all)
         }
         _ => {
-            let (column, signal) = signal(acting.as_ref(), effect, here, companion, piece, along, model)?;
+            let (column, mut signal) = signal(acting.as_ref(), effect, here, companion, piece, along, model)?;
+            signal.iter_mut().for_each(|s| *s /= small);
             Some(along.response(column, &signal))
         }
     }

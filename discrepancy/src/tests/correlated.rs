@@ -1,0 +1,82 @@
+//! Residuals next to each other that are alike are not worth as much as many of their own.
+
+use std::sync::atomic::AtomicUsize;
+
+use mops_models::effects::effects;
+
+use crate::search::{Limits, Search, Trial};
+use crate::subject::Subject;
+use crate::testing::{Record, study, subject, white};
+use crate::weigh::{Dispersion, criterion};
+use crate::{Options, Verdict, diagnose};
+
+const CREEP: &str = r#"
+states     = { x = "m" }
+parameters = { k = "1/s" }
+der        = { x = "-k*x" }
+"#;
+
+/// A decay whose errors have the correlation `r` from sample to sample, and variance 1.
+fn decay(r: f64, label: &str) -> Subject {
+    let times: Vec<f64> = (0..4000_u32).map(|k| 0.005 * f64::from(k)).collect();
+    let mut error = 0.0;
+    let errors = white(label, 1.0, times.len()).into_iter().map(|e| {
+        error = r * error + (1.0 - r * r).sqrt() * e;
+        error
+    });
+    let values = times.iter().zip(errors).map(|(t, e)| 50.0 * (-0.3 * t).exp() + e).collect();
+    subject(CREEP, &[0.3, 50.0], 1, vec![Record { inputs: Vec::new(), times, signals: vec![("x", values, 1.0)] }])
+}
+
+fn with<T>(subject: &Subject, look: impl FnOnce(&Trial<'_>) -> T) -> T {
+    let simulations = AtomicUsize::new(0);
+    let limits = Limits { refits: 10, finalists: 5 };
+    let search = Search { subject, effects: &[], limits, simulations: &simulations };
+    look(&search.trial(&[], &subject.start(), vec![vec![50.0]], 1, 60).expect("it simulates"))
+}
+
+#[test]
+fn white_residuals_count_fully_and_correlated_ones_by_what_their_correlation_leaves() {
+    let white = with(&decay(0.0, "white"), Dispersion::of);
+    assert_eq!(white.repeats, 1.0);
+    for r in [0.5, 0.9] {
+        let found = with(&decay(r, "alike"), Dispersion::of).repeats;
+        let expected = (1.0 + r) / (1.0 - r);
+        assert!((found / expected - 1.0).abs() < 0.25, "{r}: {found} {expected}");
+    }
+}
+
+#[test]
+fn a_fall_of_the_sum_of_squares_is_worth_less_where_residuals_are_alike() {
+    let gain = |dispersion: Dispersion| {
+        with(&decay(0.9, "alike"), |trial| {
+            let mut better = trial.fitted.clone();
+            better.chi2 -= 40.0;
+            let now = criterion(trial, &dispersion);
+            let fitted = better;
+            let (added, variant) = (Vec::new(), crate::variant::Variant::new(trial.fit.subject, &[]));
+            let fit = crate::fit::Fit {
+                subject: trial.fit.subject,
+                model: trial.fit.model.clone(),
+                globals: trial.fit.globals.clone(),
+                pieces: trial.fit.pieces.clone(),
+                simulations: trial.fit.simulations,
+            };
+            now - criterion(&Trial { added, windows: 1, fit, variant, fitted }, &dispersion)
+        })
+    };
+    assert!((gain(Dispersion::WHITE) - 40.0).abs() < 1e-9);
+    let alike = gain(Dispersion { square: 1.0, repeats: 19.0 });
+    assert!((alike - 40.0 / 19.0).abs() < 1e-9, "{alike}");
+}
+
+#[test]
+fn noise_that_is_correlated_is_not_taken_for_an_effect() {
+    for label in ["alike 1", "alike 2", "alike 3"] {
+        let study = study(&decay(0.9, label));
+        let diagnosis = diagnose(&study, &effects(), &Options { max_effects: 2, level: 0.05, seed: 1 }, &());
+        let diagnosis = diagnosis.expect("it simulates");
+        let names: Vec<_> = diagnosis.found.iter().map(|f| (&f.effect, &f.place)).collect();
+        assert_eq!(diagnosis.verdict, Verdict::None, "{label}: {names:?}");
+    }
+}

@@ -1,0 +1,46 @@
+//! What a hidden state starts with is unknown, and no error of the model.
+
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{Hold, Input};
+use mops_models::effects::effects;
+
+use crate::search::{Limits, Search};
+use crate::testing::{Record, integrated, subject, white};
+
+const CART: &str = r#"
+states     = { x = "m", v = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", d = "N s/m" }
+der        = { x = "v", v = "m*v' = u - d*v" }
+"#;
+
+#[test]
+fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise() {
+    const STEP: f64 = 0.02;
+    const COUNT: u32 = 250;
+    let [m, d, tau, pull] = [2.0, 0.8, 0.4, 6.0];
+    let command = |t: f64| if (t / 1.1 + 1e-7).floor() % 2.0 < 1.0 { -2.0 } else { 3.0 };
+    let rates = |t: f64, x: &[f64; 3]| [x[1], (x[2] - d * x[1]) / m, (command(t) - x[2]) / tau];
+    let states = integrated(rates, [0.0, 0.0, pull], STEP, COUNT as usize);
+    let times: Vec<f64> = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
+    let values = states.iter().zip(white("pull", 2e-3, states.len())).map(|(s, e)| s[0] + e).collect();
+    let samples = times.iter().map(|&t| command(t)).collect();
+    let inputs = vec![("u", Input::Sampled { times: times.clone(), values: samples, hold: Hold::Zero })];
+    let record = Record { inputs, times, signals: vec![("x", values, 2e-3)] };
+    let subject = subject(CART, &[m, d, 0.0, 0.0], 2, vec![record]);
+    let simulations = AtomicUsize::new(0);
+    let lag: Vec<_> = effects().into_iter().filter(|e| e.name() == "actuator-lag").collect();
+    let limits = Limits { refits: 10, finalists: 5 };
+    let search = Search { subject: &subject, effects: &lag, limits, simulations: &simulations };
+    let declared = search.trial(&[], &subject.start(), vec![vec![0.0; 2]], 1, 60).expect("it simulates");
+    assert!(declared.fitted.normalised() > 5.0, "{}", declared.fitted.normalised());
+
+    let round = search.round(&declared).expect("it simulates");
+    let best = &round.trials[0];
+    assert!(best.fitted.normalised() < 1.1, "{}", best.fitted.normalised());
+    assert!((best.added[0].strengths[0] - tau).abs() < 0.05 * tau, "{:?}", best.added[0].strengths);
+    // The lag begins with what the motor pulled beyond the command, `6 - (-2)`.
+    let start = best.fitted.point.locals[0][2];
+    assert!((start - (pull - command(0.0))).abs() < 0.4, "{start}");
+}
