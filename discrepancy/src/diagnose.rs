@@ -87,7 +87,8 @@ pub fn diagnose(
         let gain = criterion(&current, &dispersion) - criterion(best, &dispersion) + worth;
         let chance = by_chance(gain, round.directions);
         if k == 0 {
-            p_value = chance;
+            // Of the screening itself: its gains are those of single directions.
+            p_value = round.screened.first().map_or(1.0, |s| by_chance(s.gain, round.directions));
         }
         if chance > options.level {
             rounds.push(round);
@@ -195,7 +196,8 @@ pub fn diagnose(
     let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
     let removed = held.iter().map(|k| crate::diagnosis::Removed { term: names(k), place: String::new() }).collect();
     let probability = match verdict {
-        Verdict::None => 1.0 - 0.5 * (1.0 - p_value).max(0.0),
+        // Nothing at all was weighed among the others.
+        Verdict::None => 1.0 - ranking.iter().map(|r| r.probability).sum::<f64>(),
         Verdict::Effect => found.iter().map(|f| f.probability).product(),
         Verdict::Unexplained => 0.9,
     };
