@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Dimension, Effect, Interface, Placement, Port, PortKind, Trials};
+use mops_core::{Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
 /// An effect at a place.
 #[derive(Clone)]
@@ -30,6 +30,12 @@ impl Candidate {
             && self.port == other.port
             && self.companion == other.companion
             && self.only == other.only
+    }
+
+    /// The unit of a strength as results spell it: empty where the model does not tell that of its forces.
+    pub fn unit(&self, strength: &Strength, unit: &Unit) -> String {
+        let untold = matches!(self.port, Port::Joint { unit: None, .. } | Port::Process { unit: None, .. });
+        if untold && strength.dimension.output != 0 { String::new() } else { unit.to_string() }
     }
 
     /// Its place as results spell it. What an equation of its own gains is a process only where it is no joint.

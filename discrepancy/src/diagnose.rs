@@ -249,10 +249,21 @@ fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
 fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
     let mut ranked: Vec<Ranked> = Vec::new();
     let mut seen: Vec<(String, String)> = Vec::new();
+    let is_added =
+        |t: &Trial<'_>| t.added.last().is_some_and(|a| last.added.iter().any(|b| a.candidate.is(&b.candidate)));
     for round in rounds {
         let Some(best) = round.trials.first() else { continue };
+        // What was tried after the last effect is told by chance, and says nothing.
+        let accepted = round.trials.iter().any(is_added);
+        if !accepted && !last.added.is_empty() {
+            continue;
+        }
         let dispersion = Dispersion::of(best);
-        let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+        let mut criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+        if !accepted {
+            // Nothing at all is a rival too.
+            criteria.push(round.before / dispersion.weight());
+        }
         let probabilities = probabilities(&criteria);
         for (trial, probability) in round.trials.iter().zip(probabilities) {
             let Some(a) = trial.added.last() else { continue };
@@ -267,7 +278,7 @@ fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
             let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
                 name: s.name.to_owned(),
                 value: a.strengths[k],
-                unit: parameters[first + k].variable.unit.to_string(),
+                unit: a.candidate.unit(s, &parameters[first + k].variable.unit),
                 std_error: None,
                 interval95: None,
             });
@@ -362,7 +373,7 @@ fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
             strength: StrengthValue {
                 name: strength.name.to_owned(),
                 value: s.noticed.filter(|n| n.is_finite())?,
-                unit: parameter.variable.unit.to_string(),
+                unit: candidate.unit(strength, &parameter.variable.unit),
                 std_error: None,
                 interval95: None,
             },

@@ -150,7 +150,7 @@ impl Calibrated {
             StrengthValue {
                 name: strength.name.to_owned(),
                 value,
-                unit: parameters[variant.first[index] + k].variable.unit.to_string(),
+                unit: a.candidate.unit(strength, &parameters[variant.first[index] + k].variable.unit),
                 std_error: error,
                 interval95: error.map(|e| [value - 1.96 * e, value + 1.96 * e]),
             }

@@ -175,7 +175,7 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|i| {
-                let last = self.from_neutral(&screened[i].added);
+                let last = self.neutral_start(&screened[i].added);
                 let added: Vec<Added> = from.added.iter().cloned().chain([last]).collect();
                 self.from(from, &added, 5)
             })
@@ -245,7 +245,7 @@ impl<'a> Search<'a> {
         let mut trials: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|(i, j)| {
-                let added = [&few[i], &few[j]].map(|s| self.from_neutral(&s.added));
+                let added = [&few[i], &few[j]].map(|s| self.neutral_start(&s.added));
                 self.from(from, &[from.added.as_slice(), &added].concat(), 6)
             })
             .collect();
@@ -260,7 +260,7 @@ impl<'a> Search<'a> {
     }
 
     /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
-    fn from_neutral(&self, added: &Added) -> Added {
+    fn neutral_start(&self, added: &Added) -> Added {
         let mut added = added.clone();
         let first = &added.candidate.effect.strengths()[0];
         if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {

@@ -1,7 +1,5 @@
 //! What the test bed and the catalogue call the same things.
 
-use std::f64::consts::TAU;
-
 use mops_testbed::TrueEffect;
 
 /// Kinds of effect in the catalogue that are this effect of the test bed.
@@ -71,7 +69,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "sensor-gain" => vec![("g", of("gain") - 1.0)],
         "sensor-drift" => vec![("r", of("rate"))],
         "sensor-dead-zone" => vec![("width", of("width")), ("centre", of("middle"))],
-        "eccentricity" => vec![("a", of("amplitude")), ("phase", of("phase").rem_euclid(TAU))],
+        "eccentricity" => vec![("a", of("amplitude"))],
         "cross-talk" => vec![("k", of("share"))],
         _ => Vec::new(),
     }

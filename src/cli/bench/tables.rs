@@ -111,7 +111,8 @@ fn summary(results: &Results) -> String {
         (Kind::Outside, "outside of the catalogue: declared unexplained"),
     ];
     let tell = |rows: &[Row], kind: Kind| {
-        let own = rows.iter().filter(|row| row.kind == kind && row.answer.is_ok());
+        // No answer is a wrong one, but no alarm.
+        let own = rows.iter().filter(|row| row.kind == kind && (row.answer.is_ok() || kind != Kind::Nothing));
         let rate = Rate::of(own.map(|row| match kind {
             Kind::Two => row.judgement.both == Some(true),
             Kind::Nothing => !row.judgement.verdict,
@@ -128,7 +129,7 @@ fn summary(results: &Results) -> String {
     let mut lines: Vec<Vec<String>> = kinds.iter().map(|(kind, name)| line(name, &|rows| tell(rows, *kind))).collect();
     lines.retain(|line| !line[1].is_empty());
     let decided = |rows: &[Row]| {
-        let rate = Rate::of(rows.iter().filter(|row| row.answer.is_ok()).map(|row| row.judgement.decision));
+        let rate = Rate::of(rows.iter().map(|row| row.judgement.decision));
         if rate.of == 0 { String::new() } else { percent(rate) }
     };
     lines.push(line("all: decisions right", &decided));
