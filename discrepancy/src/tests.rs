@@ -1,6 +1,8 @@
 //! How a search for missing effects goes wrong, one file for each way, on experiments whose truth is known.
 
+mod absorbed;
 mod correlated;
+mod selection;
 mod signs;
 mod starts;
 mod tangents;

@@ -40,12 +40,20 @@ pub fn spot(port: &Port, model: &WithEffects, piece: &Piece) -> Option<Spot> {
     })
 }
 
-/// Root mean square about the middle, doubled: the amplitude of a sine is 0.7 of it.
+/// Root of twice the mean square about the middle: of a sine its amplitude. About 0 where nothing but rounding moves.
 #[allow(clippy::cast_precision_loss)]
 fn amplitude(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let n = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / n;
-    (values.map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt() * 2.0_f64.sqrt()
+    let about_middle = size(values.map(|v| v - mean));
+    if about_middle > 1e-6 * mean.abs() { about_middle } else { 2.0_f64.sqrt() * mean.abs() }
+}
+
+/// The same about 0: a falling ball has a constant acceleration, and a size of the forces on it all the same.
+#[allow(clippy::cast_precision_loss)]
+fn size(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = values.clone().count().max(1) as f64;
+    (2.0 * values.map(|v| v * v).sum::<f64>() / n).sqrt()
 }
 
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
@@ -69,7 +77,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let inputs = trajectories[0].inputs();
             let accelerations = moments().map(|m| m.rates[v]);
             let mobility = moments().map(|m| m.b[(v, inputs + w)].abs()).fold(0.0, f64::max);
-            let output = amplitude(accelerations) / positive(mobility);
+            let output = size(accelerations) / positive(mobility);
             let speed = positive(amplitude(moments().map(|m| m.x[v])));
             let position = positive(amplitude(moments().map(|m| m.x[q])));
             Sizes {
@@ -86,7 +94,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
         Spot::Process(w, s) => {
             let inputs = trajectories[0].inputs();
             let mobility = moments().map(|m| m.b[(s, inputs + w)].abs()).fold(0.0, f64::max);
-            let rate = amplitude(moments().map(|m| m.rates[s]));
+            let rate = size(moments().map(|m| m.rates[s]));
             let position = positive(amplitude(moments().map(|m| m.x[s])));
             let speed = positive(rate);
             Sizes {

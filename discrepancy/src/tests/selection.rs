@@ -1,0 +1,89 @@
+//! Selection data help to choose; parameters come from calibration data; validation data decide nothing.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{Effect, Role};
+use mops_models::effects::effects;
+
+use crate::base;
+use crate::diagnosis::StrengthValue;
+use crate::search::{Limits, Search};
+use crate::subject::Subject;
+use crate::testing::{Record, integrated, study, subject, white};
+use crate::weigh::{Dispersion, criterion, probabilities};
+use crate::{Diagnosis, Options, diagnose};
+
+/// A block that slides on without friction, of which the data have some of the air: `v' = -k v |v|`.
+const BLOCK: &str = r#"
+states     = { x = "m", v = "m/s" }
+parameters = { a = "m/s^2" }
+der        = { x = "v", v = "v' = a" }
+"#;
+const DRAG: f64 = 0.2;
+const NOISE: f64 = 0.01;
+
+fn slide(label: &str, speed: f64, duration: f64) -> Record {
+    const COUNT: u32 = 120;
+    let step = duration / f64::from(COUNT - 1);
+    let states = integrated(|_, x: &[f64; 2]| [x[1], -DRAG * x[1] * x[1].abs()], [0.0, speed], step, COUNT as usize);
+    let times = (0..COUNT).map(|k| f64::from(k) * step).collect();
+    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
+    Record { inputs: Vec::new(), times, signals: vec![("x", values, NOISE)] }
+}
+
+/// Slow slides to calibrate with; a fast one with a role of its own, and one to validate with that is moved by `shift`.
+fn block(fast: Role, shift: f64) -> Subject {
+    let mut last = slide("last", 3.0, 2.0);
+    last.signals[0].1.iter_mut().enumerate().for_each(|(k, x)| *x += shift * (0.1 * k as f64).sin());
+    let mut subject =
+        subject(BLOCK, &[-0.01, 0.0, 2.0], 2, vec![slide("slow", 1.5, 2.0), slide("fast", 6.0, 4.0), last]);
+    subject.measurements[1].role = fast;
+    subject.measurements[2].role = Role::Validation;
+    subject
+}
+
+fn named() -> Vec<Arc<dyn Effect>> {
+    let few = ["viscous-friction", "quadratic-drag", "cubic-drag"];
+    effects().into_iter().filter(|e| few.contains(&e.name())).collect()
+}
+
+fn diagnosis(subject: &Subject) -> Diagnosis {
+    diagnose(&study(subject), &named(), &Options { max_effects: 1, level: 0.05, seed: 1 }, &()).expect("it simulates")
+}
+
+/// Effects with their probabilities, best first; and what calibration data alone say of the strength of the best.
+fn weighed(subject: &Subject) -> (Vec<(String, f64)>, StrengthValue) {
+    let simulations = AtomicUsize::new(0);
+    let (named, limits) = (named(), Limits { refits: 10, finalists: 5 });
+    let search = Search { subject, effects: &named, limits, simulations: &simulations };
+    let calibrated = base::fit(subject, 1, &simulations).expect("it simulates");
+    let declared = search.declared(&calibrated).expect("it simulates");
+    let round = search.round(&search.over_or_in_windows(&declared)).expect("it simulates");
+    let shared = Dispersion::of(&round.trials[0]);
+    let shares = probabilities(&round.trials.iter().map(|t| criterion(t, &shared)).collect::<Vec<_>>());
+    let names = round.trials.iter().map(|t| t.added[0].candidate.effect.name().to_owned());
+    let best = search.calibrate(&round.trials[0], &[]).expect("it simulates");
+    let strength = best.strengths(0, &round.trials[0].variant, 1.0).swap_remove(0);
+    (names.zip(shares).collect(), strength)
+}
+
+#[test]
+fn what_calibration_data_leave_open_selection_data_decide() {
+    let (open, alone) = weighed(&block(Role::Validation, 0.0));
+    assert!(open[0].1 < 0.95, "{open:?}");
+    let (decided, strength) = weighed(&block(Role::Selection, 0.0));
+    assert!(decided[0].0 == "quadratic-drag" && decided[0].1 > 0.999, "{decided:?}");
+    // Both come from the slow slide, and are as uncertain as that leaves them.
+    let error = strength.std_error.expect("it was fitted");
+    assert!((strength.value - DRAG).abs() < 4.0 * error && error > 0.001, "{strength:?} {alone:?}");
+}
+
+#[test]
+fn validation_data_change_no_bit_of_what_is_found() {
+    let [one, other] = [0.0, 0.5].map(|shift| diagnosis(&block(Role::Selection, shift)));
+    assert_eq!(one.found, other.found);
+    assert_eq!(one.parameters, other.parameters);
+    assert_eq!(one.ranked, other.ranked);
+    assert_ne!(one.after[2], other.after[2]);
+}
