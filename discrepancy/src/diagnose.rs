@@ -35,6 +35,10 @@ pub struct Options {
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 const UNEXPLAINED: f64 = 1.1;
 
+/// How many times the number of unknowns the sum of squares over calibration data may rise where all data are fitted: were
+/// the model right, it would rise by about that number.
+const CONTRADICTED: f64 = 4.0;
+
 /// Share by which a free signal must lower the error on samples left out to count as something that is missing.
 const FORETOLD: f64 = 0.1;
 
@@ -152,7 +156,12 @@ pub fn diagnose(
 
     let mut notes = subject.notes.clone();
     let left = if last.fitted.normalised() > UNEXPLAINED { left(&last, &mut notes) } else { 0.0 };
-    let missed = left > FORETOLD || (!last.added.is_empty() && forecast(&after, &subject) > MISTAKEN);
+    // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
+    // little they determine.
+    let mistaken = !last.added.is_empty()
+        && forecast(&after, &subject) > MISTAKEN
+        && contradiction(&last, &after) > CONTRADICTED * after.covariance.nrows() as f64;
+    let missed = left > FORETOLD || mistaken;
     let verdict = match (last.added.is_empty(), missed) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
@@ -220,6 +229,15 @@ pub fn diagnose(
         starts: starts(&subject, &after),
         simulations: simulations.load(Ordering::Relaxed),
     })
+}
+
+/// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.
+fn contradiction(last: &Trial<'_>, after: &Calibrated) -> f64 {
+    let Some(all) = last.fit.all(&last.fitted.point, false) else { return f64::INFINITY };
+    let own = |measurement: usize| last.fit.subject.measurements[measurement].role == Role::Calibration;
+    let together = last.fit.pieces.iter().zip(&all).filter(|(piece, _)| own(piece.measurement));
+    let together: f64 = together.map(|(_, residuals)| dot(&residuals.r, &residuals.r)).sum();
+    (together - after.chi2) / after.square
 }
 
 /// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out.

@@ -20,6 +20,8 @@ pub struct Calibrated {
     pub covariance: DMatrix<f64>,
     /// Mean square of the residuals on calibration data, at least 1.
     pub square: f64,
+    /// Sum of the squares of the residuals on calibration data.
+    pub chi2: f64,
     /// For each strength that was fitted the effect and its index there.
     pub free: Vec<(usize, usize)>,
     /// For each experiment: predicted outputs by series, and the values of the model's locals.
@@ -74,7 +76,7 @@ impl Search<'_> {
         }
         #[allow(clippy::cast_precision_loss)]
         let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
-        Some(Calibrated { added, tuners, covariance: fitted.covariance, square, free, experiments })
+        Some(Calibrated { added, tuners, covariance: fitted.covariance, chi2: fitted.chi2, square, free, experiments })
     }
 
     /// Start values of an experiment with everything else held, and what the model then says.
