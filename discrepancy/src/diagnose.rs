@@ -281,8 +281,10 @@ fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
         let dispersion = Dispersion::of(best);
         let mut criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
         if !accepted {
-            // Nothing at all is a rival too.
-            criteria.push(round.before / dispersion.weight());
+            // Nothing at all is a rival too, beforehand as likely as all candidates together.
+            #[allow(clippy::cast_precision_loss)]
+            let candidates = round.screened.len().max(1) as f64;
+            criteria.push(round.before / dispersion.weight() - 2.0 * candidates.ln());
         }
         let probabilities = probabilities(&criteria);
         for (trial, probability) in round.trials.iter().zip(probabilities) {
