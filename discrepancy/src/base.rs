@@ -84,7 +84,11 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fi
     // A model that lacks something cannot reach the noise: agreement of several starts is what tells.
     let mut random = stream(seed, "base fit");
     let mut agreeing = 0;
-    for _ in 0..4 {
+    for attempt in 0..40 {
+        // The start values themselves may lie where the model is not defined: then more is tried.
+        if attempt >= 4 && best.is_some() {
+            break;
+        }
         if agreeing >= 2 || best.as_ref().is_some_and(|best| best.normalised() < 1.2) {
             break;
         }
