@@ -15,7 +15,6 @@ use crate::locate::{Located, locate};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
 use crate::screen::{Scene, Screened};
-
 use crate::search::{Limits, Round, Search, Trial};
 use crate::stopgap::stopgap;
 use crate::subject::Subject;
@@ -74,7 +73,9 @@ pub fn diagnose(
     watch.stage("where the residual comes from", 0.08);
     let scene = Scene::new(&base.fit, &base.variant.model, &base.fitted);
     let located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
-    let mut current = search.again(&base).ok_or_else(lost)?;
+    let mut current = base.clone();
+    // The round after the present one, where it was looked at already.
+    let mut ahead: Option<Round<'_>> = None;
     #[allow(clippy::cast_precision_loss)]
     for k in 0..options.max_effects {
         if watch.wants_stop() {
@@ -84,7 +85,7 @@ pub fn diagnose(
             break;
         }
         watch.stage(&format!("search for effect {}", k + 1), 0.1 + 0.7 * k as f64 / options.max_effects as f64);
-        let Some(round) = search.round(&current) else { break };
+        let Some(round) = ahead.take().or_else(|| search.round(&current)) else { break };
         let Some(best) = round.trials.first() else { break };
         let dispersion = Dispersion::of(best);
         let worth = (best.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
@@ -116,6 +117,7 @@ pub fn diagnose(
                 rounds.push(round);
                 continue;
             }
+            ahead = second;
         }
         current = next;
         rounds.push(round);
@@ -146,7 +148,7 @@ pub fn diagnose(
         let better = given.iter().filter_map(|round| round.trials.first());
         let better = better.min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
         if let Some(better) = better.filter(|b| criterion(b, &of) < criterion(&last, &of) - 6.0 && b.windows == 1) {
-            last = search.again(better).ok_or_else(lost)?;
+            last = better.clone();
         }
         rounds = given;
     }

@@ -59,6 +59,7 @@ pub struct Point {
 }
 
 /// A least-squares problem.
+#[derive(Clone)]
 pub struct Fit<'a> {
     /// What is diagnosed.
     pub subject: &'a Subject,

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use crate::base;
 use crate::diagnosis::{ExperimentError, StrengthValue};
-use crate::fit::{Fit, Fitted, Point};
+use crate::fit::{Fit, Point};
 use crate::search::{Search, Trial};
 use crate::subject::Measurement;
 use crate::variant::{Added, Variant, problem};
@@ -86,14 +86,8 @@ impl Search<'_> {
         let pieces = || base::pieces(self.subject, |_| true).into_iter().filter(|p| p.measurement == index).collect();
         let first: Vec<f64> = measurement.locals.iter().map(|l| l.start).collect();
         for start in [from, Some(first)].into_iter().flatten() {
-            let held: Vec<usize> = (0..tuners.len()).collect();
-            let made = problem(self.subject, added, pieces(), tuners, vec![start], &held, self.simulations);
-            let (mut fit, point, _): (Fit<'_>, Point, Variant) = made;
-            for (global, &value) in fit.globals.iter_mut().zip(&point.globals) {
-                global.bounds = [value; 2];
-            }
-            let solved: Option<Fitted> = fit.solve(point, 60);
-            let Some(fitted) = solved else { continue };
+            let solved = self.starts(added, tuners, pieces(), vec![start], 60);
+            let Some((fit, fitted)) = solved else { continue };
             if best.as_ref().is_none_or(|(chi2, _)| fitted.chi2 < *chi2) {
                 best = Some((fitted.chi2, prognosis(&fit, &fitted.point, 0, measurement)?));
             }

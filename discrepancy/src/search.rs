@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Model, Role, Trials};
+use mops_core::{Effect, Role, Trials};
 use rayon::prelude::*;
 
 use crate::base;
@@ -12,13 +12,14 @@ use crate::fit::{Fit, Fitted, Piece, dot};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
-use crate::weigh::{Dispersion, by_chance};
+use crate::weigh::{Dispersion, by_chance, criterion};
 use crate::windows::cut;
 
 /// Residuals, in units of the noise, up to which a linear view of them is trusted.
 const NEARLY_LINEAR: f64 = 6.0;
 
 /// A model that was fitted to calibration and selection data together.
+#[derive(Clone)]
 pub struct Trial<'a> {
     /// Effects, with the strengths fitted.
     pub added: Vec<Added>,
@@ -112,16 +113,21 @@ impl<'a> Search<'a> {
         self.trial(&trial.added, tuners, locals, 1, 40)
     }
 
-    /// Fits start values alone, with the globals held: the experiments that parameters do not come from.
-    pub fn starts(&self, added: &[Added], tuners: &[f64], pieces: Vec<Piece>) -> Option<(Fit<'a>, Fitted, Variant)> {
-        let locals = base::first_locals(&pieces);
-        let held: Vec<usize> = (0..tuners.len()).collect();
-        let (mut fit, point, variant) = problem(self.subject, added, pieces, tuners, locals, &held, self.simulations);
+    /// Fits start values alone, from `locals` and with the globals held: the experiments that parameters do not come from.
+    pub fn starts(
+        &self,
+        added: &[Added],
+        tuners: &[f64],
+        pieces: Vec<Piece>,
+        locals: Vec<Vec<f64>>,
+        iterations: usize,
+    ) -> Option<(Fit<'a>, Fitted)> {
+        let (mut fit, point, _) = problem(self.subject, added, pieces, tuners, locals, &[], self.simulations);
         for (global, &value) in fit.globals.iter_mut().zip(&point.globals) {
             global.bounds = [value; 2];
         }
-        let fitted = fit.solve(point, 40)?;
-        Some((fit, fitted, variant))
+        let fitted = fit.solve(point, iterations)?;
+        Some((fit, fitted))
     }
 
     /// The declared model, fitted to all data that may choose; `tuners` come from calibration data, with the `locals` of
@@ -134,7 +140,7 @@ impl<'a> Search<'a> {
         for (piece, locals) in pieces.iter().zip(&mut locals) {
             if self.subject.measurements[piece.measurement].role == Role::Calibration {
                 locals.clone_from(calibration.next().expect("one for every calibration experiment"));
-            } else if let Some((_, fitted, _)) = self.starts(&[], tuners, vec![piece.clone()]) {
+            } else if let Some((_, fitted)) = self.starts(&[], tuners, vec![piece.clone()], vec![locals.clone()], 40) {
                 locals.clone_from(&fitted.point.locals[0]);
             }
         }
@@ -180,15 +186,7 @@ impl<'a> Search<'a> {
                 self.from(from, &added, 5)
             })
             .collect();
-        // Those that lead after a few steps go on, and the best of them to the end.
-        let mut trials = started;
-        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
-            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-            let rest = trials.split_off(trials.len().min(count));
-            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
-            trials.extend(rest);
-        }
-        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        let mut trials = self.race(started);
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
             let wholes: Vec<Trial<'a>> = trials[..trials.len().min(self.limits.finalists)]
@@ -242,14 +240,19 @@ impl<'a> Search<'a> {
                 chosen.push((i, j));
             }
         }
-        let mut trials: Vec<Trial<'a>> = chosen
+        let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|(i, j)| {
                 let added = [&few[i], &few[j]].map(|s| self.neutral_start(&s.added));
                 self.from(from, &[from.added.as_slice(), &added].concat(), 6)
             })
             .collect();
-        for (count, iterations) in [(5, 8), (3, 40)] {
+        self.race(started)
+    }
+
+    /// Those that lead after a few steps go on, and the best of them to the end; best first.
+    fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
+        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
             trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
             let rest = trials.split_off(trials.len().min(count));
             trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
@@ -273,52 +276,38 @@ impl<'a> Search<'a> {
     pub fn without(&self, trial: &Trial<'a>, index: usize) -> Option<Trial<'a>> {
         let mut added = trial.added.clone();
         added.remove(index);
-        let tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+        self.from(trial, &added, 40)
+    }
+
+    /// Start values of the pieces of a trial, those of effects left out.
+    fn own_locals(&self, trial: &Trial<'a>) -> Vec<Vec<f64>> {
         let own = self.pieces(trial.windows);
         let locals = own.iter().zip(&trial.fitted.point.locals);
-        let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
-        self.trial(&added, &tuners, locals, trial.windows, 40)
+        locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect()
     }
 
     /// Fits a variant from where another ended.
     pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
-        let own = self.pieces(from.windows);
-        let locals = own.iter().zip(&from.fitted.point.locals);
-        let locals = locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect();
-        self.trial(added, tuners, locals, from.windows, iterations)
+        self.trial(added, tuners, self.own_locals(from), from.windows, iterations)
     }
 
     /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
     /// linear view, else in windows.
     pub fn over_or_in_windows(&self, trial: &Trial<'a>) -> Trial<'a> {
-        let whole = if trial.windows == 1 { self.again(trial) } else { self.over_whole(trial) };
+        let whole = if trial.windows == 1 { Some(trial.clone()) } else { self.over_whole(trial) };
         match whole {
             Some(whole) if whole.fitted.normalised() < NEARLY_LINEAR => whole,
             Some(whole) => {
                 let windows = self.in_windows(whole);
                 // A trial that was in windows stays there: a fit of whole records that failed has nothing to tell.
                 if trial.windows > 1 && trial.fitted.normalised() <= windows.fitted.normalised() {
-                    return self.again(trial).unwrap_or(windows);
+                    return trial.clone();
                 }
                 windows
             }
-            None => self.again(trial).expect("it was fitted before"),
+            None => trial.clone(),
         }
-    }
-
-    /// The same trial once more.
-    pub fn again(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
-        let variant = Variant::new(self.subject, &trial.added);
-        let fit = Fit {
-            subject: self.subject,
-            model: Arc::clone(&variant.model) as Arc<dyn Model>,
-            globals: trial.fit.globals.clone(),
-            pieces: trial.fit.pieces.clone(),
-            simulations: self.simulations,
-        };
-        let (added, fitted) = (trial.added.clone(), trial.fitted.clone());
-        Some(Trial { added, windows: trial.windows, fit, variant, fitted })
     }
 
     /// The trial without effects that the others make superfluous.
@@ -361,12 +350,7 @@ impl<'a> Search<'a> {
             }
             let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
             tuners[k] = global.bounds[0].max(0.0);
-            let own = self.pieces(trial.windows);
-            let locals: Vec<Vec<f64>> = own
-                .iter()
-                .zip(&trial.fitted.point.locals)
-                .map(|(piece, values)| values[..piece.locals.len()].to_vec())
-                .collect();
+            let (own, locals) = (self.pieces(trial.windows), self.own_locals(&trial));
             let all: Vec<usize> = held.iter().copied().chain([k]).collect();
             let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
             let Some(fitted) = made.0.solve(made.1, 40) else { continue };
@@ -387,8 +371,6 @@ impl<'a> Search<'a> {
         measured.sort();
         measured.dedup();
         let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
-        let dry =
-            |c: &Candidate| c.effect.act(&first_values(c)).friction(&still(), &vec![0.0; c.effect.states()]).is_some();
         let taken = |c: &Candidate| {
             added.iter().any(|a| a.candidate.is(c) || (a.candidate.port == c.port && dry(&a.candidate) && dry(c)))
         };
@@ -440,10 +422,8 @@ impl<'a> Trial<'a> {
         self.fitted.point.globals.len() - self.fit.subject.globals.len()
     }
 
-    /// The Bayesian information criterion up to a constant: lower is better; rarer effects pay a little more.
-    #[allow(clippy::cast_precision_loss)]
+    /// Its [`criterion`] for white residuals of the size of the noise.
     pub fn score(&self) -> f64 {
-        let rarity: f64 = self.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
-        self.fitted.chi2 + self.unknowns() as f64 * (self.fitted.count as f64).ln() + 2.0 * rarity
+        criterion(self, &Dispersion::WHITE)
     }
 }

@@ -25,6 +25,7 @@ pub struct Added {
 }
 
 /// Where the strengths of an added effect stand among the parameters of the model.
+#[derive(Clone)]
 pub struct Variant {
     /// The model.
     pub model: Arc<WithEffects>,
