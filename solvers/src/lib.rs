@@ -2,6 +2,7 @@
 
 mod argmin_adapter;
 pub mod auto;
+pub mod cma_es;
 pub mod epigraph;
 pub mod levenberg_marquardt;
 mod multistart;
@@ -10,6 +11,7 @@ mod pareto;
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
+mod ranking;
 pub mod sqp;
 mod start;
 
@@ -23,6 +25,7 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<auto::AutoOptions>(),
         SolverKind::of::<sqp::SqpOptions>(),
         SolverKind::of::<pattern_search::PatternSearchOptions>(),
+        SolverKind::of::<cma_es::CmaEsOptions>(),
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),
         SolverKind::of::<nelder_mead::NelderMeadOptions>(),
         SolverKind::of::<particle_swarm::ParticleSwarmOptions>(),
