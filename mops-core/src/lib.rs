@@ -10,6 +10,7 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod effect;
+mod evaluator;
 mod experiment;
 pub mod expression;
 pub mod file;
@@ -43,6 +44,7 @@ pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use effect::{
     Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
 };
+pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
@@ -58,7 +60,7 @@ pub use outcome::{
 pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
-pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
+pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};

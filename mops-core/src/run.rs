@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::differences;
+use crate::differences::Differences;
+use crate::evaluator::Evaluator;
 use crate::model::Failure;
 use crate::problem::{Evaluation, Merit, Problem};
 use crate::random::{Stream, stream};
@@ -59,9 +60,9 @@ pub struct Record {
     pub merit: Merit,
 }
 
-/// A run of a solver on a problem.
-pub struct Run<'a> {
-    problem: &'a Problem,
+/// A run of a solver on a problem: that of a study, or one with a known answer.
+pub struct Run<'a, E: Evaluator = Problem> {
+    problem: &'a E,
     budget: Budget,
     watch: &'a dyn Watch,
     cache: HashMap<Vec<u64>, Evaluation>,
@@ -84,9 +85,9 @@ pub struct FailureCount {
     pub count: usize,
 }
 
-impl<'a> Run<'a> {
+impl<'a, E: Evaluator> Run<'a, E> {
     /// A run that has not begun.
-    pub fn new(problem: &'a Problem, budget: Budget, watch: &'a dyn Watch) -> Self {
+    pub fn new(problem: &'a E, budget: Budget, watch: &'a dyn Watch) -> Self {
         Self {
             problem,
             budget,
@@ -144,7 +145,7 @@ impl<'a> Run<'a> {
     }
 
     /// The problem.
-    pub fn problem(&self) -> &'a Problem {
+    pub fn problem(&self) -> &'a E {
         self.problem
     }
 
@@ -176,11 +177,11 @@ impl<'a> Run<'a> {
 }
 
 /// Bits of the values a point stands for: points that round to the same tuners are one.
-fn key(problem: &Problem, point: &[f64]) -> Vec<u64> {
+fn key(problem: &impl Evaluator, point: &[f64]) -> Vec<u64> {
     problem.tuners_at(point).into_iter().map(f64::to_bits).collect()
 }
 
-impl Oracle for Run<'_> {
+impl<E: Evaluator> Oracle for Run<'_, E> {
     fn shape(&self) -> &Shape {
         self.problem.shape()
     }
@@ -204,7 +205,11 @@ impl Oracle for Run<'_> {
                 return Err(Halt::Interrupted);
             }
             let problem = self.problem;
-            let evaluated: Vec<Evaluation> = batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect();
+            // A single point is not worth the way to another thread.
+            let evaluated: Vec<Evaluation> = match batch {
+                [i] => vec![problem.evaluate(&points[*i])],
+                _ => batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect(),
+            };
             for (&i, evaluation) in batch.iter().zip(evaluated) {
                 self.record(&evaluation);
                 self.cache.insert(keys[i].clone(), evaluation);
@@ -223,6 +228,7 @@ impl Oracle for Run<'_> {
 
     /// Exact slopes where models and criteria have them, differences elsewhere.
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        let differences = Differences::of_noise(self.problem.noise());
         let at = self.evaluate(&[point.to_vec()])?.pop().expect("one point, one answer");
         if at.scaled.is_none() {
             return Ok(None);
@@ -235,12 +241,12 @@ impl Oracle for Run<'_> {
             if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }
-            if let Some(slopes) = self.problem.slopes(&at, differences::step(reach)) {
+            if let Some(slopes) = self.problem.slopes(&at, differences.step(reach)) {
                 self.linearisations += 1;
                 return Ok(Some(Linearisation { at, rows: slopes.rows, residuals: slopes.residuals }));
             }
         }
-        differences::linearise(self, point, reach)
+        differences.linearise(self, point, reach)
     }
 
     fn best(&self) -> Option<&Evaluation> {
@@ -248,6 +254,6 @@ impl Oracle for Run<'_> {
     }
 
     fn stream(&self, label: &str) -> Stream {
-        stream(self.problem.study().seed, label)
+        stream(self.problem.seed(), label)
     }
 }
