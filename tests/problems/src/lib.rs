@@ -3,6 +3,7 @@
 //! Every problem is written once, over [`mops_core::Scalar`]: values come from plain numbers, exact slopes from dual ones.
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
 
+pub mod bbob;
 mod bounds;
 mod formula;
 mod posed;
@@ -29,5 +30,5 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![]
+    vec![bbob::SUITE]
 }
