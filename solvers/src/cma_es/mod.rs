@@ -42,7 +42,7 @@ pub struct CmaEsOptions {
 
 impl Default for CmaEsOptions {
     fn default() -> Self {
-        Self { population: 0, size: 0.2, tolerance: 1e-12, restarts: 9 }
+        Self { population: 0, size: 0.2, tolerance: 1e-10, restarts: 9 }
     }
 }
 
@@ -152,8 +152,13 @@ impl State {
         }
         run.distribution.update(&steps, &order);
         let values: Vec<f64> = order.iter().map(|&member| height(&answers[member])).collect();
-        let end = run.history.tell(&values, self.unit, &run.distribution);
-        Ok(end.or_else(|| (run.spent >= run.plan.evaluations).then_some(End::Stagnated)))
+        let first = answers[order[0]].merit;
+        let comparable = first.is_feasible() && self.best.is_feasible();
+        let behind = if comparable { first.objective - self.best.objective } else { 0.0 };
+        let end = run.history.tell(&values, self.unit, behind, &run.distribution);
+        // A run that found the best point may go on for as long as it likes.
+        let over = run.spent >= run.plan.evaluations && !run.improved;
+        Ok(end.or_else(|| over.then_some(End::Stagnated)))
     }
 }
 

@@ -16,6 +16,9 @@ pub struct History {
     tolerance: f64,
 }
 
+/// A run ends when its values differ by less than this share of what it lies behind the best known point.
+const WORSE_BASIN: f64 = 1e-2;
+
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
@@ -32,11 +35,15 @@ impl History {
     }
 
     /// Takes a generation's values, the best first, and says whether the run is over. `unit` is the order of magnitude of
-    /// the objective below which differences count absolutely.
+    /// the objective below which differences count absolutely, `behind` how far the generation lies above the best point of
+    /// the runs before.
+    ///
+    /// N.B.: a run whose values no longer differ by a hundredth of what it lies behind has found a worse basin, and ends;
+    /// the paper lets it converge.
     ///
     /// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009) 2389-2396.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn tell(&mut self, values: &[f64], unit: f64, at: &Distribution) -> Option<End> {
+    pub fn tell(&mut self, values: &[f64], unit: f64, behind: f64, at: &Distribution) -> Option<End> {
         let (n, population) = (at.mean.len() as f64, values.len() as f64);
         let (best, median) = (values[0], values[values.len() / 2]);
         self.best.push(best);
@@ -51,11 +58,15 @@ impl History {
             high - low
         };
         let flat = self.tolerance * best.abs().max(unit);
-        if self.recent.len() == window
-            && range(&mut self.recent.iter().copied()) <= flat
-            && (range(&mut values.iter().copied()) <= flat || self.has_repeated(window))
-        {
-            return Some(End::Converged);
+        if self.recent.len() == window {
+            let spread = range(&mut self.recent.iter().copied());
+            let spread = spread.max(range(&mut values.iter().copied()));
+            if spread <= flat || self.has_repeated(window) {
+                return Some(End::Converged);
+            }
+            if spread <= WORSE_BASIN * behind {
+                return Some(End::Stagnated);
+            }
         }
         if at.reach() < 1e-11 * self.first_sigma {
             return Some(End::Converged);
