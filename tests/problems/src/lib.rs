@@ -3,12 +3,17 @@
 //! Every problem is written once, over [`mops_core::Scalar`]: values come from plain numbers, exact slopes from dual ones.
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
 
+mod arithmetic;
 mod bounds;
 mod formula;
+mod hock_schittkowski;
+mod measure;
+mod minimax;
 mod posed;
 mod problem;
 
 pub use formula::{Formula, Functions, Outputs};
+pub use measure::{Measured, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
 
@@ -29,5 +34,5 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![]
+    vec![minimax::SUITE]
 }
