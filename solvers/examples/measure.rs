@@ -1,5 +1,5 @@
-use mops_problems::*;
 use mops_core::*;
+use mops_problems::*;
 use std::time::Instant;
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -7,10 +7,16 @@ fn main() {
     let slope = if args[2] == "g" { Slope::Exact } else { Slope::Differences };
     let kind = args.get(3).map_or("sqp", |s| s);
     let only = args.get(4);
-    let mut solved = 0; let mut evs = vec![]; let mut total = 0;
+    let mut solved = 0;
+    let mut evs = vec![];
+    let mut total = 0;
     let mut worst = vec![];
     for p in (suite.problems)() {
-        if let Some(o) = only { if *o != p.name { continue; } }
+        if let Some(o) = only {
+            if *o != p.name {
+                continue;
+            }
+        }
         let posed = Posed::new(&p, slope);
         let mut s = mops_solvers::kinds().into_iter().find(|k| k.name == kind).unwrap().default_choice().make();
         let t = Instant::now();
@@ -19,13 +25,32 @@ fn main() {
         total += 1;
         let e = m.evaluations_to(suite.accuracy);
         let ok = e.is_some();
-        if ok { solved += 1; evs.push(e.unwrap()); } else { worst.push(p.name.clone()); }
-        println!("{:16} n{:3} m{:4} f* {:>16.9e} reached {:>16.9e} viol {:.1e} ev3 {:>6} ev {:>6} of {:>6} lin {:>4} {:?} {:.1}ms {}",
-            p.name, p.dimension(), posed.shape().rows.len(), m.target.unwrap_or(f64::NAN), m.best.objective, m.best.violation,
-            m.evaluations_to(1e-3).map_or("-".into(), |e| e.to_string()), e.map_or("-".into(), |e| e.to_string()), m.history.len(), m.linearisations, m.stop, el*1e3,
-            if ok {""} else {"  <<<<<"});
-        if m.claims_what_is_violated() { println!("   FALSE SUCCESS"); }
+        if ok {
+            solved += 1;
+            evs.push(e.unwrap());
+        } else {
+            worst.push(p.name.clone());
+        }
+        println!(
+            "{:16} n{:3} m{:4} f* {:>16.9e} reached {:>16.9e} viol {:.1e} ev3 {:>6} ev {:>6} of {:>6} lin {:>4} {:?} {:.1}ms {}",
+            p.name,
+            p.dimension(),
+            posed.shape().rows.len(),
+            m.target.unwrap_or(f64::NAN),
+            m.best.objective,
+            m.best.violation,
+            m.evaluations_to(1e-3).map_or("-".into(), |e| e.to_string()),
+            e.map_or("-".into(), |e| e.to_string()),
+            m.history.len(),
+            m.linearisations,
+            m.stop,
+            el * 1e3,
+            if ok { "" } else { "  <<<<<" }
+        );
+        if m.claims_what_is_violated() {
+            println!("   FALSE SUCCESS");
+        }
     }
     evs.sort();
-    println!("solved {solved}/{total}, median {:?}, not: {worst:?}", evs.get(evs.len()/2));
+    println!("solved {solved}/{total}, median {:?}, not: {worst:?}", evs.get(evs.len() / 2));
 }

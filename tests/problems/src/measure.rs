@@ -46,7 +46,10 @@ pub fn measure<E: Evaluator>(
     let mut run = Run::new(posed, Budget { evaluations: budget }, &());
     let stop = run.solve(solver, start);
     let history: Vec<Merit> = run.archive().iter().map(|record| record.merit).collect();
-    let best = history.iter().copied().fold(Merit::FAILED, |best, merit| if merit.is_better_than(&best) { merit } else { best });
+    let best = history
+        .iter()
+        .copied()
+        .fold(Merit::FAILED, |best, merit| if merit.is_better_than(&best) { merit } else { best });
     let target = problem.nearest_minimum(best.objective);
     Measured { stop, best, target, history, linearisations: run.linearisations() }
 }
