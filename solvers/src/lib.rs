@@ -1,5 +1,6 @@
 //! Solvers of mops: one file each, behind one seam ([`mops_core::Solver`]).
 
+mod active_set;
 mod argmin_adapter;
 pub mod auto;
 pub mod cma_es;

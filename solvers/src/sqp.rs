@@ -34,7 +34,7 @@ pub struct SqpOptions {
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-7, radius: 0.1, max_iterations: 200 }
+        Self { tolerance: 1e-10, radius: 0.1, max_iterations: 200 }
     }
 }
 

@@ -4,12 +4,17 @@
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
 
 pub mod bbob;
+mod arithmetic;
 mod bounds;
 mod formula;
+mod hock_schittkowski;
+mod measure;
+mod minimax;
 mod posed;
 mod problem;
 
 pub use formula::{Formula, Functions, Outputs};
+pub use measure::{Measured, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
 
@@ -30,5 +35,5 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![bbob::SUITE]
+    vec![minimax::SUITE, bbob::SUITE]
 }

@@ -1,0 +1,3 @@
+//! Smooth problems with constraints.
+
+pub(crate) mod common;
