@@ -4,7 +4,9 @@ mod active_set;
 mod argmin_adapter;
 pub mod auto;
 pub mod cma_es;
+pub mod differential_evolution;
 pub mod epigraph;
+pub mod genetic;
 pub mod levenberg_marquardt;
 mod multistart;
 pub mod nelder_mead;
@@ -12,9 +14,11 @@ mod pareto;
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
+mod population;
 mod ranking;
 pub mod sqp;
 mod start;
+mod variation;
 
 use mops_core::SolverKind;
 
@@ -27,6 +31,8 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<sqp::SqpOptions>(),
         SolverKind::of::<pattern_search::PatternSearchOptions>(),
         SolverKind::of::<cma_es::CmaEsOptions>(),
+        SolverKind::of::<differential_evolution::DifferentialEvolutionOptions>(),
+        SolverKind::of::<genetic::GeneticOptions>(),
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),
         SolverKind::of::<nelder_mead::NelderMeadOptions>(),
         SolverKind::of::<particle_swarm::ParticleSwarmOptions>(),

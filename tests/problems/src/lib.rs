@@ -3,8 +3,8 @@
 //! Every problem is written once, over [`mops_core::Scalar`]: values come from plain numbers, exact slopes from dual ones.
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
 
-pub mod bbob;
 mod arithmetic;
+pub mod bbob;
 mod bounds;
 mod formula;
 mod hock_schittkowski;
