@@ -7,6 +7,7 @@ mod arithmetic;
 pub mod bbob;
 mod bounds;
 mod formula;
+mod fronts;
 mod hock_schittkowski;
 mod measure;
 mod minimax;
@@ -35,5 +36,5 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![minimax::SUITE, bbob::SUITE]
+    vec![minimax::SUITE, bbob::SUITE, fronts::ZDT, fronts::DTLZ, fronts::CONSTRAINED]
 }
