@@ -19,6 +19,11 @@ struct Found {
 }
 
 fn main() {
+    // Inside the pool, as the program runs: outside it every batch would wake another thread.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(all);
+}
+
+fn all() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [suite, kind, generations, seeds] = arguments.as_slice() else { panic!("fronts SUITE KIND GENERATIONS SEEDS") };
     let (generations, seeds) = (generations.parse().expect("a number"), seeds.parse().expect("a number"));

@@ -1,5 +1,7 @@
 //! NSGA-II: a front by non-dominated sorting and crowding.
 
+mod thinning;
+
 use std::cmp::Ordering;
 
 use mops_core::front::FrontSorter;
@@ -9,12 +11,14 @@ use serde::Deserialize;
 
 use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
 use crate::variation::Variation;
+use thinning::Thinning;
 
 /// Looks for the front of designs that no other is better than in every criterion (NSGA-II): members that few dominate
 /// survive, and of those the ones in sparse places. For two criteria, or three; needs `objective = "each"`. Feasible points
-/// win over infeasible ones.
+/// win over infeasible ones. The last front that fits only in part loses its most crowded members one by one.
 ///
-/// Source: K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197.
+/// Source: K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197;
+/// one by one: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga2Options {
@@ -63,6 +67,7 @@ pub struct Crowding {
     /// Places of the feasible points by rank, and where each rank begins.
     by_rank: Vec<u32>,
     begins: Vec<usize>,
+    thinning: Thinning,
 }
 
 impl Survival for Crowding {
@@ -78,12 +83,10 @@ impl Survival for Crowding {
             let (from, to) = (self.begins[rank], self.begins[rank + 1]);
             self.measure(pool, from, to);
             let left = keep - self.chosen.len();
-            let front = &mut self.by_rank[from..to];
-            if front.len() > left {
-                let distance = &self.distance;
-                front.sort_unstable_by(|&a, &b| distance[b as usize].total_cmp(&distance[a as usize]).then(a.cmp(&b)));
+            if to - from > left {
+                self.thinning.thin(pool, &mut self.by_rank[from..to], left, &mut self.distance);
             }
-            self.chosen.extend(front.iter().take(left));
+            self.chosen.extend(self.by_rank[from..to].iter().take(left));
             if self.chosen.len() == keep {
                 break;
             }
