@@ -34,5 +34,5 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![minimax::SUITE]
+    vec![hock_schittkowski::SUITE, minimax::SUITE]
 }
