@@ -14,7 +14,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
         hs(61, &[0.0; 3], [0, 2], -143.6461422, Functions::of(hs61, hs61)),
         within(&[[0.0, 1.0]; 3], hs(62, &[0.7, 0.2, 0.1], [0, 1], -26272.51449, Functions::of(hs62, hs62))),
         within(&[POSITIVE; 3], hs(63, &[2.0; 3], [0, 2], 961.7151721, Functions::of(hs63, hs63))),
-        within(&[[1e-5, f64::INFINITY]; 3], hs(64, &[1.0; 3], [1, 0], 6299.842428, Functions::of(hs64, hs64))),
+        within(&[[1e-5, 1e3]; 3], hs(64, &[1.0; 3], [1, 0], 6299.842428, Functions::of(hs64, hs64))),
         within(
             &[[-4.5, 4.5], [-4.5, 4.5], [-5.0, 5.0]],
             hs(65, &[-5.0, 5.0, 0.0], [1, 0], 0.9535288568, Functions::of(hs65, hs65)),

@@ -13,7 +13,8 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
     let exchangers = [[[100.0, 1e4], [1e3, 1e4], [1e3, 1e4]].to_vec(), vec![[10.0, 1e3]; 5]].concat();
     let power = [vec![POSITIVE; 2], vec![free; 2], vec![[0.90909, 1.0909]; 3], vec![free; 2]].concat();
     let hexagon = [vec![free; 8], vec![POSITIVE]].concat();
-    let grid = [vec![POSITIVE; 2], vec![[-0.55, 0.55]; 2], vec![[196.0, 252.0]; 3], vec![[-400.0, 800.0]; 2]].concat();
+    let grid =
+        [vec![[0.0, 1500.0]; 2], vec![[-0.55, 0.55]; 2], vec![[196.0, 252.0]; 3], vec![[-400.0, 800.0]; 2]].concat();
     vec![
         within(&geometric, hs(101, &[6.0; 7], [6, 0], 1809.76476, Functions::of(hs101, hs101))),
         within(&geometric, hs(102, &[6.0; 7], [6, 0], 911.88053, Functions::of(hs102, hs102))),

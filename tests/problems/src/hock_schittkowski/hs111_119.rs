@@ -4,7 +4,7 @@ use mops_core::Scalar;
 
 use super::common::hs113;
 use super::hs071_086::colville;
-use super::{POSITIVE, hs, within};
+use super::{hs, within};
 use crate::arithmetic::{c, cube, dot, sq, sum};
 use crate::formula::Functions;
 use crate::problem::Problem;
@@ -36,7 +36,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
             &MEMBRANE.map(|[_, low, high]| [low, high]),
             hs(116, &MEMBRANE.map(|v| v[0]), [15, 0], 97.58750956, Functions::of(hs116, hs116)),
         ),
-        within(&[POSITIVE; 15], hs(117, &shell, [5, 0], 32.34867897, Functions::of(hs117, hs117))),
+        within(&[[0.0, 100.0]; 15], hs(117, &shell, [5, 0], 32.34867897, Functions::of(hs117, hs117))),
         within(&quarters(), hs(118, &QUARTERS, [29, 0], 664.82045, Functions::of(hs118, hs118))),
         within(&[[0.0, 5.0]; 16], hs(119, &[10.0; 16], [0, 8], 244.899698, Functions::of(hs119, hs119))),
     ]
