@@ -57,7 +57,8 @@ impl Rows {
         if shape.objective == Objective::Sum || objectives.is_empty() {
             let n = shape.dimension();
             let sum = |slope: Vec<f64>, row: &Linear| slope.iter().zip(&row.slope).map(|(a, b)| a + b).collect();
-            let slope = objectives.iter().fold(vec![0.0; n], sum);
+            let slope =
+                if slopes.iter().all(Vec::is_empty) { Vec::new() } else { objectives.iter().fold(vec![0.0; n], sum) };
             objectives = vec![Linear { value: objectives.iter().map(|row| row.value).sum(), slope }];
         }
         Self { objectives, inequalities: pick(Usage::Inequality, 1.0), equalities: pick(Usage::Equality, 1.0) }
@@ -152,6 +153,13 @@ pub struct Multipliers {
     pub inequalities: Vec<f64>,
     /// Of the equalities, signed.
     pub equalities: Vec<f64>,
+}
+
+impl Multipliers {
+    /// The sum of those of constraints.
+    pub fn of_constraints(&self) -> f64 {
+        self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
+    }
 }
 
 /// The solution of the subproblem.

@@ -9,13 +9,20 @@ use nalgebra::{DMatrix, DVector};
 pub struct Scale {
     ideal: Vec<f64>,
     nadir: Vec<f64>,
+    /// The worst of every objective ever seen.
+    worst: Vec<f64>,
     extremes: Vec<Vec<f64>>,
 }
 
 impl Scale {
     /// Of `m` objectives, before any point.
     pub fn new(m: usize) -> Self {
-        Self { ideal: vec![f64::INFINITY; m], nadir: vec![1.0; m], extremes: Vec::new() }
+        Self {
+            ideal: vec![f64::INFINITY; m],
+            nadir: vec![1.0; m],
+            worst: vec![f64::NEG_INFINITY; m],
+            extremes: Vec::new(),
+        }
     }
 
     /// Takes the objectives of a generation with their ranks.
@@ -24,6 +31,7 @@ impl Scale {
         let rows = || objectives.chunks_exact(m);
         for row in rows() {
             self.ideal.iter_mut().zip(row).for_each(|(ideal, f)| *ideal = ideal.min(*f));
+            self.worst.iter_mut().zip(row).for_each(|(worst, f)| *worst = worst.max(*f));
         }
         let front: Vec<&[f64]> = rows().zip(ranks).filter(|(_, rank)| **rank == 0).map(|(row, _)| row).collect();
         // Extreme along an axis: the least of what the achievement function of that axis gives.
@@ -40,26 +48,21 @@ impl Scale {
         self.extremes = extremes;
         let worst = |k: usize| front.iter().map(|row| row[k]).fold(f64::NEG_INFINITY, f64::max);
         let worst_of_front: Vec<f64> = (0..m).map(worst).collect();
-        let intercepts = self.intercepts(&worst_of_front);
+        let intercepts = self.intercepts();
         for k in 0..m {
             let all = rows().map(|row| row[k]).fold(f64::NEG_INFINITY, f64::max);
-            let nadir = intercepts.as_ref().map_or(worst_of_front[k], |found| found[k]);
-            self.nadir[k] = if nadir - self.ideal[k] > 1e-6 * nadir.abs().max(1e-12) { nadir } else { all };
+            let nadir = intercepts.as_ref().map_or(worst_of_front[k], |found| found[k].min(self.worst[k]));
+            self.nadir[k] = if nadir - self.ideal[k] > 1e-6 { nadir } else { all };
         }
     }
 
-    /// Where the plane through the extreme points meets the axes; `None` where it does not, or lies beyond the front.
-    fn intercepts(&self, worst_of_front: &[f64]) -> Option<Vec<f64>> {
+    /// Where the plane through the extreme points meets the axes; `None` where it does not.
+    fn intercepts(&self) -> Option<Vec<f64>> {
         let m = self.ideal.len();
         let plane = DMatrix::from_fn(m, m, |i, k| self.extremes[i][k] - self.ideal[k]);
         let normal = plane.lu().solve(&DVector::from_element(m, 1.0))?;
-        let found: Vec<f64> = (0..m).map(|k| self.ideal[k] + 1.0 / normal[k]).collect();
-        let usable = |k: usize| {
-            found[k].is_finite()
-                && found[k] - self.ideal[k] > 1e-6
-                && found[k] <= worst_of_front[k] * (1.0 + 1e-9) + 1e-9
-        };
-        (0..m).all(usable).then_some(found)
+        let usable = |k: usize| normal[k].is_finite() && 1.0 / normal[k] > 1e-6;
+        (0..m).all(usable).then(|| (0..m).map(|k| self.ideal[k] + 1.0 / normal[k]).collect())
     }
 
     /// The `k`-th objective on its scale.

@@ -11,6 +11,7 @@ mod fronts;
 mod hock_schittkowski;
 mod measure;
 mod minimax;
+mod more_wild;
 mod posed;
 mod problem;
 
@@ -36,5 +37,15 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![minimax::SUITE, bbob::SUITE, fronts::ZDT, fronts::DTLZ, fronts::CONSTRAINED]
+    vec![
+        hock_schittkowski::SUITE,
+        minimax::SUITE,
+        more_wild::SMOOTH,
+        more_wild::PIECEWISE,
+        more_wild::NOISY,
+        bbob::SUITE,
+        fronts::ZDT,
+        fronts::DTLZ,
+        fronts::CONSTRAINED,
+    ]
 }

@@ -28,6 +28,8 @@ pub struct Problem {
     pub equalities: usize,
     /// What is known of the solution.
     pub answer: Answer,
+    /// Accuracy that counts as solved, where it is not that of the suite.
+    pub accuracy: Option<f64>,
     /// The functions.
     pub functions: Functions,
 }
@@ -90,6 +92,7 @@ impl Problem {
             inequalities: 0,
             equalities: 0,
             answer: answer.into(),
+            accuracy: None,
             functions,
         }
     }

@@ -14,12 +14,16 @@ pub(super) fn problems() -> Vec<Problem> {
         Problem::new("Davidon2", &[25.0, 5.0, -5.0, -1.0], 115.7064395, Functions::of(davidon2, davidon2)),
         Problem::new("OET5", &[1.0; 4], 0.2635973497e-2, Functions::of(oet5, oet5)),
         Problem::new("OET6", &[1.0, 1.0, -3.0, -1.0], 0.2016075379e-2, Functions::of(oet6, oet6)),
-        Problem::new("GAMMA", &[1.0, 1.0, 10.0, 1.0], 0.1198679749e-6, Functions::of(gamma, gamma)),
+        Problem {
+            reach: 400.0,
+            accuracy: Some(1e-6),
+            ..Problem::new("GAMMA", &[1.0, 1.0, 10.0, 1.0], 0.1198679749e-6, Functions::of(gamma, gamma))
+        },
         Problem::new("EXP", &[0.5, 0.0, 0.0, 0.0, 0.0], 0.1223712511e-3, Functions::of(exp, exp)),
         Problem::new("PBC1", &[0.0, -1.0, 10.0, 1.0, 10.0], 0.2234049605e-1, Functions::of(pbc1, pbc1)),
         Problem::new("EVD61", &[2.0, 2.0, 7.0, 0.0, -2.0, 1.0], 0.3490492654e-1, Functions::of(evd61, evd61)),
         Problem::new("Filter", &FILTER, 0.6185284778e-2, Functions::of(filter, filter)),
-        Problem::new("Watson", &[0.0; 20], 3.3e-10, Functions::of(watson, watson)),
+        Problem { accuracy: Some(1e-6), ..Problem::new("Watson", &[0.0; 20], 3.3e-10, Functions::of(watson, watson)) },
         Problem::new("Osborne2", &OSBORNE2, 0.4802740071e-1, Functions::of(osborne2, osborne2)),
     ];
     curves.into_iter().map(|problem| Problem { sense: Sense::MaxAbs, ..problem }).collect()
