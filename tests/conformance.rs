@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use mops::{
     Analysis, Budget, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Interface, Job, Mistake, Model,
-    Oracle, Parameter, Problem, Response, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value, Variable,
-    Watch,
+    Objective, Oracle, Parameter, Problem, Response, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value,
+    Variable, Watch,
 };
 
 /// A function of the tuners, dressed as a model: signal `i` is constant at `f(x)[i]`.
@@ -54,6 +54,15 @@ impl Criterion for End {
 
 /// A study of `f` over the box [-2, 2]^n, starting at 1.5, with a usage for every value.
 fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
+    study_of(Objective::Max, n, usages, f)
+}
+
+/// The same twice: for one number, and for a front. Solvers for fronts take the second alone.
+fn problems(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> [Problem; 2] {
+    [Objective::Max, Objective::Each].map(|objective| Problem::new(Arc::new(study_of(objective, n, usages, f))))
+}
+
+fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
     let name = |prefix: &str, i: usize| format!("{prefix}{i}");
     let interface = Interface {
         signals: (0..usages.len()).map(|i| Variable::new(name("f", i), "1", "value")).collect(),
@@ -63,6 +72,7 @@ fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study
     };
     Draft {
         name: "function".into(),
+        objective: Some(objective),
         models: vec![("function".into(), Function { interface, f }.into())],
         tuners: (0..n).map(|j| (name("x", j), TunerDraft::new(1.5, -2.0, 2.0))).collect(),
         criteria: usages
@@ -122,6 +132,19 @@ fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
     Problem::new(Arc::new(study.build().unwrap()))
 }
 
+/// Every problem with every kind of solver that accepts it; those for fronts alone with the second.
+fn both(problems: [Problem; 2]) -> Vec<(Arc<Problem>, SolverKind)> {
+    let [one, front] = problems.map(Arc::new);
+    let ordinary = solvers(&one);
+    let mut for_fronts = solvers(&front);
+    for_fronts.retain(|kind| kind.name == "auto" || ordinary.iter().all(|known| known.name != kind.name));
+    assert!(for_fronts.len() >= 3, "auto and two more look for fronts");
+    let with = |problem: &Arc<Problem>, kinds: Vec<SolverKind>| -> Vec<(Arc<Problem>, SolverKind)> {
+        kinds.into_iter().map(|kind| (Arc::clone(problem), kind)).collect()
+    };
+    [with(&one, ordinary), with(&front, for_fronts)].concat()
+}
+
 /// Every kind of solver that accepts the study.
 fn solvers(problem: &Problem) -> Vec<SolverKind> {
     let mut kinds = mops::catalogue().solvers;
@@ -154,8 +177,7 @@ fn kink(x: &[f64]) -> Option<Vec<f64>> {
 #[test]
 fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
     for budget in [1, 2, 7, 50] {
-        let problem = Problem::new(Arc::new(study(3, MINIMISE, kink)));
-        for kind in solvers(&problem) {
+        for (problem, kind) in both(problems(3, MINIMISE, kink)) {
             let solved = solve(&problem, &kind, budget, &());
             assert!(solved.points.len() <= budget, "{}: {}", kind.name, solved.points.len());
             assert!(solved.stop != Stop::Budget || solved.points.len() == budget, "{}", kind.name);
@@ -166,8 +188,7 @@ fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
 
 #[test]
 fn every_solver_comes_near_the_kink_of_two_criteria() {
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((1.25 - 1e-9..1.26).contains(&found), "{}: {found}", kind.name);
     }
@@ -175,8 +196,7 @@ fn every_solver_comes_near_the_kink_of_two_criteria() {
 
 #[test]
 fn same_seed_same_bits_for_any_number_of_threads() {
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
         let points = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| solve(&problem, &kind, 300, &()).points)
@@ -188,8 +208,7 @@ fn same_seed_same_bits_for_any_number_of_threads() {
 #[test]
 fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
     // The start (1.5, ...) lies in the half that fails.
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) })));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) })) {
         let solved = solve(&problem, &kind, 5000, &());
         let found = solved.best.merit.objective;
         assert!(found < 1.3, "{}: {found}", kind.name);
@@ -198,8 +217,7 @@ fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
 
 #[test]
 fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, |_| None)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, |_| None)) {
         let solved = solve(&problem, &kind, 300, &());
         assert!(solved.best.scaled.is_none(), "{}", kind.name);
     }
@@ -207,16 +225,14 @@ fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
 
 #[test]
 fn a_constant_objective_ends() {
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, |_| Some(vec![1.0, 1.0]))));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, |_| Some(vec![1.0, 1.0]))) {
         assert_eq!(solve(&problem, &kind, 50_000, &()).best.merit.objective, 1.0, "{}", kind.name);
     }
 }
 
 #[test]
 fn one_tuner_is_enough() {
-    let problem = Problem::new(Arc::new(study(1, MINIMISE, kink)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(1, MINIMISE, kink)) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((found - 1.25).abs() < 1e-3, "{}: {found}", kind.name);
     }
@@ -224,10 +240,12 @@ fn one_tuner_is_enough() {
 
 #[test]
 fn no_active_tuner_leaves_the_start() {
-    let mut fixed = study(1, MINIMISE, kink);
-    fixed.tuners[0].active = false;
-    let problem = Problem::new(Arc::new(fixed));
-    for kind in solvers(&problem) {
+    let fixed = [Objective::Max, Objective::Each].map(|objective| {
+        let mut fixed = study_of(objective, 1, MINIMISE, kink);
+        fixed.tuners[0].active = false;
+        Problem::new(Arc::new(fixed))
+    });
+    for (problem, kind) in both(fixed) {
         let solved = solve(&problem, &kind, 100, &());
         assert_eq!(solved.points, [[1.5]], "{}", kind.name);
     }
@@ -238,8 +256,7 @@ fn constraints_are_met_where_they_can_be() {
     // Least |x|^2 with x0 >= 0.8, written as 1.8 - x0 <= 1.
     let usages = [Usage::Minimise, Usage::Inequality];
     let f = |x: &[f64]| Some(vec![x.iter().map(|x| x * x).sum(), 1.8 - x[0]]);
-    let problem = Problem::new(Arc::new(study(2, &usages, f)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, &usages, f)) {
         let best = solve(&problem, &kind, 5000, &()).best;
         assert!(best.merit.is_feasible(), "{}: {:?}", kind.name, best.merit);
         assert!(best.merit.objective < 0.70, "{}: {:?}", kind.name, best.merit);
@@ -251,8 +268,7 @@ fn an_infeasible_problem_ends_at_a_small_violation() {
     // x0 >= 1.5 and x0 <= 0.5: the least violation is 0.5, at 1.
     let usages = [Usage::Minimise, Usage::Inequality, Usage::Inequality];
     let f = |x: &[f64]| Some(vec![x[1] * x[1], 2.5 - x[0], 0.5 + x[0]]);
-    let problem = Problem::new(Arc::new(study(2, &usages, f)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, &usages, f)) {
         let violation = solve(&problem, &kind, 5000, &()).best.merit.violation;
         assert!((0.5 - 1e-9..0.55).contains(&violation), "{}: {violation}", kind.name);
     }
@@ -264,8 +280,7 @@ fn a_criterion_that_jumps_ends_near_its_least_value() {
         let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
         Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
     };
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, f)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, f)) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!(found < 0.2, "{}: {found}", kind.name);
     }
@@ -276,8 +291,7 @@ fn scales_of_1e_minus_12_and_1e12_are_no_obstacle() {
     let small = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e-12 * f).collect());
     let large = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e12 * f).collect());
     for (f, scale) in [(small as fn(&[f64]) -> Option<Vec<f64>>, 1e-12), (large, 1e12)] {
-        let problem = Problem::new(Arc::new(study(2, MINIMISE, f)));
-        for kind in solvers(&problem) {
+        for (problem, kind) in both(problems(2, MINIMISE, f)) {
             let found = solve(&problem, &kind, 5000, &()).best.merit.objective / scale;
             assert!(found < 1.6, "{} at {scale}: {found}", kind.name);
         }
@@ -292,8 +306,7 @@ fn an_interrupt_ends_every_solver_with_the_best_so_far() {
             true
         }
     }
-    let problem = Problem::new(Arc::new(study(2, MINIMISE, kink)));
-    for kind in solvers(&problem) {
+    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
         let solved = solve(&problem, &kind, 5000, &Impatient);
         assert_eq!(solved.stop, Stop::Interrupted, "{}", kind.name);
         assert!(solved.best.scaled.is_some(), "{}", kind.name);
@@ -313,7 +326,8 @@ fn failures_are_counted_in_the_result() {
 fn every_kind_of_solver_takes_part() {
     let design = Problem::new(Arc::new(study(2, MINIMISE, kink)));
     let least_squares = line(|x| Some(x.to_vec()));
-    let taking_part = [solvers(&design), solvers(&least_squares)].concat();
+    let front = Problem::new(Arc::new(study_of(Objective::Each, 2, MINIMISE, kink)));
+    let taking_part = [solvers(&design), solvers(&least_squares), solvers(&front)].concat();
     for kind in mops::catalogue().solvers {
         assert!(taking_part.iter().any(|k| k.name == kind.name), "{}", kind.name);
     }
@@ -361,4 +375,41 @@ fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
     let evaluation = problem.evaluate(&[0.5]);
     assert_eq!(evaluation.merit.objective, 0.0);
     assert!(evaluation.readings[1].is_none() && evaluation.failures.len() == 1);
+}
+
+#[test]
+fn whole_numbers_and_few_of_them_end_at_the_best() {
+    // The least of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
+    let whole = [Objective::Max, Objective::Each].map(|objective| {
+        let mut whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![(x[0] - 1.3).powi(2)]));
+        whole.tuners[0].grid = mops::Grid::Integer;
+        whole.tuners[0].start = -2.0;
+        Problem::new(Arc::new(whole))
+    });
+    for (problem, kind) in both(whole) {
+        let solved = solve(&problem, &kind, 5000, &());
+        assert!(solved.points.len() <= 5, "{}: no value is evaluated twice", kind.name);
+        assert_eq!(solved.best.tuners, [1.0], "{}", kind.name);
+    }
+}
+
+#[test]
+fn the_front_of_a_run_has_no_point_that_another_is_better_than() {
+    // Two parabolas along x0: the front is 0 <= x0 <= 1 with the rest 0; x0 >= 0.4 cuts off a part.
+    let usages = [Usage::Minimise, Usage::Minimise, Usage::Inequality];
+    let f = |x: &[f64]| kink(x).map(|f| vec![f[0], f[1], 1.4 - x[0]]);
+    let problem = Problem::new(Arc::new(study_of(Objective::Each, 3, &usages, f)));
+    for kind in solvers(&problem).into_iter().filter(|kind| ["auto", "nsga2", "nsga3"].contains(&kind.name)) {
+        let mut run = Run::new(&problem, Budget { evaluations: 5000 }, &());
+        run.solve(kind.default_choice().make().as_mut(), &problem.start());
+        let front: Vec<&[f64]> = run.front().iter().map(|&i| run.archive()[i].objectives.as_slice()).collect();
+        assert!(front.len() >= 50, "{}: {}", kind.name, front.len());
+        let better = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a <= b) && a != b;
+        assert!(front.iter().all(|a| !front.iter().any(|b| better(b, a))), "{}", kind.name);
+        // On the true front f1 = (sqrt(f0 - 1) - 1)^2 + 1.
+        let off = |f: &&[f64]| f[1] - ((f[0] - 1.0).max(0.0).sqrt() - 1.0).powi(2) - 1.0;
+        let mean = front.iter().map(off).sum::<f64>() / front.len() as f64;
+        assert!(mean < 0.01, "{}: {mean}", kind.name);
+        assert!(front.iter().all(|f| f[0] >= 1.16 - 1e-5), "{}: the constraint holds", kind.name);
+    }
 }

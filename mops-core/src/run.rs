@@ -172,8 +172,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
     /// # Panics
     /// If there are not so many.
     pub fn evaluation(&self, index: usize) -> &Evaluation {
-        let key: Vec<u64> = self.archive[index].tuners.iter().map(|value| value.to_bits()).collect();
-        &self.cache[&key]
+        &self.cache[&bits(&self.archive[index].tuners)]
     }
 
     fn record(&mut self, evaluation: &Evaluation) {
@@ -239,7 +238,12 @@ impl Hasher for Bits {
 
 /// Bits of the values a point stands for: points that round to the same tuners are one.
 fn key(problem: &impl Evaluator, point: &[f64]) -> Vec<u64> {
-    problem.tuners_at(point).into_iter().map(f64::to_bits).collect()
+    bits(&problem.tuners_at(point))
+}
+
+/// Bits of values; minus zero, to which small negative numbers round, is zero.
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
 
 impl<E: Evaluator> Oracle for Run<'_, E> {

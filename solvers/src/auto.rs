@@ -1,11 +1,13 @@
 //! The solver for those who do not choose one.
 
-use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
 use crate::multistart::Multistart;
+use crate::nsga2::Nsga2Options;
+use crate::nsga3::Nsga3Options;
 use crate::pattern_search::PatternSearchOptions;
 use crate::sqp::SqpOptions;
 
@@ -13,7 +15,8 @@ use crate::sqp::SqpOptions;
 /// numbers or lists, else `sqp`; from several starts: the study's own, and the best points of a sample of the box. Where
 /// the objective is no sum of squares a pattern search follows from the best point found, because an optimum may lie on a
 /// jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the best point
-/// until nothing changes.
+/// until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is `nsga2` for two criteria and
+/// `nsga3` for more.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -41,6 +44,8 @@ struct Auto {
 }
 
 enum Stage {
+    /// Where every criterion counts for itself.
+    Front(Box<dyn Solver>),
     /// From several starts.
     Global(Multistart),
     /// From the best point; with whether the first stage met a test of an optimum.
@@ -53,6 +58,12 @@ impl Solver for Auto {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        if oracle.shape().objective == Objective::Each {
+            let mut front = front(oracle.shape());
+            front.begin(oracle, start)?;
+            self.stage = Some(Stage::Front(front));
+            return Ok(());
+        }
         let mut global = Multistart::new(choose(oracle.shape()), self.options.starts);
         if oracle.shape().residuals > 0 {
             global = global.until_nothing_changes();
@@ -64,6 +75,7 @@ impl Solver for Auto {
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         match self.stage.as_mut().expect("begin comes first") {
+            Stage::Front(front) => front.step(oracle),
             Stage::Global(global) => {
                 let progress = global.step(oracle)?;
                 if progress == Progress::Continue || oracle.shape().residuals > 0 {
@@ -82,6 +94,12 @@ impl Solver for Auto {
             },
         }
     }
+}
+
+/// Crowding spreads two objectives evenly, reference directions more of them.
+fn front(shape: &Shape) -> Box<dyn Solver> {
+    let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+    if objectives <= 2 { Nsga2Options::default().build() } else { Nsga3Options::default().build() }
 }
 
 fn choose(shape: &Shape) -> Box<dyn Solver> {

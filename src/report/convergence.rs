@@ -129,8 +129,12 @@ mod tests {
 
     #[test]
     fn the_best_point_is_kept_until_a_better_one_comes() {
-        let record =
-            |violation, objective| Record { tuners: vec![], values: vec![], objectives: vec![], merit: Merit { violation, objective } };
+        let record = |violation, objective| Record {
+            tuners: vec![],
+            values: vec![],
+            objectives: vec![],
+            merit: Merit { violation, objective },
+        };
         let archive = [
             record(0.5, 1.0),
             record(f64::INFINITY, f64::INFINITY),
