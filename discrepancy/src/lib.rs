@@ -18,6 +18,7 @@ mod plan;
 mod repaired;
 mod screen;
 mod search;
+mod short_term;
 mod stopgap;
 mod subject;
 #[cfg(test)]
@@ -35,5 +36,5 @@ pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
-    StrengthValue, Unexplained, Verdict,
+    StrengthValue, Unexplained, Verdict, WindowErrors,
 };

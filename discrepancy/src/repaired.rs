@@ -129,6 +129,7 @@ impl Calibrated {
                 role: m.role,
                 channels,
                 normalised: (sum / count.max(1) as f64).sqrt(),
+                in_windows: None,
             }
         };
         measurements.iter().zip(&self.experiments).map(error).collect()
