@@ -69,8 +69,27 @@ pub struct Fit<'a> {
     pub globals: Vec<Global>,
     /// The pieces.
     pub pieces: Vec<Piece>,
+    /// What is expected of some of the globals.
+    pub expected: Vec<Expected>,
     /// Counts simulations.
     pub simulations: &'a AtomicUsize,
+}
+
+/// Globals, one after the other, that are expected to be normal about 0.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// The first of them.
+    pub first: usize,
+    /// Turns them into independent ones of variance 1.
+    pub whitening: Arc<DMatrix<f64>>,
+}
+
+impl Expected {
+    /// The independent ones at a point.
+    fn at(&self, point: &Point) -> DVector<f64> {
+        let values = &point.globals[self.first..self.first + self.whitening.ncols()];
+        self.whitening.as_ref() * DVector::from_column_slice(values)
+    }
 }
 
 /// Residuals of a piece, channel by channel, and their slopes.
@@ -196,10 +215,15 @@ impl Fit<'_> {
         (0..self.pieces.len()).into_par_iter().map(|piece| self.residuals(piece, point, slopes)).collect()
     }
 
-    /// Sum of squares; infinite where a simulation fails.
-    pub fn chi2(&self, point: &Point) -> f64 {
-        self.all(point, false)
-            .map_or(f64::INFINITY, |all| all.iter().map(|p| p.r.iter().map(|r| r * r).sum::<f64>()).sum())
+    /// Sum of squares, with those of what is expected; infinite where a simulation fails.
+    fn chi2(&self, point: &Point) -> f64 {
+        let squares = |all: Vec<Residuals>| all.iter().map(|p| p.r.iter().map(|r| r * r).sum::<f64>()).sum::<f64>();
+        self.all(point, false).map_or(f64::INFINITY, |all| squares(all) + self.unexpected(point))
+    }
+
+    /// Sum of the squares of the globals of which something is expected, in units of that.
+    fn unexpected(&self, point: &Point) -> f64 {
+        self.expected.iter().map(|expected| expected.at(point).norm_squared()).sum()
     }
 
     fn unknowns(&self) -> usize {
@@ -232,6 +256,18 @@ impl Fit<'_> {
                 }
             }
             offset += locals;
+        }
+        for expected in &self.expected {
+            let at = expected.at(point);
+            let turn = DMatrix::from_fn(at.len(), expected.whitening.ncols(), |i, k| {
+                expected.whitening[(i, k)] * self.stretch(expected.first + k, point.globals[expected.first + k])
+            });
+            let (first, n) = (expected.first, turn.ncols());
+            chi2 += at.norm_squared();
+            let mut part = gradient.rows_mut(first, n);
+            part += turn.tr_mul(&at);
+            let mut part = matrix.view_mut((first, first), (n, n));
+            part += turn.tr_mul(&turn);
         }
         Some(Normal { chi2, matrix, gradient })
     }
@@ -316,7 +352,7 @@ impl Fit<'_> {
         }
         let held = self.held(&point, &normal.gradient);
         let covariance = self.covariance(&point, &normal, &held);
-        Some(Fitted { chi2: normal.chi2, count, covariance, point })
+        Some(Fitted { chi2: normal.chi2 - self.unexpected(&point), count, covariance, point })
     }
 
     /// Covariance of the globals for residuals of size 1, the locals eliminated.
