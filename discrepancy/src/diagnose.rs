@@ -101,7 +101,7 @@ pub fn diagnose(
         }
         let pairs = if k == 0 && options.max_effects > 1 && best.fitted.normalised() > UNEXPLAINED {
             watch.stage("pairs of effects", 0.3);
-            search.pairs(&current, &round.screened)
+            search.pairs(&current, &round)
         } else {
             Vec::new()
         };
@@ -235,10 +235,9 @@ pub fn diagnose(
 
 /// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.
 fn contradiction(last: &Trial<'_>, after: &Calibrated) -> f64 {
-    let Some(all) = last.fit.all(&last.fitted.point, false) else { return f64::INFINITY };
     let own = |measurement: usize| last.fit.subject.measurements[measurement].role == Role::Calibration;
-    let together = last.fit.pieces.iter().zip(&all).filter(|(piece, _)| own(piece.measurement));
-    let together: f64 = together.map(|(_, residuals)| dot(&residuals.r, &residuals.r)).sum();
+    let together = last.fit.pieces.iter().zip(&last.fitted.residuals).filter(|(piece, _)| own(piece.measurement));
+    let together: f64 = together.map(|(_, residuals)| dot(residuals, residuals)).sum();
     (together - after.chi2) / after.square
 }
 

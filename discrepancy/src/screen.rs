@@ -23,6 +23,8 @@ pub struct Scene {
     pub begins: Vec<usize>,
     /// Orthonormal directions that the unknowns can absorb.
     pub basis: Vec<Vec<f64>>,
+    /// Residuals and slopes of each piece.
+    pub slopes: Vec<Residuals>,
 }
 
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
@@ -52,7 +54,7 @@ pub struct Screened {
 impl Scene {
     /// The scene of a fit; `None` where a simulation fails.
     pub fn new(fit: &Fit<'_>, model: &WithEffects, fitted: &Fitted) -> Option<Self> {
-        let all = fit.all(&fitted.point, true)?;
+        let all = fit.slopes(&fitted.point)?;
         let pieces: Vec<usize> = (0..fit.pieces.len()).collect();
         let trajectories: Option<Vec<Trajectory>> =
             pieces.par_iter().map(|&piece| Trajectory::new(fit, model, piece, &fitted.point).ok()).collect();
@@ -61,7 +63,8 @@ impl Scene {
             begins.push(begins[begins.len() - 1] + piece.r.len());
         }
         let residuals = all.iter().flat_map(|piece| piece.r.iter().copied()).collect();
-        Some(Self { trajectories: trajectories?, residuals, basis: basis(&all, &begins, fit.globals.len()), begins })
+        let basis = basis(&all, &begins, fit.globals.len());
+        Some(Self { trajectories: trajectories?, residuals, basis, begins, slopes: all })
     }
 
     /// A trace without what the unknowns absorb.

@@ -36,8 +36,7 @@ impl Search<'_> {
         for window in windows {
             let locals = vec![window.locals.iter().map(|local| local.start).collect()];
             let (fit, fitted) = self.starts(&model.added, &model.tuners, vec![window], locals, 30)?;
-            let residuals = fit.residuals(0, &fitted.point, false)?.r;
-            let mut rest = residuals.as_slice();
+            let mut rest = fitted.residuals[0].as_slice();
             for (series, (sum, samples)) in fit.pieces[0].series.iter().zip(&mut squares) {
                 let (own, others) = rest.split_at(series.times.len());
                 *sum += own.iter().map(|r| r * r).sum::<f64>();

@@ -73,7 +73,7 @@ impl Trajectory {
             knots.windows(2).zip(moments.chunks(2)).map(|(ends, m)| interval(ends[1] - ends[0], m)).collect();
         let place = |t: f64| sampled.partition_point(|&s| s < t - 1e-9 * (1.0 + t.abs())) * parts;
         let samples = p.series.iter().map(|s| s.times.iter().map(|&t| place(t)).collect()).collect();
-        let residuals = fit.residuals(piece, point, false).ok_or(Failure::Diverged(0.0))?.r;
+        let residuals = fit.residuals(piece, point).ok_or(Failure::Diverged(0.0))?;
         let mut at = 0;
         let predicted = p.series.iter().map(|s| {
             let part = &residuals[at..at + s.times.len()];
