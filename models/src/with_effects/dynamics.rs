@@ -90,6 +90,8 @@ pub(super) struct Driven<'a, S> {
     longest_step: f64,
     /// For each signal the state that it shows as it is.
     shows: Vec<Option<usize>>,
+    /// The same of those that no effect changes.
+    untouched: Vec<Option<usize>>,
     /// What a clock shows at time 0, s.
     begins: f64,
     started: bool,
@@ -127,6 +129,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             let all = of.states.len() == own;
             of.states.iter().position(|state| all && state.signal.as_ref() == Some(&signal.name))
         };
+        let shows: Vec<Option<usize>> = of.signals.iter().map(shown).collect();
+        let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
+        let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
         let begins = job.case.begins;
         let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
         let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
@@ -142,7 +147,8 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
-            shows: of.signals.iter().map(shown).collect(),
+            shows,
+            untouched,
             begins,
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
@@ -462,6 +468,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
         self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own])
+    }
+
+    fn shows(&self, signal: usize) -> Option<usize> {
+        self.untouched[signal]
     }
 
     fn next_break(&self, t: f64) -> f64 {
