@@ -37,8 +37,11 @@ fn record(run: usize) -> Record {
     Record { inputs, times, signals: vec![("x", values, NOISE)] }
 }
 
-/// Terms of a force, as functions of position and speed.
-const TERMS: [(&str, fn(f64, f64) -> f64); 4] = [
+/// A force by position and speed.
+type Force = fn(f64, f64) -> f64;
+
+/// Terms of a force.
+const TERMS: [(&str, Force); 4] = [
     ("cubic-stiffness", |x, _| x * x * x),
     ("coulomb-friction", |_, v| v.signum()),
     ("quadratic-drag", |_, v| v * v.abs()),
@@ -49,7 +52,7 @@ const TERMS: [(&str, fn(f64, f64) -> f64); 4] = [
 fn by_differences(record: &Record) -> &'static str {
     let y = &record.signals[0].1;
     let inner = 1..y.len() - 1;
-    let left = |term: fn(f64, f64) -> f64| {
+    let left = |term: Force| {
         let row = |i: usize| {
             let v = (y[i + 1] - y[i - 1]) / (2.0 * STEP);
             let a = (y[i + 1] - 2.0 * y[i] + y[i - 1]) / (STEP * STEP);
