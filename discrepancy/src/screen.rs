@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Residuals, dot};
-use crate::trace_of::{sizes, trace};
+use crate::trace_of::{View, sizes};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -147,6 +147,9 @@ fn best_of(
     let shared = |c: &[f64]| -> Vec<u64> {
         c.iter().enumerate().filter(|(k, _)| !own.contains(k)).map(|(_, v)| v.to_bits()).collect()
     };
+    let pieces = fit.pieces.iter().zip(&scene.trajectories);
+    let views: Option<Vec<View<'_>>> = pieces.map(|(piece, along)| View::new(candidate, model, piece, along)).collect();
+    let views = views?;
     let mut start = 0;
     while start < combinations.len() {
         let end = if own.is_empty() {
@@ -162,8 +165,7 @@ fn best_of(
         let mut fits = true;
         for (index, piece) in fit.pieces.iter().enumerate() {
             let r = &scene.residuals[scene.begins[index]..scene.begins[index + 1]];
-            let along = &scene.trajectories[index];
-            let traces = group.iter().filter_map(|s| Some((s, trace(candidate, s, model, piece, along)?)));
+            let traces = group.iter().filter_map(|s| Some((s, views[index].trace(s)?)));
             let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
             let found = traces.max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)));
             let Some((strengths, trace)) = found else {

@@ -76,6 +76,17 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// The next time after `t` at which the value or its slope changes: samples that are held and repeat themselves are passed
+    /// over.
+    pub fn next_jump(&self, t: f64) -> f64 {
+        let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_break(t) };
+        let mut after = self.first_after(times, t);
+        while after > 0 && after < times.len() && values[after] == values[after - 1] {
+            after += 1;
+        }
+        times.get(after).copied().unwrap_or(f64::INFINITY)
+    }
+
     /// The first sample after `t`, looked for near where the drive is.
     fn first_after(&self, times: &[f64], t: f64) -> usize {
         const NEAR: usize = 3;

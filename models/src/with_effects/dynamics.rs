@@ -71,9 +71,10 @@ impl<S: Scalar> Command<'_, S> {
         }
     }
 
-    fn next_break(&self, t: f64) -> f64 {
+    fn next_break(&self, t: f64, smooth: bool) -> f64 {
         let delay = self.delay.map_or(0.0, Scalar::value);
-        self.drive.next_break(if delay > 0.0 { self.out(t) } else { t }) + delay
+        let out = if delay > 0.0 { self.out(t) } else { t };
+        delay + if smooth { self.drive.next_jump(out) } else { self.drive.next_break(out) }
     }
 }
 
@@ -90,6 +91,8 @@ pub(super) struct Driven<'a, S> {
     longest_step: f64,
     /// For each signal the state that it shows as it is.
     shows: Vec<Option<usize>>,
+    /// Whether no effect sits at a sensor.
+    smooth: bool,
     /// The same of those that no effect changes.
     untouched: Vec<Option<usize>>,
     /// What a clock shows at time 0, s.
@@ -132,6 +135,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let shows: Vec<Option<usize>> = of.signals.iter().map(shown).collect();
         let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
+        let smooth = !actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
         let begins = job.case.begins;
         let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
         let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
@@ -148,6 +152,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             breaks,
             longest_step: longest,
             shows,
+            smooth,
             untouched,
             begins,
             started: false,
@@ -475,7 +480,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn next_break(&self, t: f64) -> f64 {
-        let inputs = self.commands.iter().map(|command| command.next_break(t)).fold(f64::INFINITY, f64::min);
+        // What an effect makes of a signal may be rough: it is resolved where samples are taken.
+        let smooth = self.smooth;
+        let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
         self.breaks.iter().copied().find(|&at| at > t).map_or(inputs, |at| at.min(inputs))
     }
 
