@@ -76,8 +76,27 @@ pub struct Fit<'a> {
     pub globals: Vec<Global>,
     /// The pieces.
     pub pieces: Vec<Piece>,
+    /// What is expected of some of the globals.
+    pub expected: Vec<Expected>,
     /// Counts simulations.
     pub simulations: &'a AtomicUsize,
+}
+
+/// Globals, one after the other, that are expected to be normal about 0.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// The first of them.
+    pub first: usize,
+    /// Turns them into independent ones of variance 1.
+    pub whitening: Arc<DMatrix<f64>>,
+}
+
+impl Expected {
+    /// The independent ones at a point.
+    fn at(&self, point: &Point) -> DVector<f64> {
+        let values = &point.globals[self.first..self.first + self.whitening.ncols()];
+        self.whitening.as_ref() * DVector::from_column_slice(values)
+    }
 }
 
 /// Residuals of a piece, channel by channel, and their slopes.
@@ -253,6 +272,11 @@ impl Fit<'_> {
         (0..self.pieces.len()).into_par_iter().map(|piece| self.look(piece, point, slopes)).collect()
     }
 
+    /// Sum of the squares of the globals of which something is expected, in units of that.
+    fn unexpected(&self, point: &Point) -> f64 {
+        self.expected.iter().map(|expected| expected.at(point).norm_squared()).sum()
+    }
+
     fn unknowns(&self) -> usize {
         self.globals.len() + self.pieces.iter().map(|p| p.locals.len()).sum::<usize>()
     }
@@ -307,6 +331,17 @@ impl Fit<'_> {
                 }
             }
             offset += locals;
+        }
+        for expected in &self.expected {
+            let at = expected.at(point);
+            let turn = DMatrix::from_fn(at.len(), expected.whitening.ncols(), |i, k| {
+                expected.whitening[(i, k)] * self.stretch(expected.first + k, point.globals[expected.first + k])
+            });
+            let (first, n) = (expected.first, turn.ncols());
+            let mut part = gradient.rows_mut(first, n);
+            part += turn.tr_mul(&at);
+            let mut part = matrix.view_mut((first, first), (n, n));
+            part += turn.tr_mul(&turn);
         }
         Normal { chi2, residuals: all.into_iter().map(|piece| piece.r).collect(), matrix, gradient }
     }
@@ -383,6 +418,7 @@ impl Fit<'_> {
         let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: None };
         let mut normal = normal;
         let mut damping = 1e-3;
+        let mut total = fitted.chi2 + self.unexpected(&fitted.point);
         for iteration in 1..=iterations {
             let held = self.held(&fitted.point, &normal.gradient);
             let mut improved = None;
@@ -394,7 +430,8 @@ impl Fit<'_> {
                 let trial = self.moved(&fitted.point, &step);
                 let residuals = self.all(&trial);
                 let chi2 = residuals.as_ref().map_or(f64::INFINITY, |all| sum_of_squares(all));
-                if let Some(residuals) = residuals.filter(|_| chi2 < fitted.chi2) {
+                let sum = chi2 + self.unexpected(&trial);
+                if let Some(residuals) = residuals.filter(|_| sum < total) {
                     improved = Some((trial, chi2, residuals));
                     break;
                 }
@@ -404,9 +441,10 @@ impl Fit<'_> {
                 damping *= if chi2.is_finite() { 6.0 } else { 20.0 };
             }
             let Some((trial, chi2, residuals)) = improved else { break };
-            let gain = fitted.chi2 - chi2;
+            let now = chi2 + self.unexpected(&trial);
+            let gain = std::mem::replace(&mut total, now) - now;
             damping = (damping * 0.15).max(1e-9);
-            if iteration == iterations || gain < 1e-3 + 1e-6 * fitted.chi2 {
+            if iteration == iterations || gain < 1e-3 + 1e-6 * total {
                 // Nobody may ask for the slopes here.
                 return Fitted { point: trial, chi2, residuals, ..fitted };
             }

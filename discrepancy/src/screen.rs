@@ -207,7 +207,7 @@ fn best_of(
         }
         let length = rest.sqrt();
         best = Some(Screened {
-            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
+            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes, expected: None },
             gain,
             absorbed: 1.0 - rest / size,
             pull: along / rest.sqrt(),

@@ -379,7 +379,7 @@ impl<'a> Search<'a> {
         (trial, held)
     }
 
-    fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
+    pub fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
         let interface = self.subject.model.interface();
         let of = &self.subject.measurements;
         let mut measured: Vec<String> = of.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();

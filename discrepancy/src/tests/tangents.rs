@@ -51,8 +51,10 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
         let view = View::new(&candidate, &variant.model, piece, &scene.trajectories[0]);
         let Some(screened) = view.and_then(|view| view.trace(&strengths)) else { continue };
         let own = Vec::new();
-        let with =
-            Variant::new(&subject, &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, sizes }]);
+        let with = Variant::new(
+            &subject,
+            &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, sizes, expected: None }],
+        );
         let mut parameters = TRUTH.to_vec();
         parameters.extend(&strengths);
         parameters[TRUTH.len()] = 0.0;
