@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use mops_core::{Along, Failure, Instant, Open, Plant, Port, Scalar, Tolerance};
 
 use super::Equations;
-use super::bank::Large;
+use super::bank::{Bank, Large, Small};
 use super::compiled::{Compiled, Signal};
 use super::running::Running;
 use super::system::System;
@@ -33,7 +33,18 @@ impl Equations {
         let model = self.opened();
         let ports = self.interface.ports.iter().filter(|port| matches!(port, Port::Process { .. })).count();
         let drives = vec![Drive::held(S::from(0.0)); self.definition.inputs.len() + ports];
-        let running: Running<'_, S, Vec<S>, Large<S>> = Running::new(model, drives, parameters, self.tolerance);
+        if model.layout.registers <= 256 {
+            self.ported::<S, Small<S>>(Running::new(model, drives, parameters, self.tolerance), parameters)
+        } else {
+            self.ported::<S, Large<S>>(Running::new(model, drives, parameters, self.tolerance), parameters)
+        }
+    }
+
+    fn ported<'a, S: Scalar, B: Bank<S> + 'a>(
+        &self,
+        running: Running<'a, S, Vec<S>, B>,
+        parameters: &[S],
+    ) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
         let start = self.start(&running, parameters);
         running.check_start(&start)?;
         Ok(Box::new(Ported { x: RefCell::new(start.clone()), start, running: RefCell::new(running) }))
@@ -55,20 +66,20 @@ impl Open for Equations {
 }
 
 /// The equations as a plant. Rates, which are asked for most, take inputs and forces straight into their registers.
-struct Ported<'a, S> {
+struct Ported<'a, S, B> {
     start: Vec<S>,
-    running: RefCell<Running<'a, S, Vec<S>, Large<S>>>,
+    running: RefCell<Running<'a, S, Vec<S>, B>>,
     /// A state to look at guards with.
     x: RefCell<Vec<S>>,
 }
 
-impl<S: Scalar> Ported<'_, S> {
+impl<S: Scalar, B: Bank<S>> Ported<'_, S, B> {
     fn hold(&self, at: &Instant<'_, S>) {
         self.running.borrow_mut().hold_drives(at.u.iter().chain(at.w).copied());
     }
 }
 
-impl<S: Scalar> Plant<S> for Ported<'_, S> {
+impl<S: Scalar, B: Bank<S>> Plant<S> for Ported<'_, S, B> {
     fn start(&self) -> Vec<S> {
         self.start.clone()
     }

@@ -40,7 +40,8 @@ impl<X> Step<X> {
     {
         let theta = s * (self.taken / self.length);
         let back = 1.0 - theta;
-        let [r0, r1, r2, r3, r4] = self.dense.each_ref().map(|r| r.as_ref()[i]);
+        let [r0, r1, r2, r3, r4] = &self.dense;
+        let (r0, r1, r2, r3, r4) = (r0.as_ref()[i], r1.as_ref()[i], r2.as_ref()[i], r3.as_ref()[i], r4.as_ref()[i]);
         r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
     }
 

@@ -86,7 +86,7 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
         let end = step.start + step.taken;
         for (i, (signal, _)) in self.signals.iter().enumerate() {
             let values: [S; 5] = match dynamics.shows(*signal) {
-                Some(state) => Trace::NODES.map(|s| step.component(s, state)),
+                Some(state) => std::array::from_fn(|node| step.component(Trace::NODES[node], state)),
                 None => std::array::from_fn(|node| {
                     let t = step.start + Trace::NODES[node] * step.taken;
                     (self.output)(dynamics, *signal, t, &self.states[node])
