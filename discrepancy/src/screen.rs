@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Residuals, dot};
-use crate::trace_of::{sizes, trace};
+use crate::trace_of::{View, sizes};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -23,6 +23,8 @@ pub struct Scene {
     pub begins: Vec<usize>,
     /// Orthonormal directions that the unknowns can absorb.
     pub basis: Vec<Vec<f64>>,
+    /// Residuals and slopes of each piece.
+    pub slopes: Vec<Residuals>,
 }
 
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
@@ -52,7 +54,7 @@ pub struct Screened {
 impl Scene {
     /// The scene of a fit; `None` where a simulation fails.
     pub fn new(fit: &Fit<'_>, model: &WithEffects, fitted: &Fitted) -> Option<Self> {
-        let all = fit.all(&fitted.point, true)?;
+        let all = fit.slopes(&fitted.point)?;
         let pieces: Vec<usize> = (0..fit.pieces.len()).collect();
         let trajectories: Option<Vec<Trajectory>> =
             pieces.par_iter().map(|&piece| Trajectory::new(fit, model, piece, &fitted.point).ok()).collect();
@@ -61,7 +63,8 @@ impl Scene {
             begins.push(begins[begins.len() - 1] + piece.r.len());
         }
         let residuals = all.iter().flat_map(|piece| piece.r.iter().copied()).collect();
-        Some(Self { trajectories: trajectories?, residuals, basis: basis(&all, &begins, fit.globals.len()), begins })
+        let basis = basis(&all, &begins, fit.globals.len());
+        Some(Self { trajectories: trajectories?, residuals, basis, begins, slopes: all })
     }
 
     /// A trace without what the unknowns absorb.
@@ -144,6 +147,9 @@ fn best_of(
     let shared = |c: &[f64]| -> Vec<u64> {
         c.iter().enumerate().filter(|(k, _)| !own.contains(k)).map(|(_, v)| v.to_bits()).collect()
     };
+    let pieces = fit.pieces.iter().zip(&scene.trajectories);
+    let views: Option<Vec<View<'_>>> = pieces.map(|(piece, along)| View::new(candidate, model, piece, along)).collect();
+    let views = views?;
     let mut start = 0;
     while start < combinations.len() {
         let end = if own.is_empty() {
@@ -159,8 +165,7 @@ fn best_of(
         let mut fits = true;
         for (index, piece) in fit.pieces.iter().enumerate() {
             let r = &scene.residuals[scene.begins[index]..scene.begins[index + 1]];
-            let along = &scene.trajectories[index];
-            let traces = group.iter().filter_map(|s| Some((s, trace(candidate, s, model, piece, along)?)));
+            let traces = group.iter().filter_map(|s| Some((s, views[index].trace(s)?)));
             let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
             let found = traces.max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)));
             let Some((strengths, trace)) = found else {
@@ -202,7 +207,7 @@ fn best_of(
         }
         let length = rest.sqrt();
         best = Some(Screened {
-            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
+            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes, expected: None },
             gain,
             absorbed: 1.0 - rest / size,
             pull: along / rest.sqrt(),
