@@ -23,7 +23,7 @@ fn main() {
         let m = measure(&p, &posed, &posed.start(), s.as_mut(), 2000 * (1 + p.dimension()));
         let el = t.elapsed().as_secs_f64();
         total += 1;
-        let e = m.evaluations_to(suite.accuracy);
+        let e = m.evaluations_to(p.accuracy.unwrap_or(suite.accuracy));
         let ok = e.is_some();
         if ok {
             solved += 1;
@@ -47,9 +47,20 @@ fn main() {
             el * 1e3,
             if ok { "" } else { "  <<<<<" }
         );
+        if only.is_some() {
+            let mut run = Run::new(&posed, Budget { evaluations: 100000 }, &());
+            let mut s = mops_solvers::kinds().into_iter().find(|k| k.name == kind).unwrap().default_choice().make();
+            run.solve(s.as_mut(), &posed.start());
+            println!("x {:?}", run.best().unwrap().tuners);
+        }
         if m.claims_what_is_violated() {
             println!("   FALSE SUCCESS");
         }
+    }
+    let mut first: Vec<_> = evs.iter().take(25).copied().collect();
+    first.sort();
+    if suite.name == "minimax" {
+        print!("first25 {:?} ", first.get(first.len() / 2));
     }
     evs.sort();
     println!("solved {solved}/{total}, median {:?}, not: {worst:?}", evs.get(evs.len() / 2));

@@ -41,7 +41,7 @@ pub struct SqpOptions {
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-10, radius: 0.05, max_iterations: 300 }
+        Self { tolerance: 1e-10, radius: 1.0, max_iterations: 300 }
     }
 }
 

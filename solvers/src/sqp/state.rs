@@ -39,12 +39,13 @@ impl State {
         let n = at.at.point.len();
         let rows = Rows::of(shape, &at);
         let scaling = Scaling::of(&rows);
+        let hessian = Hessian::new(n, rows.objectives.len());
         Self {
             rows: scaling.apply(rows),
             scaling,
             bundle: Bundle::default(),
             at,
-            hessian: Hessian::new(n),
+            hessian,
             radius,
             penalty: 10.0,
             iterations: 0,
