@@ -17,7 +17,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
         )),
         squares(within(
             &[[0.4, f64::INFINITY], [-4.0, f64::INFINITY]],
-            hs(57, &[0.42, 5.0], [1, 0], [0.02845966972, 0.03064630], Functions::of(hs57, hs57)),
+            hs(57, &[0.42, 5.0], [1, 0], [0.02845966972, 0.03064627605], Functions::of(hs57, hs57)),
         )),
         squares(within(
             &[[1e-5, 100.0], [1e-5, 100.0], [1e-5, 1.0], [1e-5, 100.0]],
