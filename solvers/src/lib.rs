@@ -11,6 +11,7 @@ mod pareto;
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
+mod rows;
 pub mod sqp;
 mod start;
 

@@ -115,7 +115,7 @@ impl Solver for Sqp {
         let merit = state.merit(&state.rows);
         let promised =
             merit - (direction.level + state.penalty * direction.violation + state.hessian.half(&direction.step));
-        let size = state.scaling.objective() + state.rows.objective().abs();
+        let size = state.scaling.objective().min(1.0) + state.rows.objective().abs();
         let tolerance = self.options.tolerance * size;
         if promised <= tolerance || state.radius < SMALLEST_RADIUS {
             return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= tolerance));
@@ -143,7 +143,7 @@ impl State {
             self.fresh_at = Some(merit);
             self.bundle.clear();
             self.hessian.forget();
-            self.radius = 0.1 * radius;
+            self.radius = 0.01 * radius;
             return Progress::Continue;
         }
         if optimal && self.rows.violation() <= 10.0 * SATISFIED { Progress::Converged } else { Progress::Stalled }
@@ -222,12 +222,12 @@ impl State {
 /// A step shorter than this that fails has met a kink, if the slopes say so: smooth rows are well described by them there.
 const KINK: f64 = 0.02;
 
-/// Whether a slope changes by as much as a third of the steepest.
+/// Whether a slope changes by as much as a tenth of the steepest.
 fn turns(before: &Rows, after: &Rows) -> bool {
     let pairs = |rows: fn(&Rows) -> &Vec<crate::epigraph::Linear>| rows(before).iter().zip(rows(after));
     let all = pairs(|rows| &rows.objectives).chain(pairs(|rows| &rows.inequalities));
     all.into_iter().any(|(a, b)| {
         let size = a.slope.iter().chain(&b.slope).fold(0.0_f64, |most, s| most.max(s.abs()));
-        a.slope.iter().zip(&b.slope).any(|(a, b)| (a - b).abs() > 0.33 * size)
+        a.slope.iter().zip(&b.slope).any(|(a, b)| (a - b).abs() > 0.1 * size)
     })
 }
