@@ -1,6 +1,7 @@
 //! The discrepancy search: finds what a calibrated model leaves unexplained in measured data, traces it to the place and the
 //! physical effect that the model lacks, and reports the error before and after.
 
+mod account;
 mod base;
 mod brute_force;
 mod candidate;
@@ -9,8 +10,10 @@ mod diagnosis;
 mod family;
 mod fit;
 mod gaussian;
+mod growth;
 mod held_out;
 mod hygiene;
+mod judge;
 mod locate;
 #[cfg(test)]
 mod locate_tests;

@@ -12,6 +12,9 @@ use crate::search::{Search, Trial};
 use crate::trace_of::sizes;
 use crate::variant::Added;
 
+/// What it is called.
+const NAME: &str = "table";
+
 /// The table as an effect: its strengths are the values at the points.
 struct Stopgap {
     over: Over,
@@ -55,7 +58,7 @@ impl Stopgap {
 
 impl Effect for Stopgap {
     fn name(&self) -> &'static str {
-        "table"
+        NAME
     }
 
     fn about(&self) -> &'static str {
@@ -120,6 +123,11 @@ impl<S: Scalar> Acting<S> for AtValues<S> {
         };
         if self.passes { at.value + table } else { table }
     }
+}
+
+/// Whether an effect is such a table.
+pub fn is_table(added: &Added) -> bool {
+    added.candidate.effect.name() == NAME
 }
 
 /// Residuals, in units of the noise, below which no further table is tried.
