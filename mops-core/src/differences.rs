@@ -3,46 +3,76 @@
 use crate::problem::Evaluation;
 use crate::solver::{Halt, Linearisation, Oracle};
 
-/// Largest step in the unit box. Simulations at a relative tolerance of 1e-8 repeat to about 1e-9, and a central
-/// difference is best near the cube root of the noise: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
-const STEP: f64 = 2e-4;
-
-/// Smallest step: below it the noise of the simulation takes over.
-const SMALLEST_STEP: f64 = 1e-6;
-
-/// The step for slopes that are to describe the problem within `reach`: a tenth of it, between the limits above.
-pub fn step(reach: f64) -> f64 {
-    (0.1 * reach).clamp(SMALLEST_STEP, STEP)
+/// How slopes are taken from values that are exact to `noise`, relative to their size.
+///
+/// A one-sided difference is best near the square root of the noise and then keeps half of its digits, a central one near
+/// the cube root and keeps two thirds at twice the price. One-sided ones are taken where half of the digits are plenty:
+/// values exact to 1e-14, and slopes that are to describe more than a thousandth of the box.
+///
+/// Source: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
+#[derive(Debug, Clone, Copy)]
+pub struct Differences {
+    noise: f64,
 }
 
-/// Values and slopes at a point by central differences, one-sided at the bounds and where one side fails.
-///
-/// # Errors
-/// The run is over.
-pub fn linearise(oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
-    let n = oracle.shape().dimension();
-    let spacing = oracle.shape().spacing.clone();
-    let step = |j: usize| if spacing[j] > 0.0 { spacing[j] } else { step(reach) };
-    let moved = |j: usize, by: f64| {
-        let mut moved = point.to_vec();
-        moved[j] = (moved[j] + by).clamp(0.0, 1.0);
-        moved
-    };
-    let points: Vec<Vec<f64>> =
-        std::iter::once(point.to_vec()).chain((0..n).flat_map(|j| [moved(j, step(j)), moved(j, -step(j))])).collect();
+impl Differences {
+    /// Differences of values with this relative error.
+    pub fn of_noise(noise: f64) -> Self {
+        Self { noise }
+    }
+
+    /// The step of a central difference for slopes that are to describe the problem within `reach`: a tenth of it, at most
+    /// a fifth of the cube root of the noise, and not so small that the noise takes over.
+    pub fn step(self, reach: f64) -> f64 {
+        (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * self.noise.cbrt())
+    }
+
+    fn one_sided(self, reach: f64) -> bool {
+        self.noise <= 1e-14 && reach >= 1e-3
+    }
+
+    /// Values and slopes at a point; central differences are one-sided at the bounds and where one side fails.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn linearise(self, oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        if self.one_sided(reach) && oracle.shape().spacing.iter().all(|&spacing| spacing == 0.0) {
+            let step = self.noise.sqrt();
+            // Towards the middle of the box, so that no bound is in the way.
+            let moved = (0..point.len()).map(|j| vec![along(point, j, if point[j] < 0.5 { step } else { -step })]);
+            if let Some(found) = slopes(oracle, point, &moved.collect::<Vec<_>>())? {
+                return Ok(Some(found));
+            }
+        }
+        let spacing = oracle.shape().spacing.clone();
+        let step = |j: usize| if spacing[j] > 0.0 { spacing[j] } else { self.step(reach) };
+        let moved = (0..point.len()).map(|j| vec![along(point, j, step(j)), along(point, j, -step(j))]);
+        slopes(oracle, point, &moved.collect::<Vec<_>>())
+    }
+}
+
+fn along(point: &[f64], j: usize, by: f64) -> Vec<f64> {
+    let mut moved = point.to_vec();
+    moved[j] = (moved[j] + by).clamp(0.0, 1.0);
+    moved
+}
+
+/// Slopes from the point and its neighbours, up to two along every coordinate; the point itself stands in for a neighbour
+/// that is missing, fails or coincides with it. `None` where nothing is left of a coordinate.
+fn slopes(oracle: &mut dyn Oracle, point: &[f64], neighbours: &[Vec<Vec<f64>>]) -> Result<Option<Linearisation>, Halt> {
+    let points: Vec<Vec<f64>> = std::iter::once(point.to_vec()).chain(neighbours.iter().flatten().cloned()).collect();
     let mut answers = oracle.evaluate(&points)?;
-    let sides = answers.split_off(1);
+    let mut sides = answers.split_off(1).into_iter();
     let at = answers.pop().expect("the point itself is the first");
     let Some(values) = &at.scaled else { return Ok(None) };
-    let mut rows = vec![vec![0.0; n]; values.len()];
-    let mut residuals = Vec::with_capacity(n);
-    for j in 0..n {
-        let usable = |side: &Evaluation| side.scaled.is_some() && side.point[j] != point[j];
-        let [up, down] = [&sides[2 * j], &sides[2 * j + 1]].map(|side| if usable(side) { side } else { &at });
+    let mut rows = vec![vec![0.0; point.len()]; values.len()];
+    let mut residuals = Vec::with_capacity(point.len());
+    for (j, of_coordinate) in neighbours.iter().enumerate() {
+        let mut usable: Vec<Evaluation> = sides.by_ref().take(of_coordinate.len()).collect();
+        usable.retain(|side| side.scaled.is_some() && side.point[j] != point[j]);
+        let Some(up) = usable.first() else { return Ok(None) };
+        let down = usable.get(1).unwrap_or(&at);
         let distance = up.point[j] - down.point[j];
-        if distance == 0.0 {
-            return Ok(None);
-        }
         let (high, low) = (up.scaled.as_ref().expect("usable"), down.scaled.as_ref().expect("usable"));
         for i in 0..values.len() {
             rows[i][j] = (high[i] - low[i]) / distance;

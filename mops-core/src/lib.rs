@@ -10,9 +10,11 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod effect;
+mod evaluator;
 mod experiment;
 pub mod expression;
 pub mod file;
+pub mod front;
 pub mod identification;
 pub mod linear;
 mod linearised;
@@ -43,6 +45,7 @@ pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use effect::{
     Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
 };
+pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use linear::StateSpace;
@@ -58,7 +61,7 @@ pub use outcome::{
 pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
-pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading};
+pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
 pub use random::{Stream, stream};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};

@@ -253,7 +253,7 @@ impl Problem {
             }
         }
         let scaled = self.scaled(&readings);
-        let merit = scaled.as_ref().map_or(Merit::FAILED, |scaled| self.merit(scaled));
+        let merit = scaled.as_ref().map_or(Merit::FAILED, |scaled| self.shape.merit(scaled));
         let residuals = if scaled.is_some() { self.residuals(residuals) } else { Vec::new() };
         Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
     }
@@ -349,20 +349,6 @@ impl Problem {
                 (_, reading) => reading.map(|r| r.scaled),
             })
             .collect()
-    }
-
-    fn merit(&self, scaled: &[f64]) -> Merit {
-        let shape = &self.shape;
-        let objectives = shape.objectives(scaled);
-        let objective = match shape.objective {
-            Objective::Max => objectives.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            Objective::Sum => objectives.iter().sum(),
-        };
-        // A study with constraints alone asks for any feasible point.
-        let objective = if objectives.is_empty() { 0.0 } else { objective };
-        let inequality = shape.inequalities(scaled).into_iter().fold(0.0, f64::max);
-        let equality = shape.equalities(scaled).into_iter().map(f64::abs).fold(0.0, f64::max);
-        Merit { violation: inequality.max(equality), objective }
     }
 
     /// Residuals of all rows to be minimised, weighted so that their squares sum to the objective; empty if one of the

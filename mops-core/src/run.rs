@@ -1,14 +1,18 @@
 //! A run: owns the budget, the cache, the archive and the random streams, and keeps the best point.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
 
 use rayon::prelude::*;
 
-use crate::differences;
+use crate::differences::Differences;
+use crate::evaluator::Evaluator;
+use crate::front;
 use crate::model::Failure;
 use crate::problem::{Evaluation, Merit, Problem};
 use crate::random::{Stream, stream};
 use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
+use crate::study::Objective;
 
 /// What a run may cost.
 #[derive(Debug, Clone, Copy)]
@@ -55,16 +59,19 @@ pub struct Record {
     pub tuners: Vec<f64>,
     /// Values of all rows; NaN where there is none.
     pub values: Vec<f64>,
+    /// Weighted scaled values of the rows to be minimised where each counts for itself; else empty.
+    pub objectives: Vec<f64>,
     /// What the point is worth.
     pub merit: Merit,
 }
 
-/// A run of a solver on a problem.
-pub struct Run<'a> {
-    problem: &'a Problem,
+/// A run of a solver on a problem: that of a study, or one with a known answer.
+pub struct Run<'a, E: Evaluator = Problem> {
+    problem: &'a E,
     budget: Budget,
     watch: &'a dyn Watch,
-    cache: HashMap<Vec<u64>, Evaluation>,
+    cache: HashMap<Vec<u64>, Evaluation, BuildHasherDefault<Bits>>,
+    failed: usize,
     archive: Vec<Record>,
     best: Option<Evaluation>,
     failures: Vec<FailureCount>,
@@ -84,14 +91,15 @@ pub struct FailureCount {
     pub count: usize,
 }
 
-impl<'a> Run<'a> {
+impl<'a, E: Evaluator> Run<'a, E> {
     /// A run that has not begun.
-    pub fn new(problem: &'a Problem, budget: Budget, watch: &'a dyn Watch) -> Self {
+    pub fn new(problem: &'a E, budget: Budget, watch: &'a dyn Watch) -> Self {
         Self {
             problem,
             budget,
             watch,
-            cache: HashMap::new(),
+            cache: HashMap::default(),
+            failed: 0,
             archive: Vec::new(),
             best: None,
             failures: Vec::new(),
@@ -144,8 +152,28 @@ impl<'a> Run<'a> {
     }
 
     /// The problem.
-    pub fn problem(&self) -> &'a Problem {
+    pub fn problem(&self) -> &'a E {
         self.problem
+    }
+
+    /// The front: the feasible points that no other feasible point is better than in every objective, by their place in the
+    /// archive. Empty where the objectives become one number.
+    pub fn front(&self) -> Vec<usize> {
+        let feasible = |i: &usize| self.archive[*i].merit.is_feasible() && !self.archive[*i].objectives.is_empty();
+        let candidates: Vec<usize> = (0..self.archive.len()).filter(feasible).collect();
+        let Some(m) = candidates.first().map(|&i| self.archive[i].objectives.len()) else { return Vec::new() };
+        let objectives: Vec<f64> =
+            candidates.iter().flat_map(|&i| self.archive[i].objectives.iter().copied()).collect();
+        front::non_dominated(&objectives, m).into_iter().map(|i| candidates[i]).collect()
+    }
+
+    /// The evaluation of a point of the archive.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    pub fn evaluation(&self, index: usize) -> &Evaluation {
+        let key: Vec<u64> = self.archive[index].tuners.iter().map(|value| value.to_bits()).collect();
+        &self.cache[&key]
     }
 
     fn record(&mut self, evaluation: &Evaluation) {
@@ -155,7 +183,12 @@ impl<'a> Run<'a> {
                 None => self.failures.push(FailureCount { job: *job, first: failure.clone(), count: 1 }),
             }
         }
+        self.failed += usize::from(evaluation.merit.objective.is_infinite());
+        let shape = self.problem.shape();
+        let each = shape.objective == Objective::Each;
+        let objectives = evaluation.scaled.as_ref().filter(|_| each).map(|scaled| shape.objectives(scaled));
         self.archive.push(Record {
+            objectives: objectives.unwrap_or_default(),
             tuners: evaluation.tuners.clone(),
             values: evaluation.readings.iter().map(|r| r.map_or(f64::NAN, |r| r.value)).collect(),
             merit: evaluation.merit,
@@ -169,18 +202,47 @@ impl<'a> Run<'a> {
         State {
             evaluations: self.archive.len(),
             budget: self.budget.evaluations,
-            failed: self.archive.iter().filter(|r| r.merit.objective.is_infinite()).count(),
+            failed: self.failed,
             best: self.best.as_ref().map_or(Merit::FAILED, |b| b.merit),
         }
     }
 }
 
+/// A hash of the bits of numbers: each word is folded in by a multiplication. The keys are nobody's attack.
+///
+/// Source: the constant is that of D. E. Knuth, The Art of Computer Programming, volume 3, section 6.4.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bits(u64);
+
+impl Hasher for Bits {
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.write_u64(u64::from_ne_bytes(word));
+        }
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        self.0 = (self.0.rotate_left(23) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
+
+    /// The low bits of floating-point numbers are often zero, and so are those of their products.
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+}
+
 /// Bits of the values a point stands for: points that round to the same tuners are one.
-fn key(problem: &Problem, point: &[f64]) -> Vec<u64> {
+fn key(problem: &impl Evaluator, point: &[f64]) -> Vec<u64> {
     problem.tuners_at(point).into_iter().map(f64::to_bits).collect()
 }
 
-impl Oracle for Run<'_> {
+impl<E: Evaluator> Oracle for Run<'_, E> {
     fn shape(&self) -> &Shape {
         self.problem.shape()
     }
@@ -188,12 +250,9 @@ impl Oracle for Run<'_> {
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
         debug_assert!(points.iter().flatten().all(|u| (0.0..=1.0).contains(u)), "solvers stay inside the unit box");
         let keys: Vec<Vec<u64>> = points.iter().map(|point| key(self.problem, point)).collect();
-        let mut new: Vec<usize> = Vec::new();
-        for (i, k) in keys.iter().enumerate() {
-            if !self.cache.contains_key(k) && !new.iter().any(|&j| keys[j] == *k) {
-                new.push(i);
-            }
-        }
+        let mut seen: HashSet<&[u64], BuildHasherDefault<Bits>> = HashSet::default();
+        let is_new = |i: &usize| !self.cache.contains_key(&keys[*i]) && seen.insert(&keys[*i]);
+        let mut new: Vec<usize> = (0..keys.len()).filter(is_new).collect();
         let left = self.budget.evaluations.saturating_sub(self.archive.len());
         let within_budget = new.len() <= left;
         new.truncate(left);
@@ -204,7 +263,11 @@ impl Oracle for Run<'_> {
                 return Err(Halt::Interrupted);
             }
             let problem = self.problem;
-            let evaluated: Vec<Evaluation> = batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect();
+            // A single point is not worth the way to another thread.
+            let evaluated: Vec<Evaluation> = match batch {
+                [i] => vec![problem.evaluate(&points[*i])],
+                _ => batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect(),
+            };
             for (&i, evaluation) in batch.iter().zip(evaluated) {
                 self.record(&evaluation);
                 self.cache.insert(keys[i].clone(), evaluation);
@@ -223,6 +286,7 @@ impl Oracle for Run<'_> {
 
     /// Exact slopes where models and criteria have them, differences elsewhere.
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        let differences = Differences::of_noise(self.problem.noise());
         let at = self.evaluate(&[point.to_vec()])?.pop().expect("one point, one answer");
         if at.scaled.is_none() {
             return Ok(None);
@@ -235,12 +299,12 @@ impl Oracle for Run<'_> {
             if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }
-            if let Some(slopes) = self.problem.slopes(&at, differences::step(reach)) {
+            if let Some(slopes) = self.problem.slopes(&at, differences.step(reach)) {
                 self.linearisations += 1;
                 return Ok(Some(Linearisation { at, rows: slopes.rows, residuals: slopes.residuals }));
             }
         }
-        differences::linearise(self, point, reach)
+        differences.linearise(self, point, reach)
     }
 
     fn best(&self) -> Option<&Evaluation> {
@@ -248,6 +312,6 @@ impl Oracle for Run<'_> {
     }
 
     fn stream(&self, label: &str) -> Stream {
-        stream(self.problem.study().seed, label)
+        stream(self.problem.seed(), label)
     }
 }

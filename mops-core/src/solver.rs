@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::criterion::Usage;
-use crate::problem::Evaluation;
+use crate::problem::{Evaluation, Merit};
 use crate::random::Stream;
 use crate::study::Objective;
 
@@ -46,6 +46,24 @@ impl Shape {
 
     fn pick(&self, usage: Usage, scaled: &[f64], f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         self.rows.iter().zip(scaled).filter(|((u, _), _)| *u == usage).map(|((_, w), &s)| f(s, *w)).collect()
+    }
+
+    /// What scaled values are worth.
+    pub fn merit(&self, scaled: &[f64]) -> Merit {
+        let (mut violation, mut objective) = (0.0_f64, None);
+        for ((usage, weight), s) in self.rows.iter().zip(scaled) {
+            match (usage, self.objective) {
+                (Usage::Minimise, Objective::Max | Objective::Each) => {
+                    objective = Some(objective.map_or(weight * s, |worst: f64| worst.max(weight * s)));
+                }
+                (Usage::Minimise, Objective::Sum) => objective = Some(objective.unwrap_or(0.0) + weight * s),
+                (Usage::Inequality, _) => violation = violation.max(s - 1.0),
+                (Usage::Equality, _) => violation = violation.max((s - 1.0).abs()),
+                (Usage::Monitor, _) => {}
+            }
+        }
+        // A study with constraints alone asks for any feasible point.
+        Merit { violation, objective: objective.unwrap_or(0.0) }
     }
 
     /// Whether any row is a constraint.

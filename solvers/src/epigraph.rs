@@ -10,10 +10,10 @@
 //! ```
 //! It has a solution whatever the rows: where the linearised constraints contradict each other, `e` stays positive.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use mops_core::{Linearisation, Objective, Shape, Usage};
 use nalgebra::DMatrix;
+
+use crate::active_set::{ActiveSet, Constraints};
 
 /// A function's value and slope.
 #[derive(Debug, Clone)]
@@ -57,7 +57,8 @@ impl Rows {
         if shape.objective == Objective::Sum || objectives.is_empty() {
             let n = shape.dimension();
             let sum = |slope: Vec<f64>, row: &Linear| slope.iter().zip(&row.slope).map(|(a, b)| a + b).collect();
-            let slope = objectives.iter().fold(vec![0.0; n], sum);
+            let slope =
+                if slopes.iter().all(Vec::is_empty) { Vec::new() } else { objectives.iter().fold(vec![0.0; n], sum) };
             objectives = vec![Linear { value: objectives.iter().map(|row| row.value).sum(), slope }];
         }
         Self { objectives, inequalities: pick(Usage::Inequality, 1.0), equalities: pick(Usage::Equality, 1.0) }
@@ -154,6 +155,13 @@ pub struct Multipliers {
     pub equalities: Vec<f64>,
 }
 
+impl Multipliers {
+    /// The sum of those of constraints.
+    pub fn of_constraints(&self) -> f64 {
+        self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
+    }
+}
+
 /// The solution of the subproblem.
 #[derive(Debug, Clone)]
 pub struct Direction {
@@ -172,108 +180,141 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves the subproblem for steps between `low` and `high`; `None` if the interior-point method gives up.
+/// Solves the subproblem for steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding
+/// keeps the method from an end.
 pub fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
-    let n = low.len();
-    let (level, elastic) = (n, n + 1);
-    let mut constraints = Triplets::default();
-    for row in &rows.objectives {
-        constraints.row(&row.slope, &[(level, -1.0)], -row.value);
-    }
-    for row in &rows.inequalities {
-        constraints.row(&row.slope, &[(elastic, -1.0)], -row.value);
-    }
-    for row in &rows.equalities {
-        let negative: Vec<f64> = row.slope.iter().map(|s| -s).collect();
-        constraints.row(&row.slope, &[(elastic, -1.0)], -row.value);
-        constraints.row(&negative, &[(elastic, -1.0)], row.value);
-    }
-    for j in 0..n {
-        constraints.row(&[], &[(j, 1.0)], high[j]);
-        constraints.row(&[], &[(j, -1.0)], -low[j]);
-    }
-    constraints.row(&[], &[(elastic, -1.0)], 0.0);
-
-    let mut quadratic = vec![Vec::new(); n + 2];
-    for column in 0..n {
-        quadratic[column] = (0..=column).map(|row| (row, hessian[(row, column)])).collect();
-    }
-    let mut linear = vec![0.0; n + 2];
-    (linear[level], linear[elastic]) = (1.0, penalty);
-
-    let settings = DefaultSettings {
-        verbose: false,
-        tol_gap_abs: 1e-12,
-        tol_gap_rel: 1e-12,
-        tol_feas: 1e-12,
-        max_threads: 1,
-        ..DefaultSettings::default()
-    };
-    let cones = [SupportedConeT::NonnegativeConeT(constraints.bounds.len())];
-    let (p, a) = (sparse(n + 2, &quadratic), constraints.matrix(n + 2));
-    let mut solver = DefaultSolver::new(&p, &linear, &a, &constraints.bounds, &cones, settings).ok()?;
-    solver.solve();
-    // Close to the solution the strict tolerances may not be met; what is there then is still accurate to about 1e-8.
-    let usable = [
-        SolverStatus::Solved,
-        SolverStatus::AlmostSolved,
-        SolverStatus::InsufficientProgress,
-        SolverStatus::MaxIterations,
-    ];
-    if !usable.contains(&solver.solution.status) || solver.solution.x.iter().any(|x| !x.is_finite()) {
-        return None;
-    }
-    let step: Vec<f64> = (0..n).map(|j| solver.solution.x[j].clamp(low[j], high[j])).collect();
-    let z = &solver.solution.z;
-    let (objectives, rest) = z.split_at(rows.objectives.len());
-    let (inequalities, rest) = rest.split_at(rows.inequalities.len());
-    let equalities = rest.chunks(2).take(rows.equalities.len()).map(|pair| pair[0] - pair[1]).collect();
-    let after = |rows: &[Linear]| rows.iter().map(|row| row.value + dot(&row.slope, &step)).collect::<Vec<f64>>();
-    let violation = after(&rows.inequalities).into_iter().fold(0.0, f64::max);
-    let violation = after(&rows.equalities).into_iter().map(f64::abs).fold(violation, f64::max);
-    Some(Direction {
-        level: after(&rows.objectives).into_iter().fold(f64::NEG_INFINITY, f64::max),
-        violation,
-        multipliers: Multipliers { objectives: objectives.to_vec(), inequalities: inequalities.to_vec(), equalities },
-        step,
-    })
+    Subproblem::default().solve(rows, hessian, low, high, penalty)
 }
 
-/// Rows of `A x <= b`, collected by columns.
-#[derive(Default)]
-struct Triplets {
-    entries: Vec<(usize, usize, f64)>,
-    bounds: Vec<f64>,
+/// The subproblem, with its memory, which is used again from step to step.
+///
+/// Level and elastic violation have no curvature of their own. They get one that is small beside all others, about the level
+/// here and about no violation, so that it does nothing at a solution.
+#[derive(Debug, Default)]
+pub struct Subproblem {
+    method: ActiveSet,
+    constraints: Constraints,
+    factor: Vec<f64>,
+    linear: Vec<f64>,
 }
 
-impl Triplets {
-    fn row(&mut self, dense: &[f64], single: &[(usize, f64)], bound: f64) {
-        let row = self.bounds.len();
-        let dense = dense.iter().enumerate().map(|(column, value)| (column, *value));
-        self.entries.extend(dense.chain(single.iter().copied()).filter(|(_, v)| *v != 0.0).map(|(c, v)| (row, c, v)));
-        self.bounds.push(bound);
-    }
+impl Subproblem {
+    /// Curvature of level and violation, relative to what the objective can fall by.
+    const CURVATURE: f64 = 1e-7;
 
-    fn matrix(&self, columns: usize) -> CscMatrix<f64> {
-        let mut by_column = vec![Vec::new(); columns];
-        for (row, column, value) in &self.entries {
-            by_column[*column].push((*row, *value));
+    /// As [`solve`].
+    pub fn solve(
+        &mut self,
+        rows: &Rows,
+        hessian: &DMatrix<f64>,
+        low: &[f64],
+        high: &[f64],
+        penalty: f64,
+    ) -> Option<Direction> {
+        let n = low.len();
+        let level = rows.objective();
+        let first = self.collect(rows, level, low, high);
+        self.factor(hessian, &rows.objectives[first].slope)?;
+        self.linear.clear();
+        self.linear.resize(n, 0.0);
+        self.linear.extend([1.0, penalty]);
+        let no_violation = self.constraints.bounds.len() - 1;
+        if !self.method.solve(&self.factor, &self.linear, &self.constraints, &[first, no_violation]) {
+            return None;
         }
-        sparse(self.bounds.len(), &by_column)
+        let step: Vec<f64> = (0..n).map(|j| self.method.x()[j].clamp(low[j], high[j])).collect();
+        let after = |rows: &[Linear], step: &[f64]| {
+            rows.iter().map(|row| row.value + dot(&row.slope, step)).collect::<Vec<f64>>()
+        };
+        let violation = after(&rows.inequalities, &step).into_iter().fold(0.0, f64::max);
+        let violation = after(&rows.equalities, &step).into_iter().map(f64::abs).fold(violation, f64::max);
+        Some(Direction {
+            level: after(&rows.objectives, &step).into_iter().fold(f64::NEG_INFINITY, f64::max),
+            violation,
+            multipliers: self.multipliers(rows),
+            step,
+        })
     }
-}
 
-fn sparse(rows: usize, columns: &[Vec<(usize, f64)>]) -> CscMatrix<f64> {
-    let mut starts = vec![0];
-    let (mut indices, mut values) = (Vec::new(), Vec::new());
-    for column in columns {
-        for (row, value) in column {
-            indices.push(*row);
-            values.push(*value);
+    /// The rows as constraints on step, level and violation, in the order of `rows`, then the box, then no violation; the
+    /// index of the largest objective row.
+    fn collect(&mut self, rows: &Rows, level: f64, low: &[f64], high: &[f64]) -> usize {
+        self.constraints.clear();
+        for row in &rows.objectives {
+            self.push(row, -1.0, [1.0, 0.0], row.value - level);
         }
-        starts.push(indices.len());
+        for row in &rows.inequalities {
+            self.push(row, -1.0, [0.0, 1.0], row.value);
+        }
+        for row in &rows.equalities {
+            self.push(row, -1.0, [0.0, 1.0], row.value);
+            self.push(row, 1.0, [0.0, 1.0], -row.value);
+        }
+        let n = low.len();
+        for (j, (low, high)) in low.iter().zip(high).enumerate() {
+            for (sign, bound) in [(1.0, *low), (-1.0, -high)] {
+                let begin = self.constraints.normals.len();
+                self.constraints.normals.resize(begin + n + 2, 0.0);
+                self.constraints.normals[begin + j] = sign;
+                self.constraints.bounds.push(bound);
+            }
+        }
+        self.constraints.normals.extend(std::iter::repeat_n(0.0, n + 1).chain([1.0]));
+        self.constraints.bounds.push(0.0);
+        rows.objectives.iter().position(|row| row.value >= level).unwrap_or(0)
     }
-    CscMatrix::new(rows, columns.len(), starts, indices, values)
+
+    fn push(&mut self, row: &Linear, sign: f64, rest: [f64; 2], bound: f64) {
+        self.constraints.normals.extend(row.slope.iter().map(|s| sign * s));
+        self.constraints.normals.extend(rest);
+        self.constraints.bounds.push(bound);
+    }
+
+    /// The Cholesky factor of the Hessian and of the small curvatures.
+    fn factor(&mut self, hessian: &DMatrix<f64>, slope: &[f64]) -> Option<()> {
+        let n = slope.len();
+        let size = n + 2;
+        self.factor.clear();
+        self.factor.resize(size * size, 0.0);
+        let l = &mut self.factor;
+        for k in 0..n {
+            for i in k..n {
+                let known: f64 = (0..k).map(|m| l[m * size + i] * l[m * size + k]).sum();
+                let left = hessian[(i, k)] - known;
+                l[k * size + i] = if i > k { left / l[k * size + k] } else { left.sqrt() };
+            }
+            if !(l[k * size + k] > 0.0 && l[k * size + k].is_finite()) {
+                return None;
+            }
+        }
+        // What the first row falls by without the others: |L^-1 g|^2.
+        let mut y = slope.to_vec();
+        for k in 0..n {
+            y[k] = (y[k] - (0..k).map(|m| l[m * size + k] * y[m]).sum::<f64>()) / l[k * size + k];
+        }
+        let small = (Self::CURVATURE / (1.0 + dot(&y, &y))).sqrt();
+        l[n * size + n] = small;
+        l[(n + 1) * size + n + 1] = small;
+        Some(())
+    }
+
+    fn multipliers(&self, rows: &Rows) -> Multipliers {
+        let (f, c, h) = (rows.objectives.len(), rows.inequalities.len(), rows.equalities.len());
+        let mut all = vec![0.0; f + c + h];
+        for (p, multiplier) in self.method.active() {
+            match p {
+                p if p < f + c => all[p] = multiplier,
+                p if p < f + c + 2 * h => {
+                    let (row, side) = ((p - f - c) / 2, (p - f - c) % 2);
+                    all[f + c + row] += if side == 0 { multiplier } else { -multiplier };
+                }
+                _ => {}
+            }
+        }
+        let equalities = all.split_off(f + c);
+        let inequalities = all.split_off(f);
+        Multipliers { objectives: all, inequalities, equalities }
+    }
 }
 
 #[cfg(test)]
@@ -292,7 +333,7 @@ mod tests {
             inequalities: vec![],
             equalities: vec![],
         };
-        let d = solve(&rows, &DMatrix::zeros(1, 1), &[-5.0], &[5.0], 1.0).unwrap();
+        let d = solve(&rows, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 1.0).unwrap();
         assert!((d.step[0] - 1.0).abs() < 1e-8 && (d.level - 2.0).abs() < 1e-8, "{d:?}");
         assert!((d.multipliers.objectives[0] - 2.0 / 3.0).abs() < 1e-6, "{d:?}");
     }
@@ -305,7 +346,7 @@ mod tests {
             inequalities: vec![linear(1.0, &[1.0]), linear(1.0, &[-1.0])],
             equalities: vec![],
         };
-        let d = solve(&rows, &DMatrix::zeros(1, 1), &[-5.0], &[5.0], 100.0).unwrap();
+        let d = solve(&rows, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 100.0).unwrap();
         assert!(d.step[0].abs() < 1e-7 && (d.violation - 1.0).abs() < 1e-7, "{d:?}");
     }
 

@@ -42,7 +42,7 @@ pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
     let low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
     let high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
     // A penalty above every multiplier keeps the direction inside the cone.
-    let Some(direction) = solve(&cone, &(DMatrix::identity(n, n) * 1e-9), &low, &high, 1e4) else {
+    let Some(direction) = solve(&cone, &(DMatrix::identity(n, n) * 1e-6), &low, &high, 1e4) else {
         return Pareto::NotShown;
     };
     if dot(&cone.objectives[0].slope, &direction.step) > -IMPROVEMENT {

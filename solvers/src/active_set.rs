@@ -1,0 +1,367 @@
+//! A dual active-set method for strictly convex quadratic programs.
+//!
+//! ```text
+//! min over x   1/2 x'Hx + c'x    subject to   a_i x >= b_i
+//! ```
+//! Every iterate is the minimum over its active constraints, with multipliers that are not negative; a violated constraint
+//! is added at a time, and those whose multiplier falls to 0 on the way are dropped. With `H = L L'`, `J = L^-T Q` and the
+//! triangle `R` from the normals `N` of the active constraints, `L^-1 N = Q [R; 0]`: both are updated by plane rotations. The
+//! last iterate is computed anew from its active set, so that no rounding of the way there stays in it.
+//!
+//! Source: D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly convex quadratic programs,
+//! Mathematical Programming 27 (1983) 1-33.
+
+/// Linear constraints `a_i x >= b_i`.
+#[derive(Debug, Default)]
+pub struct Constraints {
+    /// The rows `a_i`, one after the other.
+    pub normals: Vec<f64>,
+    /// The numbers `b_i`.
+    pub bounds: Vec<f64>,
+}
+
+impl Constraints {
+    /// Forgets all of them.
+    pub fn clear(&mut self) {
+        self.normals.clear();
+        self.bounds.clear();
+    }
+}
+
+/// The method, with its memory, which is used again from program to program.
+#[derive(Debug, Default)]
+pub struct ActiveSet {
+    /// Number of variables.
+    n: usize,
+    /// `J`, by columns.
+    j: Vec<f64>,
+    /// `R`, by columns.
+    r: Vec<f64>,
+    /// The active constraints, by index.
+    active: Vec<usize>,
+    /// Their multipliers.
+    multipliers: Vec<f64>,
+    /// The iterate.
+    x: Vec<f64>,
+    /// `J'a` of the constraint that is added.
+    along: Vec<f64>,
+    /// The step of the iterate.
+    step: Vec<f64>,
+    /// The step of the multipliers.
+    change: Vec<f64>,
+}
+
+/// Relative size of what is left of a normal below which it depends on the active ones.
+const DEPENDENT: f64 = 1e-13;
+
+impl ActiveSet {
+    /// Solves a program whose Hessian has the Cholesky factor `l`, by columns; `first` are constraints that are active with
+    /// multipliers above 0 at the minimum over them, or none. `false` where the constraints contradict each other, or
+    /// rounding keeps the method from an end.
+    pub fn solve(&mut self, l: &[f64], c: &[f64], constraints: &Constraints, first: &[usize]) -> bool {
+        self.begin(l, c.len());
+        for &p in first {
+            self.project(row(constraints, p, self.n));
+            if !self.add(p) {
+                return false;
+            }
+        }
+        self.minimise(c, constraints);
+        let most = 50 + 20 * (self.n + constraints.bounds.len());
+        let mut steps = 0;
+        while let Some((p, mut slack)) = self.most_violated(constraints) {
+            let mut multiplier = 0.0;
+            loop {
+                steps += 1;
+                if steps > most {
+                    return false;
+                }
+                let normal = row(constraints, p, self.n);
+                self.project(normal);
+                let curvature = self.directions();
+                let (length, drop) = self.first_to_leave();
+                let full = if curvature > 0.0 { -slack / curvature } else { f64::INFINITY };
+                let taken = length.min(full);
+                if taken.is_infinite() {
+                    return false;
+                }
+                for (u, change) in self.multipliers.iter_mut().zip(&self.change) {
+                    *u -= taken * change;
+                }
+                multiplier += taken;
+                if full.is_finite() {
+                    for (x, step) in self.x.iter_mut().zip(&self.step) {
+                        *x += taken * step;
+                    }
+                    slack = dot(normal, &self.x) - constraints.bounds[p];
+                }
+                if full <= length {
+                    if !self.add(p) {
+                        return false;
+                    }
+                    *self.multipliers.last_mut().expect("one was added") = multiplier;
+                    break;
+                }
+                self.drop(drop);
+            }
+        }
+        self.minimise(c, constraints);
+        self.x.iter().all(|x| x.is_finite())
+    }
+
+    /// The solution.
+    pub fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    /// The active constraints, by index, with their multipliers.
+    pub fn active(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.active.iter().copied().zip(self.multipliers.iter().copied())
+    }
+
+    /// `J = L^-T`, and nothing active.
+    fn begin(&mut self, l: &[f64], n: usize) {
+        self.n = n;
+        self.active.clear();
+        self.multipliers.clear();
+        self.j.clear();
+        self.j.resize(n * n, 0.0);
+        for buffer in [&mut self.x, &mut self.along, &mut self.step] {
+            buffer.clear();
+            buffer.resize(n, 0.0);
+        }
+        self.change.clear();
+        self.r.clear();
+        self.r.resize(n * n, 0.0);
+        // Column k of L^-T by back substitution: L' J = I.
+        for k in 0..n {
+            for i in (0..=k).rev() {
+                let known: f64 = (i + 1..=k).map(|m| l[i * n + m] * self.j[k * n + m]).sum();
+                self.j[k * n + i] = (if i == k { 1.0 } else { 0.0 } - known) / l[i * n + i];
+            }
+        }
+    }
+
+    /// `along = J'a`.
+    fn project(&mut self, normal: &[f64]) {
+        for (along, column) in self.along.iter_mut().zip(self.j.chunks_exact(self.n)) {
+            *along = dot(column, normal);
+        }
+    }
+
+    /// The steps of the iterate and of the multipliers per unit of the new one; the curvature along the first, 0 where the
+    /// normal depends on the active ones.
+    fn directions(&mut self) -> f64 {
+        let (n, q) = (self.n, self.active.len());
+        self.change.clear();
+        self.change.extend_from_slice(&self.along[..q]);
+        for i in (0..q).rev() {
+            self.change[i] /= self.r[i * n + i];
+            let known = self.change[i];
+            for k in 0..i {
+                self.change[k] -= known * self.r[i * n + k];
+            }
+        }
+        let free: f64 = self.along[q..].iter().map(|d| d * d).sum();
+        let all: f64 = self.along.iter().map(|d| d * d).sum();
+        if free <= DEPENDENT * DEPENDENT * all {
+            return 0.0;
+        }
+        self.step.fill(0.0);
+        for (d, column) in self.along[q..].iter().zip(self.j.chunks_exact(n).skip(q)) {
+            for (step, j) in self.step.iter_mut().zip(column) {
+                *step += d * j;
+            }
+        }
+        free
+    }
+
+    /// How far the multipliers can go until the first of them is 0, and which.
+    fn first_to_leave(&self) -> (f64, usize) {
+        let ratios = self.multipliers.iter().zip(&self.change).enumerate();
+        let ratios = ratios.filter(|(_, (_, change))| **change > 0.0).map(|(i, (u, change))| (u.max(0.0) / change, i));
+        ratios.fold((f64::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best })
+    }
+
+    /// Adds the constraint that was projected; `false` where rounding leaves nothing of it.
+    fn add(&mut self, p: usize) -> bool {
+        let (n, q) = (self.n, self.active.len());
+        if q == n {
+            return false;
+        }
+        for k in (q + 1..n).rev() {
+            let (cos, sin, length) = rotation(self.along[k - 1], self.along[k]);
+            if sin != 0.0 {
+                (self.along[k - 1], self.along[k]) = (length, 0.0);
+                self.rotate(k - 1, cos, sin);
+            }
+        }
+        self.r[q * n..q * n + q + 1].copy_from_slice(&self.along[..=q]);
+        self.active.push(p);
+        self.multipliers.push(0.0);
+        self.along[q] != 0.0
+    }
+
+    /// Drops the active constraint at `position`.
+    fn drop(&mut self, position: usize) {
+        let n = self.n;
+        self.active.remove(position);
+        self.multipliers.remove(position);
+        let q = self.active.len();
+        for column in position..q {
+            self.r.copy_within((column + 1) * n..(column + 1) * n + column + 2, column * n);
+        }
+        for k in position..q {
+            let (cos, sin, length) = rotation(self.r[k * n + k], self.r[k * n + k + 1]);
+            (self.r[k * n + k], self.r[k * n + k + 1]) = (length, 0.0);
+            for column in k + 1..q {
+                let (a, b) = (self.r[column * n + k], self.r[column * n + k + 1]);
+                (self.r[column * n + k], self.r[column * n + k + 1]) = (cos * a + sin * b, cos * b - sin * a);
+            }
+            self.rotate(k, cos, sin);
+        }
+    }
+
+    /// Rotates the columns `k` and `k + 1` of `J`.
+    fn rotate(&mut self, k: usize, cos: f64, sin: f64) {
+        let (left, right) = self.j[k * self.n..(k + 2) * self.n].split_at_mut(self.n);
+        for (a, b) in left.iter_mut().zip(right) {
+            (*a, *b) = (cos * *a + sin * *b, cos * *b - sin * *a);
+        }
+    }
+
+    /// The minimum over the active constraints, and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 = -J_2'c`,
+    /// `R u = y_1 + J_1'c`.
+    fn minimise(&mut self, c: &[f64], constraints: &Constraints) {
+        let (n, q) = (self.n, self.active.len());
+        self.x.fill(0.0);
+        for k in 0..n {
+            let slope = dot(&self.j[k * n..(k + 1) * n], c);
+            let y = if k < q {
+                let known: f64 = (0..k).map(|i| self.r[k * n + i] * self.along[i]).sum();
+                (constraints.bounds[self.active[k]] - known) / self.r[k * n + k]
+            } else {
+                -slope
+            };
+            self.along[k] = y;
+            if k < q {
+                self.multipliers[k] = y + slope;
+            }
+            for (x, j) in self.x.iter_mut().zip(&self.j[k * n..(k + 1) * n]) {
+                *x += y * j;
+            }
+        }
+        for i in (0..q).rev() {
+            self.multipliers[i] /= self.r[i * n + i];
+            let known = self.multipliers[i];
+            for k in 0..i {
+                self.multipliers[k] -= known * self.r[i * n + k];
+            }
+        }
+    }
+
+    /// The constraint that is violated most, relative to what its terms are off by rounding, and its slack.
+    fn most_violated(&self, constraints: &Constraints) -> Option<(usize, f64)> {
+        let largest = self.x.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+        let mut worst = None;
+        let mut most = -1e-12;
+        for (p, (normal, bound)) in constraints.normals.chunks_exact(self.n).zip(&constraints.bounds).enumerate() {
+            let slack = dot(normal, &self.x) - bound;
+            if slack >= 0.0 {
+                continue;
+            }
+            let size = normal.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+            let relative = slack / (size * (1.0 + largest) + bound.abs());
+            if relative < most && !self.active.contains(&p) {
+                (worst, most) = (Some((p, slack)), relative);
+            }
+        }
+        worst
+    }
+}
+
+fn row(constraints: &Constraints, p: usize, n: usize) -> &[f64] {
+    &constraints.normals[p * n..(p + 1) * n]
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Cosine and sine of the rotation that takes `(a, b)` to `(length, 0)`.
+fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
+    if b == 0.0 {
+        return (1.0, 0.0, a);
+    }
+    let length = a.hypot(b);
+    (a / length, b / length, length)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+    use rand::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn factor(hessian: &DMatrix<f64>) -> Vec<f64> {
+        hessian.clone().cholesky().unwrap().l().as_slice().to_vec()
+    }
+
+    /// Largest error of the conditions of Karush, Kuhn and Tucker, which a strictly convex program meets at its solution alone.
+    fn error(method: &ActiveSet, hessian: &DMatrix<f64>, c: &[f64], constraints: &Constraints) -> f64 {
+        let n = c.len();
+        let x = DVector::from_column_slice(method.x());
+        let mut slope = hessian * &x + DVector::from_column_slice(c);
+        let mut worst = 0.0_f64;
+        for (p, multiplier) in method.active() {
+            let normal = DVector::from_column_slice(row(constraints, p, n));
+            worst = worst.max((normal.dot(&x) - constraints.bounds[p]).abs()).max(-multiplier);
+            slope -= normal * multiplier;
+        }
+        let slacks =
+            (0..constraints.bounds.len()).map(|p| dot(row(constraints, p, n), x.as_slice()) - constraints.bounds[p]);
+        slacks.fold(worst.max(slope.amax()), |worst, slack| worst.max(-slack))
+    }
+
+    #[test]
+    fn random_programs_are_solved_to_rounding() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut method = ActiveSet::default();
+        for (n, m) in [(1, 3), (5, 10), (10, 30), (20, 60)].repeat(25) {
+            let mut draw = || random.random_range(-1.0..1.0);
+            let a = DMatrix::from_fn(n, n, |_, _| draw());
+            let hessian = &a * a.transpose() + DMatrix::identity(n, n) * 0.1;
+            let c: Vec<f64> = (0..n).map(|_| 5.0 * draw()).collect();
+            // Feasible at a point that is drawn too, some of them with equality there.
+            let inside = DVector::from_fn(n, |_, _| draw());
+            let mut constraints = Constraints::default();
+            for p in 0..m {
+                let normal = DVector::from_fn(n, |_, _| draw());
+                let slack = if p % 3 == 0 { 0.0 } else { draw().abs() };
+                constraints.bounds.push(normal.dot(&inside) - slack);
+                constraints.normals.extend(normal.iter());
+            }
+            assert!(method.solve(&factor(&hessian), &c, &constraints, &[]), "{n} {m}");
+            let error = error(&method, &hessian, &c, &constraints);
+            assert!(error < 1e-10, "{n} {m}: {error:e}");
+        }
+    }
+
+    #[test]
+    fn constraints_that_contradict_each_other_are_seen() {
+        let hessian = DMatrix::identity(1, 1);
+        let constraints = Constraints { normals: vec![1.0, -1.0], bounds: vec![1.0, 0.0] };
+        assert!(!ActiveSet::default().solve(&factor(&hessian), &[0.0], &constraints, &[]));
+    }
+
+    #[test]
+    fn constraints_that_repeat_each_other_do_no_harm() {
+        let hessian = DMatrix::identity(2, 2);
+        let constraints = Constraints { normals: [1.0, 1.0].repeat(6), bounds: vec![2.0; 6] };
+        let mut method = ActiveSet::default();
+        assert!(method.solve(&factor(&hessian), &[0.0, 0.0], &constraints, &[]));
+        assert!(method.x().iter().all(|x| (x - 1.0).abs() < 1e-14), "{:?}", method.x());
+    }
+}

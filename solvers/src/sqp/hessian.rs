@@ -1,0 +1,73 @@
+//! The curvature of the Lagrangian, from the slopes at the two ends of a step.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A damped BFGS matrix: positive definite whatever the curvature.
+///
+/// Source: M. J. D. Powell, in Numerical Analysis Dundee 1977, Lecture Notes in Mathematics 630 (damping); J. Nocedal,
+/// S. Wright, Numerical Optimization, 2nd edition (2006), equation 6.20 (first scale).
+#[derive(Debug)]
+pub(super) struct Hessian {
+    matrix: DMatrix<f64>,
+    /// Whether it has seen a step yet.
+    learned: bool,
+}
+
+/// Curvature before anything is known, where the objective has a slope of about 1.
+const FIRST: f64 = 1.0;
+
+/// Curvature along a step that is left at least, as a share of what was there. N.B.: Powell takes 0.2.
+const DAMPED: f64 = 0.1;
+
+/// Curvature in the unit box beyond which a change of slope is taken for a kink.
+const LARGEST: f64 = 1e7;
+
+impl Hessian {
+    pub fn new(n: usize) -> Self {
+        Self { matrix: DMatrix::identity(n, n) * FIRST, learned: false }
+    }
+
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+
+    /// Whether it has seen a step yet.
+    pub fn has_learned(&self) -> bool {
+        self.learned
+    }
+
+    /// Forgets all it has seen.
+    pub fn forget(&mut self) {
+        *self = Self::new(self.matrix.nrows());
+    }
+
+    /// `1/2 d'Bd`.
+    pub fn half(&self, step: &[f64]) -> f64 {
+        let n = step.len();
+        let along = |j: usize| (0..n).map(|i| self.matrix[(i, j)] * step[i]).sum::<f64>();
+        0.5 * (0..n).map(|j| along(j) * step[j]).sum::<f64>()
+    }
+
+    /// Takes in a step and the change of the Lagrangian's slope along it.
+    pub fn learn(&mut self, s: &DVector<f64>, y: &DVector<f64>) {
+        // Across a kink or a jump the slopes change at once: that is no curvature.
+        if s.norm() < 1e-12 || y.norm() > LARGEST * s.norm() {
+            return;
+        }
+        if !self.learned {
+            let scale = if s.dot(y) > 0.0 { y.norm_squared() / s.dot(y) } else { FIRST };
+            self.matrix = DMatrix::identity(s.len(), s.len()) * scale.clamp(1e-2, 1e4);
+            self.learned = true;
+        }
+        let bs = &self.matrix * s;
+        let sbs = s.dot(&bs);
+        let sy = s.dot(y);
+        let theta = if sy >= DAMPED * sbs { 1.0 } else { (1.0 - DAMPED) * sbs / (sbs - sy) };
+        let r = y * theta + &bs * (1.0 - theta);
+        self.matrix.ger(1.0 / s.dot(&r), &r, &r, 1.0);
+        self.matrix.ger(-1.0 / sbs, &bs, &bs, 1.0);
+        if self.matrix.iter().any(|h| !h.is_finite() || h.abs() > 1e9) {
+            self.forget();
+        }
+    }
+}

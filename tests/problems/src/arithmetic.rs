@@ -1,0 +1,94 @@
+//! Short names for what formulas of test problems are made of.
+
+use mops_core::Scalar;
+
+/// A constant.
+pub(crate) fn c<S: Scalar>(value: f64) -> S {
+    S::from(value)
+}
+
+/// Square.
+pub(crate) fn sq<S: Scalar>(x: S) -> S {
+    x * x
+}
+
+/// Cube.
+pub(crate) fn cube<S: Scalar>(x: S) -> S {
+    x * x * x
+}
+
+/// Fourth power.
+pub(crate) fn fourth<S: Scalar>(x: S) -> S {
+    sq(sq(x))
+}
+
+/// Sum.
+pub(crate) fn sum<S: Scalar>(terms: impl IntoIterator<Item = S>) -> S {
+    terms.into_iter().fold(c(0.0), |sum, term| sum + term)
+}
+
+/// Inner product with constants; what has none counts nothing.
+pub(crate) fn dot<S: Scalar>(coefficients: &[f64], x: &[S]) -> S {
+    sum(coefficients.iter().zip(x).map(|(&a, &x)| x * a))
+}
+
+/// Arc tangent.
+pub(crate) fn atan<S: Scalar>(x: S) -> S {
+    x.chain(x.value().atan(), 1.0 / (1.0 + x.value().powi(2)))
+}
+
+/// Hyperbolic sine.
+pub(crate) fn sinh<S: Scalar>(x: S) -> S {
+    x.chain(x.value().sinh(), x.value().cosh())
+}
+
+/// A power with an exponent that varies, of a positive number.
+pub(crate) fn power<S: Scalar>(x: S, exponent: S) -> S {
+    (x.ln() * exponent).exp()
+}
+
+/// Rows of an exact penalty function: the objective, and the objective plus `weight` times each constraint.
+///
+/// Source: A. R. Conn, A. Wright; L. Luksan, J. Vlcek, report V-798 (2000), section 2.
+pub(crate) fn penalised<S: Scalar>(weight: f64, outputs: &[S]) -> Vec<S> {
+    let (&f, constraints) = outputs.split_first().expect("there is an objective");
+    std::iter::once(f).chain(constraints.iter().map(|&g| f + g * weight)).collect()
+}
+
+/// The standard normal distribution function: a series near 0, a continued fraction far from it.
+///
+/// Source: NIST Handbook of Mathematical Functions (2010), equations 7.6.2 and 7.9.2.
+pub(crate) fn normal<S: Scalar>(x: S) -> S {
+    let z = x.value();
+    let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+    let tail = |z: f64| (1..120).rev().fold(z, |fraction, k| z + f64::from(k) / fraction);
+    let value = if z.abs() < 3.0 {
+        let terms = (1..80).scan(z, |term, k| {
+            let this = *term;
+            *term *= z * z / f64::from(2 * k + 1);
+            Some(this)
+        });
+        let series: f64 = terms.sum();
+        0.5 + density * series
+    } else if z > 0.0 {
+        1.0 - density / tail(z)
+    } else {
+        density / tail(-z)
+    };
+    x.chain(value, density)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_normal_distribution_function_has_its_known_values() {
+        // M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), table 26.1; continuous at 3.
+        let known = [(0.0, 0.5), (1.0, 0.841344746068543), (-2.0, 0.022750131948179), (-4.0, 0.0000316712418331)];
+        for (z, p) in known {
+            assert!((normal(z) - p).abs() < 1e-15, "{z} {}", normal(z));
+        }
+        assert!((normal(3.0 - 1e-12) - normal(3.0_f64)).abs() < 1e-13);
+    }
+}

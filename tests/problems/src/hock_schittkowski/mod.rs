@@ -1,0 +1,67 @@
+//! Smooth problems with bounds, inequalities and equalities.
+//!
+//! N.B.: a start outside the bounds is moved to the nearest bound. Optima were compared with newer computations, because
+//! some in the book, or in files that came from it, are wrong or are one of several.
+
+pub(crate) mod common;
+mod hs001_020;
+mod hs021_040;
+mod hs041_060;
+mod hs061_070;
+mod hs071_086;
+mod hs088_100;
+mod hs101_110;
+mod hs111_119;
+mod least_squares;
+
+use crate::Suite;
+use crate::formula::Functions;
+use crate::problem::{Answer, Problem};
+
+pub(crate) const SUITE: Suite = Suite {
+    name: "hock-schittkowski",
+    about: "smooth problems with constraints, 2 to 16 variables",
+    source: "W. Hock, K. Schittkowski, Test examples for nonlinear programming codes, Lecture Notes in Economics and \
+             Mathematical Systems 187, Springer (1981)",
+    accuracy: 1e-6,
+    problems,
+};
+
+fn problems() -> Vec<Problem> {
+    let mut all: Vec<(u32, Problem)> = [
+        hs001_020::problems(),
+        hs021_040::problems(),
+        hs041_060::problems(),
+        hs061_070::problems(),
+        hs071_086::problems(),
+        hs088_100::problems(),
+        hs101_110::problems(),
+        hs111_119::problems(),
+        least_squares::problems(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    all.sort_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, problem)| problem).collect()
+}
+
+/// A problem by its number, with its count of inequalities and of equalities.
+fn hs(
+    number: u32,
+    start: &[f64],
+    counts: [usize; 2],
+    answer: impl Into<Answer>,
+    functions: Functions,
+) -> (u32, Problem) {
+    let [inequalities, equalities] = counts;
+    (number, Problem { inequalities, equalities, ..Problem::new(&format!("HS{number}"), start, answer, functions) })
+}
+
+/// The same with bounds.
+fn within(bounds: &[[f64; 2]], (number, problem): (u32, Problem)) -> (u32, Problem) {
+    (number, Problem { bounds: bounds.to_vec(), ..problem })
+}
+
+const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
