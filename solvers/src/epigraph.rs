@@ -13,7 +13,7 @@
 use mops_core::{Linearisation, Objective, Shape, Usage};
 use nalgebra::DMatrix;
 
-use crate::active_set::{ActiveSet, Constraints};
+use crate::active_set::{ActiveSet, Constraints, dot};
 
 /// A function's value and slope.
 #[derive(Debug, Clone)]
@@ -173,11 +173,6 @@ pub struct Direction {
     pub violation: f64,
     /// What the rows weigh.
     pub multipliers: Multipliers,
-}
-
-/// The inner product.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Solves the subproblem for steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding

@@ -41,7 +41,7 @@ pub struct SqpOptions {
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-10, radius: 0.05, max_iterations: 300 }
+        Self { tolerance: 1e-12, radius: 1.0, max_iterations: 300 }
     }
 }
 
@@ -63,7 +63,12 @@ struct Sqp {
 const SMALLEST_RADIUS: f64 = 1e-9;
 
 /// Slope of the Lagrangian that counts as none, where the steepest row has one of about 1 at the start.
-const STATIONARY: f64 = 1e-7;
+const STATIONARY: f64 = 1e-9;
+
+/// Change of objective and violation that is none, relative to 1 + |objective|; and so many steps of that kind in a row are
+/// enough: what is left is the noise of simulations.
+const IDLE: f64 = 1e-10;
+const MOST_IDLE: usize = 8;
 
 /// Share of the promise that a step must keep.
 const ENOUGH: f64 = 1e-4;
@@ -115,8 +120,15 @@ impl Solver for Sqp {
         if promised <= tolerance || state.radius < SMALLEST_RADIUS {
             return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= tolerance));
         }
+        let before = [state.rows.objective(), state.rows.violation()];
         let tried = state.try_corrected(oracle, &direction, merit, promised)?;
         state.judge(oracle, tried, &direction, merit, promised)?;
+        let change = (before[0] - state.rows.objective()).abs().max((before[1] - state.rows.violation()).abs());
+        state.idle = if change <= IDLE * size { state.idle + 1 } else { 0 };
+        if state.idle >= MOST_IDLE {
+            state.idle = 0;
+            return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= 1e4 * tolerance));
+        }
         Ok(Progress::Continue)
     }
 }
@@ -167,10 +179,14 @@ impl State {
     ) -> Result<(), Halt> {
         let length = direction.step.iter().fold(0.0_f64, |a, d| a.max(d.abs()));
         let achieved = tried.as_ref().map_or(f64::NEG_INFINITY, |(_, rows)| merit - self.merit(rows));
-        // A step may also be measured from the worse of the two iterates before: the path along a curved constraint is not
-        // held up by a merit that rises a little.
+        // A step that is better in objective or violation may also be measured from the worst of the two iterates before:
+        // the path along a curved constraint is not held up by a merit that rises a little.
         let before = self.reference() - merit;
-        let ratio = (achieved / promised).max((achieved + before) / (promised + before));
+        let trades = tried.as_ref().is_some_and(|(_, rows)| {
+            rows.objective() < self.rows.objective() || rows.violation() < self.rows.violation()
+        });
+        let relaxed = if trades { (achieved + before) / (promised + before) } else { f64::NEG_INFINITY };
+        let ratio = (achieved / promised).max(relaxed);
         if ratio < 0.25 {
             // Where the parabola through both values, with the slope here, has its minimum.
             let slope = promised + self.hessian.half(&direction.step);
