@@ -7,7 +7,7 @@ use mops_core::{Effect, Mistake, Study, Watch};
 
 use crate::account::{found, moves, next_experiment, noticeable, predictions, ranking, starts};
 use crate::base;
-use crate::diagnosis::{Diagnosis, Found, Removed, Verdict};
+use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::judge::{Judgement, judge};
 use crate::locate::locate;
 use crate::screen::Scene;
@@ -69,7 +69,6 @@ pub fn diagnose(
     let dispersion = Dispersion::of(&last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
     let found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
-    let names = |k: &usize| study.tuners[subject.globals[*k]].parameter.clone();
     let probability = match verdict {
         // Nothing at all was weighed among the others.
         Verdict::None => 1.0 - ranked.iter().map(|r| r.probability).sum::<f64>(),
@@ -82,7 +81,7 @@ pub fn diagnose(
         p_value: growth.p_value,
         next_experiment: next_experiment(&rounds, &found),
         found,
-        removed: held.iter().map(|k| Removed { term: names(k), place: String::new() }).collect(),
+        removed: search.removed(&base, &held),
         ranked,
         unexplained,
         before: search.errors(&before),

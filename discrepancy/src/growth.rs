@@ -108,7 +108,8 @@ impl<'a> Search<'a> {
         let same = |t: &Trial<'_>| t.added.last().is_some_and(|a| a.candidate.is(&own.candidate));
         round.trials.retain(|t| !same(t));
         // The effect itself stands where the whole model ended, not where a new fit from nothing may have stopped.
-        let order: Vec<_> = without.added.iter().chain([own]).cloned().collect();
+        let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a);
+        let order: Vec<_> = others.chain([own]).cloned().collect();
         round.trials.extend(self.from(last, &order, 10));
         let of = Dispersion::of(last);
         round.trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));

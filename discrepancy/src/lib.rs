@@ -18,6 +18,7 @@ mod locate;
 #[cfg(test)]
 mod locate_tests;
 mod plan;
+mod removed;
 mod repaired;
 mod screen;
 mod search;

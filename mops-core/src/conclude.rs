@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::catalogue::SolverChoice;
 use crate::experiment::{Channel, Role};
+use crate::front;
 use crate::identification::{self, Local};
 use crate::model::Analysis;
 use crate::outcome::{
@@ -107,13 +108,28 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
             objective: start.merit.objective,
             criteria: outcome::criterion_reports(&study, &start),
         },
-        front: vec![outcome::front_point(&study, &best)],
+        front: front_points(run, &best),
         calibration,
         found: Findings::default(),
         failures,
         warnings,
     };
     (outcome, best)
+}
+
+/// Points of a front in a result, at most.
+const LONGEST_FRONT: usize = 200;
+
+/// The points of the front, spread evenly where there are many; of a single design, the design itself.
+fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<serde_json::Value> {
+    let study = run.problem().study();
+    let front = run.front();
+    let Some(m) = front.first().map(|&i| run.archive()[i].objectives.len()) else {
+        return vec![outcome::front_point(study, best)];
+    };
+    let objectives: Vec<f64> = front.iter().flat_map(|&i| run.archive()[i].objectives.iter().copied()).collect();
+    let kept = front::thinned(&objectives, m, LONGEST_FRONT);
+    kept.into_iter().map(|i| outcome::front_point(study, run.evaluation(front[i]))).collect()
 }
 
 /// A number to six significant digits, so that no rounding error shows.

@@ -14,6 +14,7 @@ mod evaluator;
 mod experiment;
 pub mod expression;
 pub mod file;
+pub mod front;
 pub mod identification;
 pub mod linear;
 mod linearised;

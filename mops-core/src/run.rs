@@ -1,15 +1,18 @@
 //! A run: owns the budget, the cache, the archive and the random streams, and keeps the best point.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
 
 use rayon::prelude::*;
 
 use crate::differences::Differences;
 use crate::evaluator::Evaluator;
+use crate::front;
 use crate::model::Failure;
 use crate::problem::{Evaluation, Merit, Problem};
 use crate::random::{Stream, stream};
 use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
+use crate::study::Objective;
 
 /// What a run may cost.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +59,8 @@ pub struct Record {
     pub tuners: Vec<f64>,
     /// Values of all rows; NaN where there is none.
     pub values: Vec<f64>,
+    /// Weighted scaled values of the rows to be minimised where each counts for itself; else empty.
+    pub objectives: Vec<f64>,
     /// What the point is worth.
     pub merit: Merit,
 }
@@ -65,7 +70,8 @@ pub struct Run<'a, E: Evaluator = Problem> {
     problem: &'a E,
     budget: Budget,
     watch: &'a dyn Watch,
-    cache: HashMap<Vec<u64>, Evaluation>,
+    cache: HashMap<Vec<u64>, Evaluation, BuildHasherDefault<Bits>>,
+    failed: usize,
     archive: Vec<Record>,
     best: Option<Evaluation>,
     failures: Vec<FailureCount>,
@@ -92,7 +98,8 @@ impl<'a, E: Evaluator> Run<'a, E> {
             problem,
             budget,
             watch,
-            cache: HashMap::new(),
+            cache: HashMap::default(),
+            failed: 0,
             archive: Vec::new(),
             best: None,
             failures: Vec::new(),
@@ -149,6 +156,26 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.problem
     }
 
+    /// The front: the feasible points that no other feasible point is better than in every objective, by their place in the
+    /// archive. Empty where the objectives become one number.
+    pub fn front(&self) -> Vec<usize> {
+        let feasible = |i: &usize| self.archive[*i].merit.is_feasible() && !self.archive[*i].objectives.is_empty();
+        let candidates: Vec<usize> = (0..self.archive.len()).filter(feasible).collect();
+        let Some(m) = candidates.first().map(|&i| self.archive[i].objectives.len()) else { return Vec::new() };
+        let objectives: Vec<f64> =
+            candidates.iter().flat_map(|&i| self.archive[i].objectives.iter().copied()).collect();
+        front::non_dominated(&objectives, m).into_iter().map(|i| candidates[i]).collect()
+    }
+
+    /// The evaluation of a point of the archive.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    pub fn evaluation(&self, index: usize) -> &Evaluation {
+        let key: Vec<u64> = self.archive[index].tuners.iter().map(|value| value.to_bits()).collect();
+        &self.cache[&key]
+    }
+
     fn record(&mut self, evaluation: &Evaluation) {
         for (job, failure) in &evaluation.failures {
             match self.failures.iter_mut().find(|f| f.job == *job && f.first.kind() == failure.kind()) {
@@ -156,7 +183,12 @@ impl<'a, E: Evaluator> Run<'a, E> {
                 None => self.failures.push(FailureCount { job: *job, first: failure.clone(), count: 1 }),
             }
         }
+        self.failed += usize::from(evaluation.merit.objective.is_infinite());
+        let shape = self.problem.shape();
+        let each = shape.objective == Objective::Each;
+        let objectives = evaluation.scaled.as_ref().filter(|_| each).map(|scaled| shape.objectives(scaled));
         self.archive.push(Record {
+            objectives: objectives.unwrap_or_default(),
             tuners: evaluation.tuners.clone(),
             values: evaluation.readings.iter().map(|r| r.map_or(f64::NAN, |r| r.value)).collect(),
             merit: evaluation.merit,
@@ -170,9 +202,38 @@ impl<'a, E: Evaluator> Run<'a, E> {
         State {
             evaluations: self.archive.len(),
             budget: self.budget.evaluations,
-            failed: self.archive.iter().filter(|r| r.merit.objective.is_infinite()).count(),
+            failed: self.failed,
             best: self.best.as_ref().map_or(Merit::FAILED, |b| b.merit),
         }
+    }
+}
+
+/// A hash of the bits of numbers: each word is folded in by a multiplication. The keys are nobody's attack.
+///
+/// Source: the constant is that of D. E. Knuth, The Art of Computer Programming, volume 3, section 6.4.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bits(u64);
+
+impl Hasher for Bits {
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.write_u64(u64::from_ne_bytes(word));
+        }
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        self.0 = (self.0.rotate_left(23) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
+
+    /// The low bits of floating-point numbers are often zero, and so are those of their products.
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
     }
 }
 
@@ -189,12 +250,9 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
         debug_assert!(points.iter().flatten().all(|u| (0.0..=1.0).contains(u)), "solvers stay inside the unit box");
         let keys: Vec<Vec<u64>> = points.iter().map(|point| key(self.problem, point)).collect();
-        let mut new: Vec<usize> = Vec::new();
-        for (i, k) in keys.iter().enumerate() {
-            if !self.cache.contains_key(k) && !new.iter().any(|&j| keys[j] == *k) {
-                new.push(i);
-            }
-        }
+        let mut seen: HashSet<&[u64], BuildHasherDefault<Bits>> = HashSet::default();
+        let is_new = |i: &usize| !self.cache.contains_key(&keys[*i]) && seen.insert(&keys[*i]);
+        let mut new: Vec<usize> = (0..keys.len()).filter(is_new).collect();
         let left = self.budget.evaluations.saturating_sub(self.archive.len());
         let within_budget = new.len() <= left;
         new.truncate(left);

@@ -53,7 +53,7 @@ impl Shape {
         let (mut violation, mut objective) = (0.0_f64, None);
         for ((usage, weight), s) in self.rows.iter().zip(scaled) {
             match (usage, self.objective) {
-                (Usage::Minimise, Objective::Max) => {
+                (Usage::Minimise, Objective::Max | Objective::Each) => {
                     objective = Some(objective.map_or(weight * s, |worst: f64| worst.max(weight * s)));
                 }
                 (Usage::Minimise, Objective::Sum) => objective = Some(objective.unwrap_or(0.0) + weight * s),

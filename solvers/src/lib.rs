@@ -3,17 +3,26 @@
 mod active_set;
 mod argmin_adapter;
 pub mod auto;
+pub mod cma_es;
+pub mod differential_evolution;
 pub mod epigraph;
+pub mod evolution;
+pub mod genetic;
 pub mod levenberg_marquardt;
 mod multistart;
 pub mod nelder_mead;
+pub mod nsga2;
+pub mod nsga3;
 mod pareto;
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
+mod population;
+mod ranking;
 mod rows;
 pub mod sqp;
 mod start;
+mod variation;
 
 use mops_core::SolverKind;
 
@@ -25,6 +34,11 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<auto::AutoOptions>(),
         SolverKind::of::<sqp::SqpOptions>(),
         SolverKind::of::<pattern_search::PatternSearchOptions>(),
+        SolverKind::of::<cma_es::CmaEsOptions>(),
+        SolverKind::of::<differential_evolution::DifferentialEvolutionOptions>(),
+        SolverKind::of::<genetic::GeneticOptions>(),
+        SolverKind::of::<nsga2::Nsga2Options>(),
+        SolverKind::of::<nsga3::Nsga3Options>(),
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),
         SolverKind::of::<nelder_mead::NelderMeadOptions>(),
         SolverKind::of::<particle_swarm::ParticleSwarmOptions>(),

@@ -49,7 +49,7 @@ fn improvements(archive: &[Record]) -> Vec<(usize, Merit)> {
 
 fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot {
     let name = match study.objective {
-        Objective::Max => "worst scaled criterion",
+        Objective::Max | Objective::Each => "worst scaled criterion",
         Objective::Sum => "sum of weighted scaled criteria",
     };
     // The objective of an infeasible point can be low for the wrong reason: it is drawn in another colour.
@@ -129,8 +129,12 @@ mod tests {
 
     #[test]
     fn the_best_point_is_kept_until_a_better_one_comes() {
-        let record =
-            |violation, objective| Record { tuners: vec![], values: vec![], merit: Merit { violation, objective } };
+        let record = |violation, objective| Record {
+            tuners: vec![],
+            values: vec![],
+            objectives: vec![],
+            merit: Merit { violation, objective },
+        };
         let archive = [
             record(0.5, 1.0),
             record(f64::INFINITY, f64::INFINITY),

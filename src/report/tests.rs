@@ -90,7 +90,12 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     let problem = Problem::new(Arc::new(draft.build().unwrap()));
     let best = problem.evaluate_at(&[2.0]);
     let first = problem.evaluate_at(&[start]);
-    let record = |e: &Evaluation| Record { tuners: e.tuners.clone(), values: Vec::new(), merit: e.merit };
+    let record = |e: &Evaluation| Record {
+        tuners: e.tuners.clone(),
+        values: Vec::new(),
+        objectives: Vec::new(),
+        merit: e.merit,
+    };
     let archive = vec![record(&first), record(&best)];
     let criteria = |e: &Evaluation| criteria(&problem, e);
     let outcome = Outcome {

@@ -61,6 +61,7 @@ fn dry_friction_and_quadratic_drag_are_found_together_and_no_coefficient_is_nega
     // What was declared is the wrong term, and goes.
     let viscous = found.parameters.iter().find(|p| p.name == "b").expect("it is a tuner");
     assert!(viscous.after >= 0.0 && viscous.after < 0.01 * viscous.before.max(0.05), "{viscous:?}");
+    assert_eq!((found.removed[0].term.as_str(), found.removed[0].place.as_str()), ("b", "joint:q"));
     assert!(found.after.iter().all(|e| e.normalised < 1.1), "{:?}", found.after);
 }
 

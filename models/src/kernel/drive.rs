@@ -65,8 +65,18 @@ impl<'a, S: Scalar> Drive<'a, S> {
         self.slope
     }
 
-    /// The next time after `t` at which the value or its slope jumps.
+    /// The next time after `t` at which the value or its slope jumps; samples that are held and repeat themselves do not.
     pub fn next_break(&self, t: f64) -> f64 {
+        let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
+        let mut after = self.first_after(times, t);
+        while after > 0 && after < times.len() && values[after] == values[after - 1] {
+            after += 1;
+        }
+        times.get(after).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The same with all samples.
+    pub fn next_sample(&self, t: f64) -> f64 {
         match self.input {
             Some(Input::Sampled { times, .. }) => {
                 times.get(self.first_after(times, t)).copied().unwrap_or(f64::INFINITY)
@@ -74,17 +84,6 @@ impl<'a, S: Scalar> Drive<'a, S> {
             Some(input) => input.next_break(t),
             None => f64::INFINITY,
         }
-    }
-
-    /// The next time after `t` at which the value or its slope changes: samples that are held and repeat themselves are passed
-    /// over.
-    pub fn next_jump(&self, t: f64) -> f64 {
-        let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_break(t) };
-        let mut after = self.first_after(times, t);
-        while after > 0 && after < times.len() && values[after] == values[after - 1] {
-            after += 1;
-        }
-        times.get(after).copied().unwrap_or(f64::INFINITY)
     }
 
     /// The first sample after `t`, looked for near where the drive is.

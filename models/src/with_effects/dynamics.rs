@@ -74,7 +74,7 @@ impl<S: Scalar> Command<'_, S> {
     fn next_break(&self, t: f64, smooth: bool) -> f64 {
         let delay = self.delay.map_or(0.0, Scalar::value);
         let out = if delay > 0.0 { self.out(t) } else { t };
-        delay + if smooth { self.drive.next_jump(out) } else { self.drive.next_break(out) }
+        delay + if smooth { self.drive.next_break(out) } else { self.drive.next_sample(out) }
     }
 }
 

@@ -52,6 +52,9 @@ pub enum Objective {
     Max,
     /// The sum of the weighted scaled values.
     Sum,
+    /// None: each counts for itself, and the run keeps the front of points that no other is better than in all of them.
+    /// The point reported is that of the front whose largest is least.
+    Each,
 }
 
 /// A study whose every name, size, bound and unit has been checked.

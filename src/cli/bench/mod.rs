@@ -47,10 +47,10 @@ struct Diagnosis {
     /// Cases that lack what no catalogue has.
     #[arg(long, default_value_t = 20)]
     outside: usize,
-    /// Plants; all where absent.
+    /// Plants, separated by commas; all where absent.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
-    /// Effects, as the test bed calls them; all where absent.
+    /// Effects, as the test bed calls them, separated by commas; all where absent.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     effects: Vec<String>,
     /// Errors of the refitted base model, in units of the noise.

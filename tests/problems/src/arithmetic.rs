@@ -32,6 +32,11 @@ pub(crate) fn dot<S: Scalar>(coefficients: &[f64], x: &[S]) -> S {
     sum(coefficients.iter().zip(x).map(|(&a, &x)| x * a))
 }
 
+/// Arc tangent.
+pub(crate) fn atan<S: Scalar>(x: S) -> S {
+    x.chain(x.value().atan(), 1.0 / (1.0 + x.value().powi(2)))
+}
+
 /// Hyperbolic sine.
 pub(crate) fn sinh<S: Scalar>(x: S) -> S {
     x.chain(x.value().sinh(), x.value().cosh())

@@ -4,11 +4,14 @@
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
 
 mod arithmetic;
+pub mod bbob;
 mod bounds;
 mod formula;
+mod fronts;
 mod hock_schittkowski;
 mod measure;
 mod minimax;
+mod more_wild;
 mod posed;
 mod problem;
 
@@ -34,5 +37,15 @@ pub struct Suite {
 
 /// Every suite. A new one is a file, and a line here.
 pub fn suites() -> Vec<Suite> {
-    vec![hock_schittkowski::SUITE, minimax::SUITE]
+    vec![
+        hock_schittkowski::SUITE,
+        minimax::SUITE,
+        more_wild::SMOOTH,
+        more_wild::PIECEWISE,
+        more_wild::NOISY,
+        bbob::SUITE,
+        fronts::ZDT,
+        fronts::DTLZ,
+        fronts::CONSTRAINED,
+    ]
 }

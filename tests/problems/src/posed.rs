@@ -44,7 +44,11 @@ impl<'a> Posed<'a> {
         let mut rows = vec![(Usage::Minimise, 1.0); objectives];
         rows.extend(vec![(Usage::Inequality, 1.0); problem.inequalities]);
         rows.extend(vec![(Usage::Equality, 1.0); problem.equalities]);
-        let objective = if residuals > 0 { Objective::Sum } else { Objective::Max };
+        let objective = match problem.sense {
+            Sense::Max | Sense::MaxAbs => Objective::Max,
+            Sense::Squares => Objective::Sum,
+            Sense::Each => Objective::Each,
+        };
         let shape = Shape { spacing: vec![0.0; problem.dimension()], rows, objective, residuals };
         let bounds = finite(&problem.start, &problem.bounds, problem.reach);
         Self { problem, shape, bounds, slope, noise: 0.0, seed: 1 }

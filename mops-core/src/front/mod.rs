@@ -1,0 +1,94 @@
+//! Fronts of points that no other is better than in every objective: sorting, thinning, and how good a front is.
+//!
+//! Objectives are minimised and stand in one array, `m` per point. A point dominates another if it is worse in no objective
+//! and better in one.
+
+mod hypervolume;
+mod sort;
+
+pub use hypervolume::hypervolume;
+pub use sort::FrontSorter;
+
+/// Indices of the points that no other dominates, in increasing order; of equal points the first.
+pub fn non_dominated(objectives: &[f64], m: usize) -> Vec<usize> {
+    let mut sorter = FrontSorter::default();
+    let ranks = sorter.sort(objectives, m);
+    let row = |i: usize| &objectives[i * m..(i + 1) * m];
+    let mut first: Vec<usize> = (0..ranks.len()).filter(|&i| ranks[i] == 0).collect();
+    first.sort_by(|&a, &b| compare(row(a), row(b)).then(a.cmp(&b)));
+    first.dedup_by(|b, a| row(*a) == row(*b));
+    first.sort_unstable();
+    first
+}
+
+/// At most `count` of the points, spread evenly: the best in every objective, then again and again the one farthest from
+/// those taken, each objective measured by its range.
+pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
+    let points = objectives.len() / m.max(1);
+    if points <= count {
+        return (0..points).collect();
+    }
+    let column = |k: usize| (0..points).map(move |i| objectives[i * m + k]);
+    let ranges: Vec<f64> = (0..m)
+        .map(|k| column(k).fold(f64::NEG_INFINITY, f64::max) - column(k).fold(f64::INFINITY, f64::min))
+        .map(|range| if range > 0.0 { range } else { 1.0 })
+        .collect();
+    let least = |k: usize| (0..points).min_by(|&a, &b| objectives[a * m + k].total_cmp(&objectives[b * m + k]));
+    let mut taken: Vec<usize> = Vec::with_capacity(count);
+    let mut distance = vec![f64::INFINITY; points];
+    let mut best = (0..m).filter_map(least);
+    while taken.len() < count {
+        let farthest = (0..points).reduce(|a, b| if distance[b] > distance[a] { b } else { a });
+        let Some(next) = best.next().or(farthest).filter(|&i| distance[i] > 0.0) else { break };
+        taken.push(next);
+        for (i, distance) in distance.iter_mut().enumerate() {
+            let square = |k: usize| ((objectives[i * m + k] - objectives[next * m + k]) / ranges[k]).powi(2);
+            *distance = distance.min((0..m).map(square).sum());
+        }
+    }
+    taken.sort_unstable();
+    taken
+}
+
+/// The inverted generational distance: the mean over the points of a reference front of the distance to the nearest point.
+///
+/// Source: C. A. Coello Coello, M. Reyes Sierra, MICAI (2004), Lecture Notes in Artificial Intelligence 2972, 688-697.
+#[allow(clippy::cast_precision_loss)]
+pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &[Vec<f64>]) -> f64 {
+    let nearest = |at: &Vec<f64>| {
+        let square = |point: &[f64]| point.iter().zip(at).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        objectives.chunks_exact(m).map(square).fold(f64::INFINITY, f64::min).sqrt()
+    };
+    reference.iter().map(nearest).sum::<f64>() / reference.len() as f64
+}
+
+/// The order by the first objective, then the second, and so on.
+fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_equal_points_one_is_kept() {
+        let points = [1.0, 2.0, 2.0, 1.0, 1.0, 2.0, 3.0, 3.0];
+        assert_eq!(non_dominated(&points, 2), [0, 1]);
+    }
+
+    #[test]
+    fn thinning_keeps_the_ends_and_spreads_the_rest() {
+        let line: Vec<f64> = (0..=100).flat_map(|i| [f64::from(i), 100.0 - f64::from(i)]).collect();
+        assert_eq!(thinned(&line, 2, 3), [0, 50, 100]);
+        assert_eq!(thinned(&line, 2, 5), [0, 25, 50, 75, 100]);
+        assert_eq!(thinned(&line, 2, 1000).len(), 101);
+    }
+
+    #[test]
+    fn the_distance_of_a_front_to_itself_is_zero() {
+        let front = [0.0, 1.0, 1.0, 0.0];
+        assert_eq!(inverted_generational_distance(&front, 2, &[vec![0.0, 1.0], vec![1.0, 0.0]]), 0.0);
+        assert_eq!(inverted_generational_distance(&front, 2, &[vec![0.0, 2.0]]), 1.0);
+    }
+}

@@ -1,0 +1,67 @@
+//! Restarts with two regimes of population: ever larger, and small with steps of every size.
+
+use mops_core::Stream;
+use rand::Rng;
+
+/// What the next run begins with.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan {
+    /// Members of a generation.
+    pub population: usize,
+    /// First standard deviation.
+    pub sigma: f64,
+    /// Evaluations after which the run is broken off.
+    pub evaluations: usize,
+    large: bool,
+}
+
+/// The bookkeeping of both regimes.
+///
+/// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009) 2389-2396.
+#[derive(Debug, Clone)]
+pub struct Bipop {
+    population: usize,
+    sigma: f64,
+    /// Runs with a doubled population.
+    doublings: usize,
+    spent_large: usize,
+    spent_small: usize,
+    /// Evaluations of the last run with a large population.
+    last_large: usize,
+}
+
+impl Bipop {
+    /// Before the first run, with the usual population and step.
+    pub fn new(population: usize, sigma: f64) -> Self {
+        Self { population, sigma, doublings: 0, spent_large: 0, spent_small: 0, last_large: 0 }
+    }
+
+    /// The first run.
+    pub fn first(&self) -> Plan {
+        Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, large: true }
+    }
+
+    /// Notes what a run has cost, and plans the next; `None` after `restarts` doublings.
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn next(&mut self, last: &Plan, spent: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {
+        // The first run counts for neither regime.
+        match (last.large, self.doublings) {
+            (true, 0) => self.last_large = spent,
+            (true, _) => (self.spent_large, self.last_large) = (self.spent_large + spent, spent),
+            (false, _) => self.spent_small += spent,
+        }
+        if self.doublings > 0 && self.spent_small < self.spent_large {
+            let u: f64 = random.random();
+            let ratio = 0.5 * (1usize << self.doublings) as f64;
+            let population = (self.population as f64 * ratio.powf(u * u)) as usize;
+            let sigma = self.sigma * 10f64.powf(-2.0 * random.random::<f64>());
+            return Some(Plan { population, sigma, evaluations: self.last_large / 2, large: false });
+        }
+        if self.doublings >= restarts {
+            return None;
+        }
+        self.doublings += 1;
+        let population = self.population << self.doublings;
+        Some(Plan { population, sigma: self.sigma, evaluations: usize::MAX, large: true })
+    }
+}

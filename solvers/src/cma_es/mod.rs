@@ -1,0 +1,196 @@
+//! CMA-ES: samples a normal distribution, and adapts its mean, size and covariance to what was good.
+
+mod bipop;
+mod distribution;
+mod stop;
+mod strategy;
+
+use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use nalgebra::DMatrix;
+use rand::Rng;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::ranking::ranked;
+use crate::start::usable_start;
+use bipop::{Bipop, Plan};
+use distribution::Distribution;
+use stop::{End, History};
+use strategy::Strategy;
+
+/// Covariance matrix adaptation evolution strategy with restarts in two regimes (BIPOP): a global search without slopes
+/// that is indifferent to turned, stretched and monotonically distorted problems. A whole generation is evaluated in
+/// parallel. It sees one number per point, the maximum, and the largest violation: feasible points come first, then small
+/// violations, failures last. Points outside the box are reflected at its faces.
+///
+/// For up to about 100 tuners, rough or multimodal criteria, and budgets from some hundred evaluations per tuner.
+///
+/// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772 (2016), with negative weights; restarts:
+/// N. Hansen, GECCO (2009) 2389-2396.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct CmaEsOptions {
+    /// Members of the first generations; 0 for `4 + 3 ln n`.
+    pub population: usize,
+    /// First standard deviation, in the unit box.
+    pub size: f64,
+    /// A run ends when the best values of its last generations differ by less than this, relative to the objective.
+    pub tolerance: f64,
+    /// Number of restarts that double the population; as many evaluations go into small populations.
+    pub restarts: usize,
+}
+
+impl Default for CmaEsOptions {
+    fn default() -> Self {
+        Self { population: 0, size: 0.2, tolerance: 1e-10, restarts: 9 }
+    }
+}
+
+impl SolverOptions for CmaEsOptions {
+    const KIND: &'static str = "cma-es";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(CmaEs { options: self.clone(), state: None })
+    }
+}
+
+/// The solver of the kind `cma-es`.
+struct CmaEs {
+    options: CmaEsOptions,
+    state: Option<State>,
+}
+
+struct State {
+    random: Stream,
+    restarts: Bipop,
+    run: Run,
+    /// The best point, and whether the run that found it converged.
+    best: Merit,
+    converged: bool,
+    /// Order of magnitude of the objective at the start, at most 1.
+    unit: f64,
+}
+
+/// One run, between restarts.
+struct Run {
+    plan: Plan,
+    distribution: Distribution,
+    history: History,
+    spent: usize,
+    improved: bool,
+}
+
+impl Solver for CmaEs {
+    fn accepts(&self, _: &Shape) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
+        if start.is_empty() {
+            return Ok(());
+        }
+        let at = oracle.evaluate(std::slice::from_ref(&start))?.pop().expect("one point, one answer");
+        let usual = Strategy::usual_population(start.len());
+        let population = if self.options.population > 0 { self.options.population } else { usual };
+        let restarts = Bipop::new(population, self.options.size);
+        let run = self.run(restarts.first(), start, &oracle.shape().spacing);
+        let unit = at.merit.objective.abs().min(1.0);
+        let random = oracle.stream("cma-es");
+        self.state = Some(State { random, restarts, run, best: at.merit, converged: false, unit });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        if oracle.shape().dimension() == 0 {
+            return Ok(Progress::Converged);
+        }
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        let Some(end) = state.generation(oracle)? else { return Ok(Progress::Continue) };
+        if state.run.improved {
+            state.converged = end == End::Converged;
+        }
+        let (last, spent) = (state.run.plan, state.run.spent);
+        let Some(plan) = state.restarts.next(&last, spent, self.options.restarts, &mut state.random) else {
+            return Ok(if state.converged { Progress::Converged } else { Progress::Stalled });
+        };
+        let n = oracle.shape().dimension();
+        let start = (0..n).map(|_| state.random.random()).collect();
+        let mut state = self.state.take().expect("it was there");
+        state.run = self.run(plan, start, &oracle.shape().spacing);
+        self.state = Some(state);
+        Ok(Progress::Continue)
+    }
+}
+
+impl CmaEs {
+    fn run(&self, plan: Plan, start: Vec<f64>, spacing: &[f64]) -> Run {
+        // A fifth of the spacing still reaches the neighbouring value once in some generations.
+        let least = spacing.iter().map(|spacing| 0.2 * spacing).collect();
+        Run {
+            distribution: Distribution::new(start, plan.sigma, plan.population, least),
+            history: History::new(plan.sigma, self.options.tolerance),
+            plan,
+            spent: 0,
+            improved: false,
+        }
+    }
+}
+
+impl State {
+    /// Samples, evaluates and learns from a generation; says whether the run is over.
+    fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<Option<End>, Halt> {
+        let run = &mut self.run;
+        let steps = run.distribution.sample(&mut self.random);
+        let answers = oracle.evaluate(&points(&run.distribution, &steps))?;
+        run.spent += answers.len();
+        let order = ranked(&answers);
+        if answers[order[0]].merit.is_better_than(&self.best) {
+            self.best = answers[order[0]].merit;
+            run.improved = true;
+        }
+        run.distribution.update(&steps, &order);
+        let values: Vec<f64> = order.iter().map(|&member| height(&answers[member])).collect();
+        let first = answers[order[0]].merit;
+        let comparable = first.is_feasible() && self.best.is_feasible();
+        let behind = if comparable { first.objective - self.best.objective } else { 0.0 };
+        let end = run.history.tell(&values, self.unit, behind, &run.distribution);
+        // A run that found the best point may go on for as long as it likes.
+        let over = run.spent >= run.plan.evaluations && !run.improved;
+        Ok(end.or_else(|| over.then_some(End::Stagnated)))
+    }
+}
+
+/// A number that falls as merits get better, to see whether anything still changes.
+fn height(evaluation: &Evaluation) -> f64 {
+    let Merit { objective, violation } = evaluation.merit;
+    if evaluation.merit.is_feasible() { objective } else { violation.min(f64::MAX) }
+}
+
+/// The members of a generation, reflected into the box.
+fn points(distribution: &Distribution, steps: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let member = |j: usize| {
+        let coordinates = distribution.mean.iter().zip(steps.column(j).iter().copied().collect::<Vec<_>>());
+        coordinates.map(|(m, y)| reflected(m + distribution.sigma * y)).collect()
+    };
+    (0..steps.ncols()).map(member).collect()
+}
+
+/// The coordinate in [0, 1] at which a ray that leaves the box arrives, reflected at every face it meets.
+fn reflected(u: f64) -> f64 {
+    let v = u.rem_euclid(2.0);
+    if v <= 1.0 { v } else { (2.0 - v).max(0.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_outside_are_reflected() {
+        for (u, v) in [(0.3, 0.3), (-0.25, 0.25), (1.25, 0.75), (2.5, 0.5), (-1.5, 0.5), (1.0, 1.0), (0.0, 0.0)] {
+            assert_eq!(reflected(u), v, "{u}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Differential evolution that adapts its own factors (SHADE).
+
+use mops_core::{Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use rand::Rng;
+use rand_distr::{Cauchy, Distribution, Normal};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::population::{Patience, Population, merits};
+use crate::ranking::compare;
+
+/// Differential evolution with factors that adapt to what has succeeded (SHADE): a global search without slopes, strong
+/// where tuners act separately. A whole generation is evaluated in parallel; it begins again with new members once the old
+/// ones are all alike, or nothing improves. It sees one number per point, the maximum, and the largest violation.
+///
+/// Source: R. Tanabe, A. Fukunaga, Success-history based parameter adaptation for differential evolution, IEEE CEC (2013)
+/// 71-78, with the memory of six of their L-SHADE, IEEE CEC (2014) 1658-1665.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct DifferentialEvolutionOptions {
+    /// Number of members; 0 for ten per tuner, at least 20 and at most 100.
+    pub population: usize,
+    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    pub tolerance: f64,
+    /// Generations without a better point after which the members are drawn anew.
+    pub patience: usize,
+    /// Number of times that the members are drawn anew.
+    pub restarts: usize,
+}
+
+impl Default for DifferentialEvolutionOptions {
+    fn default() -> Self {
+        Self { population: 0, tolerance: 1e-10, patience: 200, restarts: 20 }
+    }
+}
+
+impl SolverOptions for DifferentialEvolutionOptions {
+    const KIND: &'static str = "differential-evolution";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(DifferentialEvolution { options: self.clone(), state: None })
+    }
+}
+
+/// The solver of the kind `differential-evolution`.
+struct DifferentialEvolution {
+    options: DifferentialEvolutionOptions,
+    state: Option<State>,
+}
+
+struct State {
+    random: Stream,
+    population: Population,
+    /// Members that were replaced by better ones.
+    replaced: Vec<Vec<f64>>,
+    memory: Memory,
+    patience: Patience,
+    begun: usize,
+    unit: f64,
+}
+
+impl Solver for DifferentialEvolution {
+    fn accepts(&self, _: &Shape) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        if start.is_empty() {
+            return Ok(());
+        }
+        let mut random = oracle.stream("differential-evolution");
+        let population = Population::sampled(oracle, self.size(start.len()), Some(start), &mut random)?;
+        let unit = population.merits[0].objective.abs().min(1.0);
+        self.state = Some(State {
+            random,
+            population,
+            replaced: Vec::new(),
+            memory: Memory::new(),
+            patience: Patience::NEW,
+            begun: 1,
+            unit,
+        });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let n = oracle.shape().dimension();
+        let size = self.size(n);
+        let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
+        state.generation(oracle)?;
+        let best = state.population.merits[state.population.order()[0]];
+        let idle = state.patience.tell(best);
+        let collapsed = state.population.has_collapsed(self.options.tolerance, state.unit);
+        if !collapsed && idle < self.options.patience {
+            return Ok(Progress::Continue);
+        }
+        if state.begun > self.options.restarts {
+            return Ok(Progress::Stalled);
+        }
+        state.begun += 1;
+        state.population = Population::sampled(oracle, size, None, &mut state.random)?;
+        state.replaced.clear();
+        state.memory = Memory::new();
+        state.patience = Patience::NEW;
+        Ok(Progress::Continue)
+    }
+}
+
+impl DifferentialEvolution {
+    fn size(&self, n: usize) -> usize {
+        if self.options.population > 0 { self.options.population.max(5) } else { (10 * n).clamp(20, 100) }
+    }
+}
+
+impl State {
+    /// Every member is challenged by a mixture of others.
+    fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
+        let size = self.population.len();
+        let order = self.population.order();
+        let mut factors = Vec::with_capacity(size);
+        let mut trials = Vec::with_capacity(size);
+        for member in 0..size {
+            let drawn = self.memory.draw(&mut self.random);
+            trials.push(self.trial(member, &order, drawn));
+            factors.push(drawn);
+        }
+        let worth = merits(&oracle.evaluate(&trials)?);
+        let mut successes = Vec::new();
+        for (member, (trial, merit)) in trials.into_iter().zip(worth).enumerate() {
+            let before = self.population.merits[member];
+            let against = compare(&merit, &before);
+            if against.is_gt() {
+                continue;
+            }
+            let parent = std::mem::replace(&mut self.population.points[member], trial);
+            self.population.merits[member] = merit;
+            if against.is_lt() {
+                successes.push((factors[member], gain(&before, &merit)));
+                if self.replaced.len() < size {
+                    self.replaced.push(parent);
+                } else {
+                    let slot = self.random.random_range(0..size);
+                    self.replaced[slot] = parent;
+                }
+            }
+        }
+        self.memory.learn(&successes);
+        Ok(())
+    }
+
+    /// `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`: `x_p` is one of the best tenth or two, `x_2` may be a member that
+    /// was replaced.
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn trial(&mut self, member: usize, order: &[usize], [factor, rate]: [f64; 2]) -> Vec<f64> {
+        let size = self.population.len();
+        let random = &mut self.random;
+        let elite = 2.max((random.random_range(0.0..0.2) * size as f64) as usize);
+        let best = order[random.random_range(0..elite)];
+        let first = loop {
+            let drawn = random.random_range(0..size);
+            if drawn != member {
+                break drawn;
+            }
+        };
+        let second = loop {
+            let drawn = random.random_range(0..size + self.replaced.len());
+            if drawn != member && drawn != first {
+                break drawn;
+            }
+        };
+        let points = &self.population.points;
+        let other = if second < size { &points[second] } else { &self.replaced[second - size] };
+        let x = &points[member];
+        let always = random.random_range(0..x.len());
+        let coordinate = |j: usize| {
+            if j != always && random.random::<f64>() >= rate {
+                return x[j];
+            }
+            let moved = x[j] + factor * (points[best][j] - x[j] + points[first][j] - other[j]);
+            // Halfway to the face it would cross.
+            if moved < 0.0 {
+                0.5 * x[j]
+            } else if moved > 1.0 {
+                0.5 * (1.0 + x[j])
+            } else {
+                moved
+            }
+        };
+        (0..x.len()).map(coordinate).collect()
+    }
+}
+
+/// How much better a merit is.
+fn gain(before: &Merit, after: &Merit) -> f64 {
+    let gain = if after.is_feasible() && before.is_feasible() {
+        before.objective - after.objective
+    } else {
+        before.violation - after.violation
+    };
+    if gain.is_finite() && gain > 0.0 { gain } else { f64::MIN_POSITIVE }
+}
+
+/// Factors and crossover rates that succeeded.
+#[derive(Debug, Clone)]
+struct Memory {
+    means: [[f64; 2]; 6],
+    next: usize,
+}
+
+impl Memory {
+    fn new() -> Self {
+        Self { means: [[0.5, 0.5]; 6], next: 0 }
+    }
+
+    fn draw(&self, random: &mut Stream) -> [f64; 2] {
+        let [factor, rate] = self.means[random.random_range(0..self.means.len())];
+        let spread = Cauchy::new(factor, 0.1).expect("a positive scale");
+        let factor = loop {
+            let drawn: f64 = spread.sample(random);
+            if drawn > 0.0 {
+                break drawn.min(1.0);
+            }
+        };
+        let rate: f64 = Normal::new(rate, 0.1).expect("a positive deviation").sample(random);
+        [factor, rate.clamp(0.0, 1.0)]
+    }
+
+    /// The weighted Lehmer mean of the factors, the weighted mean of the rates.
+    fn learn(&mut self, successes: &[([f64; 2], f64)]) {
+        let largest = successes.iter().map(|(_, gain)| *gain).fold(0.0, f64::max);
+        if successes.is_empty() || largest <= 0.0 {
+            return;
+        }
+        let sum = |f: &dyn Fn(&[f64; 2]) -> f64| successes.iter().map(|(s, gain)| gain / largest * f(s)).sum::<f64>();
+        let factor = sum(&|[factor, _]| factor * factor) / sum(&|[factor, _]| *factor);
+        let rate = sum(&|[_, rate]| *rate) / sum(&|_| 1.0);
+        self.means[self.next] = [factor, rate];
+        self.next = (self.next + 1) % self.means.len();
+    }
+}

@@ -1,0 +1,151 @@
+//! A genetic algorithm on real numbers.
+
+use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use rand::Rng;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::population::{Patience, Population, merits};
+use crate::ranking::compare;
+use crate::variation::Variation;
+
+/// A genetic algorithm on real numbers: tournaments, simulated binary crossover, polynomial mutation; the better half of
+/// parents and children survives. Feasible points win over infeasible ones. It begins again around nothing but its best
+/// point once the members are alike or nothing improves, each time with finer steps. For rough searches and whole numbers;
+/// where digits count take `cma-es`.
+///
+/// Source: K. Deb, Multi-Objective Optimization Using Evolutionary Algorithms (2001), sections 4.4 and 4.5 (real-coded
+/// operators); K. Deb, Computer Methods in Applied Mechanics and Engineering 186 (2000) 311-338 (constraints).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct GeneticOptions {
+    /// Number of members.
+    pub population: usize,
+    /// Probability that a pair of parents is crossed.
+    pub crossover: f64,
+    /// Distribution index of the crossover: large keeps children near their parents.
+    pub crossover_index: f64,
+    /// Distribution index of the mutation: large takes small steps. A coordinate is mutated with probability `1 / n`.
+    pub mutation_index: f64,
+    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    pub tolerance: f64,
+    /// Generations without a better point after which it begins again.
+    pub patience: usize,
+    /// Number of times that it begins again.
+    pub restarts: usize,
+}
+
+impl Default for GeneticOptions {
+    fn default() -> Self {
+        Self {
+            population: 40,
+            crossover: 0.9,
+            crossover_index: 15.0,
+            mutation_index: 20.0,
+            tolerance: 1e-10,
+            patience: 40,
+            restarts: 20,
+        }
+    }
+}
+
+impl SolverOptions for GeneticOptions {
+    const KIND: &'static str = "genetic";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(Genetic { options: self.clone(), state: None })
+    }
+}
+
+/// The solver of the kind `genetic`.
+struct Genetic {
+    options: GeneticOptions,
+    state: Option<State>,
+}
+
+struct State {
+    random: Stream,
+    population: Population,
+    variation: Variation,
+    patience: Patience,
+    begun: usize,
+    unit: f64,
+}
+
+impl Solver for Genetic {
+    fn accepts(&self, _: &Shape) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        if start.is_empty() {
+            return Ok(());
+        }
+        let options = &self.options;
+        let mut random = oracle.stream("genetic");
+        let population = Population::sampled(oracle, options.population.max(4), Some(start), &mut random)?;
+        let unit = population.merits[0].objective.abs().min(1.0);
+        let variation = Variation {
+            crossover: options.crossover,
+            crossover_index: options.crossover_index,
+            mutation_index: options.mutation_index,
+            ..Variation::usual(start.len())
+        };
+        self.state = Some(State { random, population, variation, patience: Patience::NEW, begun: 1, unit });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
+        state.generation(oracle)?;
+        let idle = state.patience.tell(state.population.merits[0]);
+        let collapsed = state.population.has_collapsed(self.options.tolerance, state.unit);
+        if !collapsed && idle < self.options.patience {
+            return Ok(Progress::Continue);
+        }
+        if state.begun > self.options.restarts {
+            return Ok(Progress::Stalled);
+        }
+        state.begun += 1;
+        let best = state.population.points[0].clone();
+        state.population = Population::sampled(oracle, state.population.len(), Some(&best), &mut state.random)?;
+        // Finer steps around what is known.
+        state.variation.mutation_index *= 1.5;
+        state.variation.crossover_index *= 1.2;
+        state.patience = Patience::NEW;
+        Ok(Progress::Continue)
+    }
+}
+
+impl State {
+    /// As many children as members; the better half of all survives, the best first.
+    fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
+        let size = self.population.len();
+        let mut children: Vec<Vec<f64>> = Vec::with_capacity(size + 1);
+        while children.len() < size {
+            let [mut a, mut b] = [self.winner(), self.winner()].map(|i| self.population.points[i].clone());
+            self.variation.cross(&mut a, &mut b, &mut self.random);
+            for mut child in [a, b] {
+                self.variation.mutate(&mut child, &mut self.random);
+                children.push(child);
+            }
+        }
+        children.truncate(size);
+        let worth = merits(&oracle.evaluate(&children)?);
+        self.population.points.append(&mut children);
+        self.population.merits.extend(worth);
+        let order = self.population.order();
+        let all = std::mem::replace(&mut self.population, Population { points: Vec::new(), merits: Vec::new() });
+        self.population.points = order[..size].iter().map(|&i| all.points[i].clone()).collect();
+        self.population.merits = order[..size].iter().map(|&i| all.merits[i]).collect();
+        Ok(())
+    }
+
+    /// The better of two members drawn at random.
+    fn winner(&mut self) -> usize {
+        let size = self.population.len();
+        let (a, b) = (self.random.random_range(0..size), self.random.random_range(0..size));
+        if compare(&self.population.merits[b], &self.population.merits[a]).is_lt() { b } else { a }
+    }
+}

@@ -1,0 +1,163 @@
+//! NSGA-II: a front by non-dominated sorting and crowding.
+
+mod thinning;
+
+use std::cmp::Ordering;
+
+use mops_core::front::FrontSorter;
+use mops_core::{Solver, SolverOptions, Stream};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
+use crate::variation::Variation;
+use thinning::Thinning;
+
+/// Looks for the front of designs that no other is better than in every criterion (NSGA-II): members that few dominate
+/// survive, and of those the ones in sparse places. For two criteria, or three; needs `objective = "each"`. Feasible points
+/// win over infeasible ones. The last front that fits only in part loses its most crowded members one by one.
+///
+/// Source: K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197;
+/// one by one: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Nsga2Options {
+    /// Number of members.
+    pub population: usize,
+    /// Number of generations.
+    pub generations: usize,
+}
+
+impl Default for Nsga2Options {
+    fn default() -> Self {
+        Self { population: 100, generations: 250 }
+    }
+}
+
+impl Nsga2Options {
+    /// The solver, with its members to look at.
+    pub fn search(&self) -> Evolution<Crowding> {
+        let survival = Crowding { population: self.population.max(4), ..Crowding::default() };
+        Evolution::new(survival, Variation::usual, self.generations)
+    }
+}
+
+impl SolverOptions for Nsga2Options {
+    const KIND: &'static str = "nsga2";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(self.search())
+    }
+}
+
+/// Survival of the lower rank, then of the sparser place.
+#[derive(Default)]
+pub struct Crowding {
+    population: usize,
+    sorter: FrontSorter,
+    feasible: Vec<u32>,
+    others: Vec<u32>,
+    objectives: Vec<f64>,
+    /// Rank and distance of every place of the pool.
+    rank: Vec<u32>,
+    distance: Vec<f64>,
+    chosen: Vec<u32>,
+    /// Rank and distance of the chosen.
+    fitness: Vec<(u32, f64)>,
+    /// Places of the feasible points by rank, and where each rank begins.
+    by_rank: Vec<u32>,
+    begins: Vec<usize>,
+    thinning: Thinning,
+}
+
+impl Survival for Crowding {
+    fn begin(&mut self, _: usize) -> usize {
+        self.population
+    }
+
+    fn survive(&mut self, pool: &Pool, keep: usize, _: &mut Stream) -> &[u32] {
+        by_feasibility(pool, &mut self.feasible, &mut self.others);
+        self.sort(pool);
+        self.chosen.clear();
+        for rank in 0..self.begins.len() - 1 {
+            let (from, to) = (self.begins[rank], self.begins[rank + 1]);
+            self.measure(pool, from, to);
+            let left = keep - self.chosen.len();
+            if to - from > left {
+                self.thinning.thin(pool, &mut self.by_rank[from..to], left, &mut self.distance);
+            }
+            self.chosen.extend(self.by_rank[from..to].iter().take(left));
+            if self.chosen.len() == keep {
+                break;
+            }
+        }
+        let left = keep - self.chosen.len();
+        self.chosen.extend(self.others.iter().take(left));
+        self.fitness.clear();
+        self.fitness.extend(self.chosen.iter().map(|&i| (self.rank[i as usize], self.distance[i as usize])));
+        &self.chosen
+    }
+
+    fn prefers(&self, a: usize, b: usize) -> Ordering {
+        let (a, b) = (self.fitness[a], self.fitness[b]);
+        a.0.cmp(&b.0).then(b.1.total_cmp(&a.1))
+    }
+}
+
+impl Crowding {
+    /// Ranks of the feasible points by dominance; the others come after them, by violation.
+    #[allow(clippy::cast_possible_truncation)]
+    fn sort(&mut self, pool: &Pool) {
+        self.objectives.clear();
+        for &i in &self.feasible {
+            self.objectives.extend_from_slice(pool.row(i as usize));
+        }
+        self.rank.clear();
+        self.rank.resize(pool.len(), u32::MAX);
+        self.distance.clear();
+        self.distance.resize(pool.len(), 0.0);
+        let ranks = self.sorter.sort(&self.objectives, pool.m);
+        let fronts = ranks.iter().max().map_or(0, |rank| *rank as usize + 1);
+        // A counting sort by rank.
+        self.begins.clear();
+        self.begins.resize(fronts + 1, 0);
+        ranks.iter().for_each(|rank| self.begins[*rank as usize + 1] += 1);
+        for rank in 0..fronts {
+            self.begins[rank + 1] += self.begins[rank];
+        }
+        self.by_rank.clear();
+        self.by_rank.resize(ranks.len(), 0);
+        for (&i, &rank) in self.feasible.iter().zip(ranks) {
+            self.rank[i as usize] = rank;
+            let place = &mut self.begins[rank as usize];
+            self.by_rank[*place] = i;
+            *place += 1;
+        }
+        self.begins.rotate_right(1);
+        self.begins[0] = 0;
+        for (later, &i) in (0_u32..).zip(&self.others) {
+            self.rank[i as usize] = fronts as u32 + later;
+        }
+    }
+
+    /// The crowding distance of a front: the sum over the objectives of the gap between the neighbours, relative to the
+    /// front's range; infinite at the ends.
+    fn measure(&mut self, pool: &Pool, from: usize, to: usize) {
+        let front = &mut self.by_rank[from..to];
+        #[allow(clippy::cast_precision_loss)]
+        let share = 1.0 / pool.m as f64;
+        for k in 0..pool.m {
+            let value = |i: u32| pool.objectives[i as usize * pool.m + k];
+            front.sort_unstable_by(|&a, &b| value(a).total_cmp(&value(b)).then(a.cmp(&b)));
+            let (first, last) = (front[0], front[front.len() - 1]);
+            let range = value(last) - value(first);
+            self.distance[first as usize] = f64::INFINITY;
+            self.distance[last as usize] = f64::INFINITY;
+            if range > 0.0 {
+                for near in front.windows(3) {
+                    self.distance[near[1] as usize] += share * (value(near[2]) - value(near[0])) / range;
+                }
+            }
+        }
+    }
+}

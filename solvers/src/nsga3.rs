@@ -1,0 +1,178 @@
+//! NSGA-III: a front spread along reference directions.
+
+mod directions;
+mod scale;
+
+use std::cmp::Ordering;
+
+use mops_core::front::FrontSorter;
+use mops_core::{Solver, SolverOptions, Stream};
+use rand::Rng;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
+use crate::variation::Variation;
+use scale::Scale;
+
+/// Looks for the front of designs that no other is better than in every criterion (NSGA-III): members that few dominate
+/// survive, and of those the ones nearest to reference directions that have few. For three criteria and more; needs
+/// `objective = "each"`. Feasible points win over infeasible ones.
+///
+/// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601; constraints: H. Jain, K. Deb,
+/// the same 602-622; reference directions: I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Nsga3Options {
+    /// Divisions of every objective between the reference directions; 0 for as many as give at most 100 directions.
+    pub divisions: usize,
+    /// Number of generations.
+    pub generations: usize,
+}
+
+impl Default for Nsga3Options {
+    fn default() -> Self {
+        Self { divisions: 0, generations: 250 }
+    }
+}
+
+impl Nsga3Options {
+    /// The solver, with its members to look at.
+    pub fn search(&self) -> Evolution<Niching> {
+        let survival = Niching { divisions: self.divisions, ..Niching::default() };
+        // A large index of the crossover, as in the paper: members of different niches are far apart.
+        Evolution::new(
+            survival,
+            |n| Variation { crossover: 1.0, crossover_index: 30.0, ..Variation::usual(n) },
+            self.generations,
+        )
+    }
+}
+
+impl SolverOptions for Nsga3Options {
+    const KIND: &'static str = "nsga3";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(self.search())
+    }
+}
+
+/// Survival of the lower rank, then of the rarer niche.
+#[derive(Default)]
+pub struct Niching {
+    divisions: usize,
+    directions: Vec<Vec<f64>>,
+    scale: Scale,
+    sorter: FrontSorter,
+    feasible: Vec<u32>,
+    others: Vec<u32>,
+    objectives: Vec<f64>,
+    chosen: Vec<u32>,
+    violations: Vec<f64>,
+}
+
+/// A candidate of the last front: its place, its direction and how far it is from that.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    place: u32,
+    direction: usize,
+    distance: f64,
+}
+
+impl Survival for Niching {
+    fn begin(&mut self, m: usize) -> usize {
+        let divisions = if self.divisions > 0 { self.divisions } else { directions::usual_divisions(m) };
+        self.directions = directions::spread(m, divisions);
+        self.scale = Scale::new(m);
+        // A multiple of four.
+        self.directions.len().div_ceil(4).max(2) * 4
+    }
+
+    fn survive(&mut self, pool: &Pool, keep: usize, random: &mut Stream) -> &[u32] {
+        by_feasibility(pool, &mut self.feasible, &mut self.others);
+        self.objectives.clear();
+        for &i in &self.feasible {
+            self.objectives.extend_from_slice(pool.row(i as usize));
+        }
+        let ranks = self.sorter.sort(&self.objectives, pool.m);
+        let mut order: Vec<usize> = (0..ranks.len()).collect();
+        order.sort_by_key(|&i| ranks[i]);
+        let wanted = keep.min(order.len());
+        self.chosen.clear();
+        if wanted > 0 {
+            self.scale.update(&self.objectives, ranks);
+            let last = ranks[order[wanted - 1]];
+            let sure = order.partition_point(|&i| ranks[i] < last);
+            let reach = order.partition_point(|&i| ranks[i] <= last);
+            self.chosen.extend(order[..sure].iter().map(|&i| self.feasible[i]));
+            if reach > wanted {
+                let mut counts = vec![0_usize; self.directions.len()];
+                order[..sure].iter().for_each(|&i| counts[self.nearest(pool, i).direction] += 1);
+                let candidates = order[sure..reach].iter().map(|&i| self.nearest(pool, i)).collect();
+                fill(&mut self.chosen, wanted, candidates, &mut counts, random);
+            } else {
+                self.chosen.extend(order[sure..wanted].iter().map(|&i| self.feasible[i]));
+            }
+        }
+        let left = keep - self.chosen.len();
+        self.chosen.extend(self.others.iter().take(left));
+        self.violations.clear();
+        self.violations.extend(self.chosen.iter().map(|&i| pool.violations[i as usize]));
+        &self.chosen
+    }
+
+    /// Only constraints decide a tournament.
+    fn prefers(&self, a: usize, b: usize) -> Ordering {
+        self.violations[a].total_cmp(&self.violations[b])
+    }
+}
+
+impl Niching {
+    /// The direction nearest to the `i`-th feasible point.
+    fn nearest(&self, pool: &Pool, i: usize) -> Candidate {
+        let place = self.feasible[i];
+        let row = pool.row(place as usize);
+        let mut best = Candidate { place, direction: 0, distance: f64::INFINITY };
+        for (direction, d) in self.directions.iter().enumerate() {
+            let (mut along, mut square) = (0.0, 0.0);
+            for k in 0..row.len() {
+                let value = self.scale.normalised(k, row[k]);
+                along += value * d[k];
+                square += value * value;
+            }
+            let distance = square - along * along;
+            if distance < best.distance {
+                best = Candidate { place, direction, distance };
+            }
+        }
+        best
+    }
+}
+
+/// Takes candidates of the directions with the fewest members until there are `wanted`: the nearest where there is none yet,
+/// else any.
+fn fill(
+    chosen: &mut Vec<u32>,
+    wanted: usize,
+    mut candidates: Vec<Candidate>,
+    counts: &mut [usize],
+    random: &mut Stream,
+) {
+    while chosen.len() < wanted {
+        let fewest = candidates.iter().map(|c| counts[c.direction]).min().expect("more candidates than places");
+        let mut rare: Vec<usize> =
+            candidates.iter().map(|c| c.direction).filter(|&direction| counts[direction] == fewest).collect();
+        rare.sort_unstable();
+        rare.dedup();
+        let direction = rare[random.random_range(0..rare.len())];
+        let here: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].direction == direction).collect();
+        let taken = if fewest == 0 {
+            let nearer = |a: &usize, b: &usize| candidates[*a].distance.total_cmp(&candidates[*b].distance);
+            here.into_iter().min_by(nearer).expect("the direction has candidates")
+        } else {
+            here[random.random_range(0..here.len())]
+        };
+        counts[direction] += 1;
+        chosen.push(candidates.swap_remove(taken).place);
+    }
+}

@@ -1,0 +1,376 @@
+//! Pattern search: polls a pattern of points around the best one, and shrinks it where nothing is better.
+
+mod least;
+mod models;
+mod pattern;
+
+use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::epigraph::Rows;
+use crate::start::usable_start;
+use least::Aim;
+use models::Models;
+use pattern::Pattern;
+
+/// Mesh-adaptive direct search on the unit box: points of a pattern are polled around the best one, those first that look
+/// best; a better one is taken, else the pattern shrinks and turns. Ends at a mesh size. Needs no slopes: for criteria that
+/// jump, for noise, and for tuners with whole numbers or lists.
+///
+/// Before it polls, it searches: every row has a quadratic model of its own through the points around the best one, and the
+/// point where the largest of the models is least is tried, inside a trust region. So the kink where two criteria meet is
+/// seen. Constraints enter by an exact penalty, which grows while the search ends at infeasible points.
+///
+/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); turned patterns: M. A. Abramson, C. Audet,
+/// J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N. Vicente,
+/// Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one for every row: J. Larson, M. Menickelly,
+/// S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct PatternSearchOptions {
+    /// First distance of the pattern's points, in the unit box.
+    pub size: f64,
+    /// Distance at which the search ends.
+    pub tolerance: f64,
+    /// Points of a pattern that are evaluated at once; 0 for all.
+    pub batch: usize,
+}
+
+impl Default for PatternSearchOptions {
+    fn default() -> Self {
+        Self { size: 0.1, tolerance: 1e-7, batch: 2 }
+    }
+}
+
+impl SolverOptions for PatternSearchOptions {
+    const KIND: &'static str = "pattern-search";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(PatternSearch { options: self.clone(), state: None })
+    }
+}
+
+/// The solver of the kind `pattern-search`.
+struct PatternSearch {
+    options: PatternSearchOptions,
+    state: Option<State>,
+}
+
+struct State {
+    best: Evaluation,
+    /// Points with values: what the models go through.
+    known: Vec<(Vec<f64>, Vec<f64>)>,
+    /// Size of the pattern and of the trust region.
+    radius: f64,
+    /// What the models promised at last.
+    promised: f64,
+    /// Times that the search began again because of a kink.
+    restarts: i32,
+    /// Steps of the models in a row that led nowhere.
+    failures: usize,
+    /// The best point at the last turn of the pattern.
+    turned_at: Option<Vec<f64>>,
+    penalty: f64,
+    unit: f64,
+    pattern: Pattern,
+    random: Stream,
+    spacing: Vec<f64>,
+    /// Curvature of every row as the last models have it, per unit of the box.
+    curvatures: Vec<DMatrix<f64>>,
+    /// Whether the first pattern has been polled.
+    polled: bool,
+}
+
+impl Solver for PatternSearch {
+    fn accepts(&self, _: &Shape) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
+        let best = oracle.evaluate(&[start])?.pop().expect("one point, one answer");
+        let n = best.point.len();
+        let scaled = best.scaled.clone().expect("the start is usable");
+        let none = vec![vec![0.0; n]; scaled.len()];
+        self.state = Some(State {
+            unit: Rows::new(oracle.shape(), &scaled, &none).unit(),
+            known: vec![(best.point.clone(), scaled)],
+            turned_at: None,
+            best,
+            radius: self.options.size,
+            failures: 0,
+            promised: 0.0,
+            restarts: 0,
+            penalty: 10.0,
+            pattern: Pattern::straight(n),
+            random: oracle.stream("pattern-search"),
+            spacing: oracle.shape().spacing.clone(),
+            curvatures: vec![DMatrix::zeros(n, n); none.len()],
+            polled: false,
+        });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        if state.best.point.is_empty() {
+            return Ok(Progress::Converged);
+        }
+        state.forget();
+        if state.polled && state.search(oracle)? {
+            return Ok(Progress::Continue);
+        }
+        let batch = if state.polled { self.options.batch } else { 0 };
+        let better = state.poll(oracle, batch)?;
+        state.polled = true;
+        if better {
+            return Ok(Progress::Continue);
+        }
+        if state.radius > self.options.tolerance && !state.is_on_finest_grid() {
+            state.shrink();
+            return Ok(Progress::Continue);
+        }
+        // The models still promise what the problem does not keep: a kink inside a row. Again, with more turns on the way.
+        let worth = state.worth(oracle.shape(), &state.best);
+        if state.promised > KEPT * worth.abs() && state.restarts < RESTARTS {
+            state.restarts += 1;
+            state.radius = SHRINK * self.options.size;
+            return Ok(Progress::Continue);
+        }
+        // An infeasible end: the penalty was too small, or nothing is feasible.
+        if !state.best.merit.is_feasible() && state.penalty < 1e6 {
+            state.penalty *= 100.0;
+            state.radius = self.options.size;
+            return Ok(Progress::Continue);
+        }
+        Ok(if state.best.merit.is_feasible() { Progress::Converged } else { Progress::Stalled })
+    }
+}
+
+/// How much the pattern shrinks when nothing in it is better; the root of that after a restart, the root of that after two.
+const SHRINK: f64 = 0.25;
+
+/// A promise at the end, relative to what the best point is worth, that tells of a kink.
+const KEPT: f64 = 1e-10;
+
+/// Times that the search begins again because of a kink.
+const RESTARTS: i32 = 4;
+
+/// Steps of the models in a row that lead nowhere before the pattern is polled.
+const FAILURES: usize = 2;
+
+impl State {
+    fn aim<'a>(&self, shape: &'a Shape) -> Aim<'a> {
+        Aim { shape, unit: self.unit, penalty: self.penalty }
+    }
+
+    fn worth(&self, shape: &Shape, evaluation: &Evaluation) -> f64 {
+        evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.aim(shape).worth(scaled))
+    }
+
+    /// Evaluates points, keeps their values, and moves to the best if it is better; says how much better.
+    fn visit(&mut self, oracle: &mut dyn Oracle, points: &[Vec<f64>]) -> Result<f64, Halt> {
+        let answers = oracle.evaluate(points)?;
+        let shape = oracle.shape();
+        let before = self.worth(shape, &self.best);
+        let mut gained = 0.0;
+        for answer in answers {
+            if let Some(scaled) = &answer.scaled
+                && !self.known.iter().any(|(point, _)| *point == answer.point)
+            {
+                self.known.push((answer.point.clone(), scaled.clone()));
+            }
+            let worth = self.worth(shape, &answer);
+            if before - worth > gained {
+                gained = before - worth;
+                self.best = answer;
+            }
+        }
+        Ok(gained)
+    }
+
+    /// Forgets the oldest points where there are many: few of them are near.
+    fn forget(&mut self) {
+        let n = self.best.point.len();
+        if self.known.len() > MEMORY + 2 * (n + 1) * (n + 2) {
+            self.known.drain(..MEMORY);
+        }
+    }
+
+    /// Tries where the models are least; `true` while that is worth going on with, `false` when it is time to poll.
+    fn search(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        if self.spacing.iter().all(|&spacing| spacing > 0.0) {
+            return Ok(false);
+        }
+        let near = self.near();
+        let Some(models) = self.models(&near) else { return Ok(false) };
+        let shape = oracle.shape();
+        let (low, high) = self.room();
+        let step = self.aim(shape).least(&models, &low, &high);
+        self.promised = step.as_ref().map_or(0.0, |(_, promised)| *promised);
+        let Some((y, promised)) = step else { return self.mend(oracle, &near, &models) };
+        let length = self.radius * y.amax();
+        let floor = 1e-14 * self.worth(shape, &self.best).abs();
+        let point = self.at(&y);
+        if promised <= floor || point == self.best.point {
+            return self.mend(oracle, &near, &models);
+        }
+        let gained = self.visit(oracle, &[point])?;
+        let ratio = gained / promised;
+        if gained > 0.0 {
+            self.failures = 0;
+        } else if self.mend(oracle, &near, &models)? {
+            // The models were wrong for want of points.
+            return Ok(true);
+        } else {
+            self.failures += 1;
+        }
+        if ratio >= 0.7 {
+            self.radius = self.radius.max((2.0 * length).min(0.5));
+        } else if ratio < 0.1 {
+            self.radius = self.radius.min(length).max(0.1 * self.radius);
+        }
+        Ok(self.failures < FAILURES)
+    }
+
+    /// Adds a point in the direction in which those around the best one tell least; `false` where they tell enough.
+    fn mend(&mut self, oracle: &mut dyn Oracle, near: &[usize], models: &Models) -> Result<bool, Halt> {
+        let Some(direction) = self.unknown_direction(near) else { return Ok(false) };
+        let aim = self.aim(oracle.shape());
+        let [up, down] = [1.0, -1.0].map(|side| &direction * side);
+        let point = if aim.worth(&models.values(&up)) <= aim.worth(&models.values(&down)) { up } else { down };
+        let point = self.at(&point);
+        if point == self.best.point || self.known.iter().any(|(known, _)| *known == point) {
+            return Ok(false);
+        }
+        let count = self.known.len();
+        self.visit(oracle, &[point])?;
+        Ok(self.known.len() > count)
+    }
+
+    /// Polls the pattern, what looks best first; `true` when a point was better.
+    fn poll(&mut self, oracle: &mut dyn Oracle, batch: usize) -> Result<bool, Halt> {
+        self.failures = 0;
+        let mut points = self.pattern.points(&self.best.point, self.radius, &self.spacing);
+        if let Some(models) = self.models(&self.near()) {
+            let aim = self.aim(oracle.shape());
+            let worth = |point: &Vec<f64>| {
+                let y = DVector::from_fn(point.len(), |j, _| (point[j] - self.best.point[j]) / self.radius);
+                aim.worth(&models.values(&y))
+            };
+            let mut ordered: Vec<(f64, Vec<f64>)> = points.into_iter().map(|point| (worth(&point), point)).collect();
+            ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points = ordered.into_iter().map(|(_, point)| point).collect();
+        }
+        let batch = if batch == 0 { points.len().max(1) } else { batch };
+        for points in points.chunks(batch) {
+            let before = self.best.point.clone();
+            if self.visit(oracle, points)? > 0.0 {
+                self.run_on(oracle, before)?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Goes on in the direction of a success, twice as far each time, while that is better.
+    fn run_on(&mut self, oracle: &mut dyn Oracle, mut before: Vec<f64>) -> Result<(), Halt> {
+        loop {
+            let here = self.best.point.clone();
+            let step = DVector::from_fn(here.len(), |j, _| 2.0 * (here[j] - before[j]) / self.radius);
+            let point = self.at(&step);
+            if point == here || self.visit(oracle, &[point])? == 0.0 {
+                return Ok(());
+            }
+            before = here;
+        }
+    }
+
+    fn shrink(&mut self) {
+        self.radius *= SHRINK.powf(0.5_f64.powi(self.restarts));
+        // Where the search went tells where it may go on.
+        match self.turned_at.replace(self.best.point.clone()) {
+            Some(before) if before != self.best.point => {
+                let went = DVector::from_fn(before.len(), |j, _| self.best.point[j] - before[j]);
+                self.pattern.align(&went);
+            }
+            _ => self.pattern.turn(&mut self.random),
+        }
+    }
+
+    fn is_on_finest_grid(&self) -> bool {
+        self.spacing.iter().all(|&spacing| spacing > 0.0 && self.radius < 0.5 * spacing)
+    }
+
+    /// The point after a step of the models, inside the box and on the grids.
+    fn at(&self, y: &DVector<f64>) -> Vec<f64> {
+        let coordinate = |j: usize| {
+            let u = (self.best.point[j] + self.radius * y[j]).clamp(0.0, 1.0);
+            let spacing = self.spacing[j];
+            if spacing > 0.0 { ((u / spacing).round() * spacing).min(1.0) } else { u }
+        };
+        (0..y.len()).map(coordinate).collect()
+    }
+
+    /// The trust region inside the box, in steps of the models.
+    fn room(&self) -> (Vec<f64>, Vec<f64>) {
+        let low = self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)).collect();
+        let high = self.best.point.iter().map(|u| ((1.0 - u) / self.radius).min(1.0)).collect();
+        (low, high)
+    }
+
+    /// Known points around the best one, the nearest first: at most as many as determine a quadratic.
+    fn near(&self) -> Vec<usize> {
+        let n = self.best.point.len();
+        let distance = |i: usize| {
+            self.known[i].0.iter().zip(&self.best.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / self.radius
+        };
+        let mut near: Vec<(f64, usize)> = (0..self.known.len()).map(|i| (distance(i), i)).collect();
+        near.retain(|(distance, _)| *distance <= REACH);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate((n + 1) * (n + 2) / 2);
+        near.into_iter().map(|(_, i)| i).collect()
+    }
+
+    fn step_to(&self, i: usize) -> Vec<f64> {
+        self.known[i].0.iter().zip(&self.best.point).map(|(a, b)| (a - b) / self.radius).collect()
+    }
+
+    /// Models through the given points, whose curvature changes as little as can be from the last ones.
+    fn models(&mut self, near: &[usize]) -> Option<Models> {
+        if near.len() <= self.best.point.len() {
+            return None;
+        }
+        let steps: Vec<Vec<f64>> = near.iter().map(|&i| self.step_to(i)).collect();
+        let values: Vec<&[f64]> = near.iter().map(|&i| self.known[i].1.as_slice()).collect();
+        let models = Models::through(&steps, &values, &self.curvatures, self.radius)?;
+        self.curvatures = models.curvatures(self.radius);
+        Some(models)
+    }
+
+    /// The direction in which the points around the best one are least spread; `None` where they are spread in all.
+    fn unknown_direction(&self, near: &[usize]) -> Option<DVector<f64>> {
+        let n = self.best.point.len();
+        let mut spread = DMatrix::zeros(n, n);
+        for &i in near {
+            let y = DVector::from_vec(self.step_to(i));
+            let shortened = &y / y.amax().max(1.0);
+            spread.ger(1.0, &shortened, &shortened, 1.0);
+        }
+        let eigen = SymmetricEigen::new(spread);
+        let least = eigen.eigenvalues.imin();
+        (eigen.eigenvalues[least] < SPREAD).then(|| eigen.eigenvectors.column(least).into_owned())
+    }
+}
+
+/// Points that are forgotten at a time.
+const MEMORY: usize = 200;
+
+/// Points within this many radii take part in the models.
+const REACH: f64 = 2.5;
+
+/// A sum of squared steps along a direction below which that direction is unknown.
+const SPREAD: f64 = 0.3;

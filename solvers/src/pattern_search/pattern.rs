@@ -1,0 +1,61 @@
+//! The pattern that is polled around the best point.
+
+use mops_core::Stream;
+use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+
+/// Directions of a pattern, one per column, turned at random.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    basis: DMatrix<f64>,
+}
+
+impl Pattern {
+    /// Along the coordinates.
+    pub fn straight(n: usize) -> Self {
+        Self { basis: DMatrix::identity(n, n) }
+    }
+
+    /// Turns the pattern by a random reflection `I - 2 v v'`.
+    pub fn turn(&mut self, random: &mut Stream) {
+        let n = self.basis.nrows();
+        let v = DVector::from_fn(n, |_, _| random.random_range(-1.0..1.0));
+        let norm = v.norm_squared();
+        if norm > 1e-6 {
+            self.basis = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / norm);
+        }
+    }
+
+    /// Turns the pattern so that its first direction is the given one.
+    pub fn align(&mut self, direction: &DVector<f64>) {
+        let n = self.basis.nrows();
+        let mut v = direction / direction.norm();
+        v[0] += v[0].signum();
+        let norm = v.norm_squared();
+        self.basis = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / norm);
+    }
+
+    /// Points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid away.
+    pub fn points(&self, centre: &[f64], size: f64, spacing: &[f64]) -> Vec<Vec<f64>> {
+        let n = centre.len();
+        let mut points = Vec::with_capacity(2 * n);
+        for j in 0..n {
+            for side in [1.0, -1.0] {
+                let at = |i: usize| {
+                    let by = if spacing[i] == 0.0 {
+                        side * size * self.basis[(i, j)]
+                    } else if i == j {
+                        // Along a grid the pattern keeps to its own coordinate, by whole steps.
+                        side * (size / spacing[i]).round().max(1.0) * spacing[i]
+                    } else {
+                        0.0
+                    };
+                    (centre[i] + by).clamp(0.0, 1.0)
+                };
+                points.push((0..n).map(at).collect());
+            }
+        }
+        points.retain(|point| point != centre);
+        points
+    }
+}

@@ -1,0 +1,106 @@
+//! `constrained-fronts`: two objectives with constraints.
+
+use mops_core::Scalar;
+
+use super::{best_of, evenly, problem, sampled};
+use crate::arithmetic::atan;
+use crate::{Problem, Suite};
+
+pub(crate) const SUITE: Suite = Suite {
+    name: "constrained-fronts",
+    about: "BNH, SRN, TNK and OSY: two objectives with inequalities",
+    source: "K. Deb, Multi-Objective Optimization Using Evolutionary Algorithms (2001), section 8.3",
+    accuracy: 0.02,
+    problems: || {
+        let osy_box = vec![[0.0, 10.0], [0.0, 10.0], [1.0, 5.0], [0.0, 6.0], [1.0, 5.0], [0.0, 10.0]];
+        let with = |problem: Problem, inequalities: usize| Problem { inequalities, ..problem };
+        let pi = std::f64::consts::PI;
+        vec![
+            with(
+                problem("BNH", vec![[0.0, 5.0], [0.0, 3.0]], (bnh, bnh), sampled(&[140.0, 50.0], 20_000, bnh_front)),
+                2,
+            ),
+            with(problem("SRN", vec![[-20.0, 20.0]; 2], (srn, srn), sampled(&[250.0, 10.0], 20_000, srn_front)), 2),
+            with(problem("TNK", vec![[1e-9, pi]; 2], (tnk, tnk), sampled(&[1.1, 1.1], 20_000, tnk_front)), 2),
+            with(problem("OSY", osy_box, (osy, osy), sampled(&[-40.0, 80.0], 20_000, osy_front)), 6),
+        ]
+    },
+};
+
+/// Two objectives, then what must be at most 0.
+fn bnh<S: Scalar>(x: &[S]) -> Vec<S> {
+    let square = |a: S, at: f64| (a - at) * (a - at);
+    vec![
+        (x[0] * x[0] + x[1] * x[1]) * 4.0,
+        square(x[0], 5.0) + square(x[1], 5.0),
+        (square(x[0], 5.0) + x[1] * x[1]) / 25.0 - 1.0,
+        -(square(x[0], 8.0) + square(x[1], -3.0)) / 7.7 + 1.0,
+    ]
+}
+
+fn bnh_front(count: usize) -> Vec<Vec<f64>> {
+    let values = |t: f64| bnh(&[t, t.min(3.0)])[..2].to_vec();
+    evenly(0.0, 5.0, count).map(values).collect()
+}
+
+fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
+    let square = |a: S, at: f64| (a - at) * (a - at);
+    vec![
+        square(x[0], 2.0) + square(x[1], 1.0) + 2.0,
+        x[0] * 9.0 - square(x[1], 1.0),
+        (x[0] * x[0] + x[1] * x[1]) / 225.0 - 1.0,
+        (x[0] - x[1] * 3.0) / 10.0 + 1.0,
+    ]
+}
+
+/// `x_1 = -5/2` from where the second constraint begins to where the first ends.
+fn srn_front(count: usize) -> Vec<Vec<f64>> {
+    let top = (225.0_f64 - 6.25).sqrt();
+    evenly(2.5, top, count).map(|y| srn(&[-2.5, y])[..2].to_vec()).collect()
+}
+
+fn tnk<S: Scalar>(x: &[S]) -> Vec<S> {
+    let (a, b) = (x[0] - 0.5, x[1] - 0.5);
+    let wave = (atan(x[0] / x[1]) * 16.0).cos() * 0.1;
+    vec![x[0], x[1], -x[0] * x[0] - x[1] * x[1] + 1.0 + wave, (a * a + b * b) * 2.0 - 1.0]
+}
+
+/// Of the first constraint's edge, what the second allows and nothing dominates.
+fn tnk_front(count: usize) -> Vec<Vec<f64>> {
+    let edge = |angle: f64| {
+        let radius = (1.0 + 0.1 * (16.0 * angle).cos()).sqrt();
+        vec![radius * angle.sin(), radius * angle.cos()]
+    };
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let allowed = |p: &Vec<f64>| (p[0] - 0.5).powi(2) + (p[1] - 0.5).powi(2) <= 0.5;
+    best_of(&evenly(1e-9, quarter - 1e-9, 3 * count).map(edge).filter(allowed).collect::<Vec<_>>())
+}
+
+fn osy<S: Scalar>(x: &[S]) -> Vec<S> {
+    let square = |a: S, at: f64| (a - at) * (a - at);
+    let first =
+        square(x[0], 2.0) * 25.0 + square(x[1], 2.0) + square(x[2], 1.0) + square(x[3], 4.0) + square(x[4], 1.0);
+    vec![
+        -first,
+        x.iter().fold(S::from(0.0), |sum, x| sum + *x * *x),
+        -(x[0] + x[1]) / 2.0 + 1.0,
+        (x[0] + x[1]) / 6.0 - 1.0,
+        (x[1] - x[0]) / 2.0 - 1.0,
+        (x[0] - x[1] * 3.0) / 2.0 - 1.0,
+        (square(x[2], 3.0) + x[3]) / 4.0 - 1.0,
+        -(square(x[4], 3.0) + x[5]) / 4.0 + 1.0,
+    ]
+}
+
+/// Five pieces, with `x_4 = x_6 = 0`, of which nothing is kept that another dominates.
+fn osy_front(count: usize) -> Vec<Vec<f64>> {
+    let root = 3.0_f64.sqrt();
+    let values = |x: [f64; 5]| osy(&[x[0], x[1], x[2], 0.0, x[4], 0.0])[..2].to_vec();
+    let pieces = evenly(1.0, 5.0, count)
+        .map(|t| [5.0, 1.0, t, 0.0, 5.0])
+        .chain(evenly(1.0, 5.0, count).map(|t| [5.0, 1.0, t, 0.0, 1.0]))
+        .chain(evenly(4.0, 5.0, count).map(|t| [t, (t - 2.0) / 3.0, 1.0, 0.0, 1.0]))
+        .chain(evenly(1.0, 2.0 + root, count).map(|t| [0.0, 2.0, t, 0.0, 1.0]))
+        .chain(evenly(0.0, 1.0, count).map(|t| [t, 2.0 - t, 1.0, 0.0, 1.0]));
+    best_of(&pieces.map(values).collect::<Vec<_>>())
+}
