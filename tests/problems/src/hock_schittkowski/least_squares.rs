@@ -98,6 +98,8 @@ fn hs70<S: Scalar>(x: &[S]) -> Vec<S> {
         0.0869, 0.0453, 0.01509, 0.00189,
     ];
     let b = x[2] + (-x[2] + 1.0) * x[3];
+    // 2 pi to the digits of the book.
+    #[allow(clippy::approx_constant)]
     let density = |weight: S, shape: S, rate: S, time: f64| {
         let t = time / 7.658;
         let stirling = c::<S>(1.0) + c::<S>(1.0) / (shape * 12.0);
