@@ -333,3 +333,22 @@ fn an_interrupt_ends_the_run_with_the_best_point_on_disk() {
     assert_eq!(result["stop"], "interrupted");
     assert!(result["evaluations"].as_u64().unwrap() >= 1);
 }
+
+#[test]
+fn a_benchmark_of_solvers_leaves_results_that_can_be_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("bench");
+    let results = out.join("results.json");
+    let bench =
+        ["bench", "minimax", "--problems", "CB2,Bard", "--gradients", "--quiet", "--out", out.to_str().unwrap()];
+    let first = mops(&bench).output().unwrap();
+    let text = String::from_utf8(first.stdout).unwrap();
+    assert!(first.status.success() && text.contains("sqp: 2 of 2 solved"), "{text}");
+    let written: Value = serde_json::from_slice(&std::fs::read(&results).unwrap()).unwrap();
+    assert_eq!((written["suite"].as_str(), written["rows"].as_array().map(Vec::len)), (Some("minimax"), Some(2)));
+    assert!(std::fs::read_to_string(out.join("index.html")).unwrap().contains("Data profile"));
+    let again = mops(&bench).args(["--against", results.to_str().unwrap()]).output().unwrap();
+    let text = String::from_utf8(again.stdout).unwrap();
+    assert!(text.contains("before: sqp: 2 of 2 solved"), "{text}");
+    mops(&["bench", "minimax", "--problems", "CB22"]).assert().code(2);
+}

@@ -41,6 +41,7 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fi
         model: subject.model.clone(),
         globals: globals(subject),
         pieces,
+        expected: Vec::new(),
         simulations,
     };
     let whole = problem(pieces(subject, |role| role == Role::Calibration));

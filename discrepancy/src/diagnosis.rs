@@ -127,6 +127,21 @@ pub struct ExperimentError {
     pub channels: Vec<(String, f64)>,
     /// Over all channels and samples, in units of the noise: 1 is the noise itself.
     pub normalised: f64,
+    /// The same in windows of a few periods; `None` where the record is too short for two.
+    pub in_windows: Option<WindowErrors>,
+}
+
+/// Errors over windows of a record, each with start values of its own and the parameters held.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WindowErrors {
+    /// Number of windows.
+    pub count: usize,
+    /// Length of a window, s.
+    pub length: f64,
+    /// Root mean square error per channel, in its unit.
+    pub channels: Vec<(String, f64)>,
+    /// Over all channels and samples, in units of the noise.
+    pub normalised: f64,
 }
 
 /// How a parameter moved: what it had absorbed.

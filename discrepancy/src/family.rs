@@ -132,7 +132,7 @@ impl Family {
             let shares = (0..count).map(|k| f64::from(k) / f64::from(count - 1));
             shares.map(|s| (low + s * (high - low), s)).unzip()
         };
-        let lengths = vec![0.2, 0.7, 3.0];
+        let lengths = vec![0.06, 0.2, 0.7, 3.0];
         Some(Self {
             over,
             columns: first..first + knots.len(),
@@ -177,6 +177,18 @@ impl Family {
     pub fn table(&self, values: &[f64]) -> Vec<[f64; 2]> {
         let knots = self.blocks.iter().flat_map(|block| &block.knots);
         knots.zip(&values[self.columns.clone()]).map(|(&x, &y)| [x, y]).collect()
+    }
+
+    /// The values of a function of one argument at some places from those at its knots, as a matrix.
+    pub fn at(&self, places: &[f64]) -> DMatrix<f64> {
+        let knots = &self.blocks[0].knots;
+        let mut at = DMatrix::zeros(places.len(), knots.len());
+        for (i, &place) in places.iter().enumerate() {
+            let (k, share) = between(knots, place);
+            at[(i, k)] += 1.0 - share;
+            at[(i, k + 1)] += share;
+        }
+        at
     }
 
     fn each(&self, piece: usize, mut look: impl FnMut(usize, &Block)) {

@@ -23,6 +23,13 @@ pub struct Global {
     pub scale: f64,
 }
 
+impl Global {
+    /// Whether it has one value only.
+    fn is_pinned(&self) -> bool {
+        self.bounds[0] == self.bounds[1]
+    }
+}
+
 /// What an unknown of all pieces sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sets {
@@ -69,8 +76,27 @@ pub struct Fit<'a> {
     pub globals: Vec<Global>,
     /// The pieces.
     pub pieces: Vec<Piece>,
+    /// What is expected of some of the globals.
+    pub expected: Vec<Expected>,
     /// Counts simulations.
     pub simulations: &'a AtomicUsize,
+}
+
+/// Globals, one after the other, that are expected to be normal about 0.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// The first of them.
+    pub first: usize,
+    /// Turns them into independent ones of variance 1.
+    pub whitening: Arc<DMatrix<f64>>,
+}
+
+impl Expected {
+    /// The independent ones at a point.
+    fn at(&self, point: &Point) -> DVector<f64> {
+        let values = &point.globals[self.first..self.first + self.whitening.ncols()];
+        self.whitening.as_ref() * DVector::from_column_slice(values)
+    }
 }
 
 /// Residuals of a piece, channel by channel, and their slopes.
@@ -91,8 +117,10 @@ pub struct Fitted {
     pub chi2: f64,
     /// Number of residuals.
     pub count: usize,
-    /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1.
-    pub covariance: DMatrix<f64>,
+    /// The residuals of each piece.
+    pub residuals: Vec<Vec<f64>>,
+    /// The normal equations there, where the last iteration needed them.
+    normal: Option<Arc<Normal>>,
 }
 
 impl Fitted {
@@ -103,9 +131,30 @@ impl Fitted {
     }
 }
 
+/// What is known at the point of another fit, which has the first of the unknowns of this one.
+pub struct Known {
+    /// The point.
+    pub point: Point,
+    /// Residuals and slopes there.
+    pub all: Vec<Residuals>,
+}
+
+/// Which slopes are wanted.
+#[derive(Clone, Copy)]
+enum Slopes {
+    None,
+    All,
+    /// Those by what is not pinned; 0 stands for the others.
+    Free,
+    /// Those by the unknowns from these on: globals, then locals of the piece.
+    From(usize, usize),
+}
+
 /// Normal equations at a point.
+#[derive(Debug)]
 struct Normal {
     chi2: f64,
+    residuals: Vec<Vec<f64>>,
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -134,7 +183,8 @@ impl Fit<'_> {
         values
     }
 
-    fn seeds(&self, piece: usize, point: &Point, count: usize) -> Vec<Vec<f64>> {
+    /// The unknowns as directions of the model's parameters.
+    fn seeds(&self, piece: usize, point: &Point, count: usize, slopes: Slopes) -> Vec<Vec<f64>> {
         let p = &self.pieces[piece];
         let mut tuners = self.subject.start();
         for (global, &value) in self.globals.iter().zip(&point.globals) {
@@ -152,6 +202,9 @@ impl Fit<'_> {
             if let Sets::Parameter(k) = global.sets {
                 seed[k] = 1.0;
             }
+            if matches!(slopes, Slopes::Free) && global.is_pinned() {
+                seed.fill(0.0);
+            }
             (0..count).filter(|&k| overridden(k)).for_each(|k| seed[k] = 0.0);
             seed
         };
@@ -160,11 +213,20 @@ impl Fit<'_> {
             seed[local.parameter] = 1.0;
             seed
         };
-        self.globals.iter().map(global).chain(p.locals.iter().map(local)).collect()
+        let (first, own) = match slopes {
+            Slopes::None => return Vec::new(),
+            Slopes::From(first, own) => (first, own),
+            Slopes::All | Slopes::Free => (0, 0),
+        };
+        self.globals[first..].iter().map(global).chain(p.locals[own..].iter().map(local)).collect()
     }
 
     /// Residuals of a piece; `None` where the simulation fails.
-    pub fn residuals(&self, piece: usize, point: &Point, slopes: bool) -> Option<Residuals> {
+    pub fn residuals(&self, piece: usize, point: &Point) -> Option<Vec<f64>> {
+        self.look(piece, point, Slopes::None).map(|found| found.r)
+    }
+
+    fn look(&self, piece: usize, point: &Point, slopes: Slopes) -> Option<Residuals> {
         let p = &self.pieces[piece];
         let parameters = self.parameters(piece, point);
         let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
@@ -172,34 +234,47 @@ impl Fit<'_> {
         signals.dedup();
         let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
         self.simulations.fetch_add(1, Ordering::Relaxed);
-        let (analysis, tangents) = if slopes {
-            self.model.tangents(&job, &self.seeds(piece, point, parameters.len()))?.ok()?
-        } else {
+        let all = self.seeds(piece, point, parameters.len(), slopes);
+        // What does nothing here needs no simulation.
+        let (columns, seeds): (Vec<usize>, Vec<Vec<f64>>) =
+            all.iter().cloned().enumerate().filter(|(_, seed)| seed.iter().any(|&s| s != 0.0)).unzip();
+        let (analysis, tangents) = if seeds.is_empty() {
             (self.model.analyse(&job).ok()?, Vec::new())
+        } else {
+            self.model.tangents(&job, &seeds)?.ok()?
         };
-        let mut r = Vec::new();
-        let mut j = vec![Vec::new(); tangents.len()];
+        let count = p.series.iter().map(|s| s.times.len()).sum();
+        let (mut r, mut j) = (Vec::with_capacity(count), vec![Vec::with_capacity(count); all.len()]);
         for s in &p.series {
             let name = &self.model.interface().signals[s.signal].name;
             let predicted = analysis.trace(name).sample(&s.times);
             r.extend(predicted.iter().zip(&s.values).map(|(p, y)| (p - y) / s.noise));
-            for (column, tangent) in j.iter_mut().zip(&tangents) {
-                column.extend(tangent.trace(name).sample(&s.times).iter().map(|t| t / s.noise));
+            for (&column, tangent) in columns.iter().zip(&tangents) {
+                j[column].extend(tangent.trace(name).sample(&s.times).iter().map(|t| t / s.noise));
             }
         }
+        j.iter_mut().for_each(|column: &mut Vec<f64>| column.resize(count, 0.0));
         let finite = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
         (finite(&r) && j.iter().all(finite)).then_some(Residuals { r, j })
     }
 
     /// Residuals of all pieces.
-    pub fn all(&self, point: &Point, slopes: bool) -> Option<Vec<Residuals>> {
-        (0..self.pieces.len()).into_par_iter().map(|piece| self.residuals(piece, point, slopes)).collect()
+    pub fn all(&self, point: &Point) -> Option<Vec<Vec<f64>>> {
+        (0..self.pieces.len()).into_par_iter().map(|piece| self.residuals(piece, point)).collect()
     }
 
-    /// Sum of squares; infinite where a simulation fails.
-    pub fn chi2(&self, point: &Point) -> f64 {
-        self.all(point, false)
-            .map_or(f64::INFINITY, |all| all.iter().map(|p| p.r.iter().map(|r| r * r).sum::<f64>()).sum())
+    /// Residuals of all pieces with their slopes.
+    pub fn slopes(&self, point: &Point) -> Option<Vec<Residuals>> {
+        self.looks(point, Slopes::All)
+    }
+
+    fn looks(&self, point: &Point, slopes: Slopes) -> Option<Vec<Residuals>> {
+        (0..self.pieces.len()).into_par_iter().map(|piece| self.look(piece, point, slopes)).collect()
+    }
+
+    /// Sum of the squares of the globals of which something is expected, in units of that.
+    fn unexpected(&self, point: &Point) -> f64 {
+        self.expected.iter().map(|expected| expected.at(point).norm_squared()).sum()
     }
 
     fn unknowns(&self) -> usize {
@@ -208,7 +283,31 @@ impl Fit<'_> {
 
     /// Normal equations in the coordinates of the search.
     fn normal(&self, point: &Point) -> Option<Normal> {
-        let all = self.all(point, true)?;
+        Some(self.equations(point, self.looks(point, Slopes::Free)?))
+    }
+
+    /// The same where the first unknowns stand as in another fit, and the others change nothing but slopes.
+    fn normal_beside(&self, point: &Point, known: &Known) -> Option<Normal> {
+        let (first, before) = (known.point.globals.len(), &known.point.locals);
+        let stays = |(now, then): (&Vec<f64>, &Vec<f64>)| now.starts_with(then);
+        let same = point.globals.starts_with(&known.point.globals)
+            && point.locals.len() == before.len()
+            && point.locals.iter().zip(before).all(stays);
+        if !same {
+            return self.normal(point);
+        }
+        let beside = |(piece, known): (usize, &Residuals)| {
+            let own = before[piece].len();
+            let found = self.look(piece, point, Slopes::From(first, own))?;
+            let (globals, locals) = found.j.split_at(self.globals.len() - first);
+            let j = [&known.j[..first], globals, &known.j[first..], locals].concat();
+            Some(Residuals { r: known.r.clone(), j })
+        };
+        let all: Option<Vec<Residuals>> = known.all.par_iter().enumerate().map(beside).collect();
+        Some(self.equations(point, all?))
+    }
+
+    fn equations(&self, point: &Point, all: Vec<Residuals>) -> Normal {
         let (n, g) = (self.unknowns(), self.globals.len());
         let mut matrix = DMatrix::zeros(n, n);
         let mut gradient = DVector::zeros(n);
@@ -233,7 +332,18 @@ impl Fit<'_> {
             }
             offset += locals;
         }
-        Some(Normal { chi2, matrix, gradient })
+        for expected in &self.expected {
+            let at = expected.at(point);
+            let turn = DMatrix::from_fn(at.len(), expected.whitening.ncols(), |i, k| {
+                expected.whitening[(i, k)] * self.stretch(expected.first + k, point.globals[expected.first + k])
+            });
+            let (first, n) = (expected.first, turn.ncols());
+            let mut part = gradient.rows_mut(first, n);
+            part += turn.tr_mul(&at);
+            let mut part = matrix.view_mut((first, first), (n, n));
+            part += turn.tr_mul(&turn);
+        }
+        Normal { chi2, residuals: all.into_iter().map(|piece| piece.r).collect(), matrix, gradient }
     }
 
     /// Change of a global per unit of its coordinate.
@@ -265,7 +375,9 @@ impl Fit<'_> {
             (value <= bounds[0] && slope > 0.0) || (value >= bounds[1] && slope < 0.0)
         };
         let g = self.globals.len();
-        let mut held: Vec<bool> = (0..g).map(|k| at(point.globals[k], self.globals[k].bounds, gradient[k])).collect();
+        let global =
+            |k: usize| self.globals[k].is_pinned() || at(point.globals[k], self.globals[k].bounds, gradient[k]);
+        let mut held: Vec<bool> = (0..g).map(global).collect();
         for (piece, locals) in self.pieces.iter().zip(&point.locals) {
             for (local, &value) in piece.locals.iter().zip(locals) {
                 held.push(at(value, local.bounds, gradient[held.len()]));
@@ -279,24 +391,48 @@ impl Fit<'_> {
     /// Source: J. More, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630
     /// (1978); unknowns at a bound that the gradient presses against are left out of a step (D. Bertsekas, Projected Newton
     /// methods, SIAM J. Control Optim. 20 (1982)).
-    #[allow(clippy::cast_precision_loss)]
     pub fn solve(&self, start: Point, iterations: usize) -> Option<Fitted> {
-        let mut point = start;
-        let mut normal = self.normal(&point)?;
+        let normal = Arc::new(self.normal(&start)?);
+        Some(self.descend(start, normal, iterations))
+    }
+
+    /// The same where much of the start is known.
+    pub fn solve_beside(&self, start: Point, known: &Known, iterations: usize) -> Option<Fitted> {
+        let normal = Arc::new(self.normal_beside(&start, known)?);
+        Some(self.descend(start, normal, iterations))
+    }
+
+    /// The same from where a fit of this problem ended.
+    pub fn resume(&self, from: &Fitted, iterations: usize) -> Option<Fitted> {
+        let normal = self.normal_at(from)?;
+        Some(self.descend(from.point.clone(), normal, iterations))
+    }
+
+    fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
+        fitted.normal.clone().or_else(|| self.normal(&fitted.point).map(Arc::new))
+    }
+
+    fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
+        let count = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
+        let residuals = normal.residuals.clone();
+        let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: None };
+        let mut normal = normal;
         let mut damping = 1e-3;
-        let count: usize = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
-        for _ in 0..iterations {
-            let held = self.held(&point, &normal.gradient);
+        let mut total = fitted.chi2 + self.unexpected(&fitted.point);
+        for iteration in 1..=iterations {
+            let held = self.held(&fitted.point, &normal.gradient);
             let mut improved = None;
             for _ in 0..8 {
                 let Some(step) = damped_step(&normal, &held, damping) else {
                     damping *= 10.0;
                     continue;
                 };
-                let trial = self.moved(&point, &step);
-                let chi2 = self.chi2(&trial);
-                if chi2 < normal.chi2 {
-                    improved = Some((trial, chi2));
+                let trial = self.moved(&fitted.point, &step);
+                let residuals = self.all(&trial);
+                let chi2 = residuals.as_ref().map_or(f64::INFINITY, |all| sum_of_squares(all));
+                let sum = chi2 + self.unexpected(&trial);
+                if let Some(residuals) = residuals.filter(|_| sum < total) {
+                    improved = Some((trial, chi2, residuals));
                     break;
                 }
                 if step.amax() < 1e-9 {
@@ -304,32 +440,36 @@ impl Fit<'_> {
                 }
                 damping *= if chi2.is_finite() { 6.0 } else { 20.0 };
             }
-            let Some((trial, chi2)) = improved else { break };
-            let gain = normal.chi2 - chi2;
+            let Some((trial, chi2, residuals)) = improved else { break };
+            let now = chi2 + self.unexpected(&trial);
+            let gain = std::mem::replace(&mut total, now) - now;
             damping = (damping * 0.15).max(1e-9);
-            let Some(next) = self.normal(&trial) else { break };
-            point = trial;
-            normal = next;
-            if gain < 1e-3 + 1e-6 * normal.chi2 {
-                break;
+            if iteration == iterations || gain < 1e-3 + 1e-6 * total {
+                // Nobody may ask for the slopes here.
+                return Fitted { point: trial, chi2, residuals, ..fitted };
             }
+            let Some(next) = self.normal(&trial) else { break };
+            (fitted.point, fitted.chi2) = (trial, next.chi2);
+            fitted.residuals.clone_from(&next.residuals);
+            normal = Arc::new(next);
         }
-        let held = self.held(&point, &normal.gradient);
-        let covariance = self.covariance(&point, &normal, &held);
-        Some(Fitted { chi2: normal.chi2, count, covariance, point })
+        Fitted { normal: Some(normal), ..fitted }
     }
 
-    /// Covariance of the globals for residuals of size 1, the locals eliminated.
-    fn covariance(&self, point: &Point, normal: &Normal, held: &[bool]) -> DMatrix<f64> {
+    /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1; 0
+    /// for what stands at a bound, and where the slopes cannot be had.
+    pub fn covariance(&self, fitted: &Fitted) -> DMatrix<f64> {
         let g = self.globals.len();
+        let mut covariance = DMatrix::zeros(g, g);
+        let Some(normal) = self.normal_at(fitted) else { return covariance };
+        let held = self.held(&fitted.point, &normal.gradient);
         let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
         let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
         let inverse = pseudo_inverse(&matrix);
-        let mut covariance = DMatrix::zeros(g, g);
+        let stretch = |k: usize| self.stretch(k, fitted.point.globals[k]);
         for (i, &a) in free.iter().enumerate().filter(|(_, a)| **a < g) {
             for (j, &b) in free.iter().enumerate().filter(|(_, b)| **b < g) {
-                covariance[(a, b)] =
-                    inverse[(i, j)] * self.stretch(a, point.globals[a]) * self.stretch(b, point.globals[b]);
+                covariance[(a, b)] = inverse[(i, j)] * stretch(a) * stretch(b);
             }
         }
         covariance
@@ -375,6 +515,10 @@ pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         }
     }
     DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]))
+}
+
+fn sum_of_squares(all: &[Vec<f64>]) -> f64 {
+    all.iter().map(|r| r.iter().map(|r| r * r).sum::<f64>()).sum()
 }
 
 /// Scalar product.

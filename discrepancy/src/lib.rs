@@ -1,6 +1,7 @@
 //! The discrepancy search: finds what a calibrated model leaves unexplained in measured data, traces it to the place and the
 //! physical effect that the model lacks, and reports the error before and after.
 
+mod account;
 mod base;
 mod brute_force;
 mod candidate;
@@ -9,15 +10,19 @@ mod diagnosis;
 mod family;
 mod fit;
 mod gaussian;
+mod growth;
 mod held_out;
 mod hygiene;
+mod judge;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
 mod plan;
+mod removed;
 mod repaired;
 mod screen;
 mod search;
+mod short_term;
 mod stopgap;
 mod subject;
 #[cfg(test)]
@@ -35,5 +40,5 @@ pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
-    StrengthValue, Unexplained, Verdict,
+    StrengthValue, Unexplained, Verdict, WindowErrors,
 };

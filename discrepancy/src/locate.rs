@@ -8,9 +8,11 @@
 //! Source: T. Rogers, T. Friis, A latent restoring force approach to nonlinear system identification, Mechanical Systems and
 //! Signal Processing 180 (2022) 109426; here with knots instead of a state-space form.
 
+use std::sync::Arc;
+
 use mops_core::Port;
 use mops_models::WithEffects;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnosis::{Curve, Evidence, Unexplained};
@@ -44,6 +46,8 @@ pub struct Table {
     pub share: f64,
     /// The signal, linear between its points.
     pub points: Vec<[f64; 2]>,
+    /// Turns values at the points into independent ones of variance 1, as far as a signal this smooth is expected.
+    pub expected: Option<Arc<DMatrix<f64>>>,
 }
 
 /// Logarithms of a likelihood that are this close count as the same: the place that the model names first is taken.
@@ -133,13 +137,28 @@ fn located(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Op
 
 fn table(unknown: &Unknown, choice: &Choice) -> Option<Table> {
     let estimate = unknown.normals.estimate(&unknown.prior(&choice.terms)?, choice.variance)?;
-    let family = &unknown.families[choice.terms[0].family];
+    let Term { family, length, .. } = choice.terms[0];
+    let family = &unknown.families[family];
+    let points = thinned(family.table(estimate.coefficients.as_slice()));
+    let root = family.at(&points.iter().map(|p| p[0]).collect::<Vec<_>>()) * family.root(length)?;
     Some(Table {
         over: family.over,
         evidence: choice.evidence,
         share: share(unknown, estimate.coefficients.as_slice(), estimate.freedom),
-        points: thinned(family.table(estimate.coefficients.as_slice())),
+        points,
+        expected: whitening(&root, choice.variance).map(Arc::new),
     })
+}
+
+/// Turns values of covariance `variance R R'` into independent ones of variance 1.
+fn whitening(root: &DMatrix<f64>, variance: f64) -> Option<DMatrix<f64>> {
+    let mut covariance = variance * root * root.transpose();
+    // Points between the same knots tell nothing apart to the last digit.
+    let jitter = 1e-6 * covariance.trace() / f64::from(u32::try_from(covariance.nrows()).unwrap_or(u32::MAX));
+    for k in 0..covariance.nrows() {
+        covariance[(k, k)] += jitter;
+    }
+    covariance.cholesky()?.l().try_inverse()
 }
 
 /// The share of the squares above the noise that a signal takes away, the freedom it uses paid for; what is less than the

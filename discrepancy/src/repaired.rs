@@ -76,7 +76,8 @@ impl Search<'_> {
         }
         #[allow(clippy::cast_precision_loss)]
         let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
-        Some(Calibrated { added, tuners, covariance: fitted.covariance, chi2: fitted.chi2, square, free, experiments })
+        let covariance = fit.covariance(&fitted);
+        Some(Calibrated { added, tuners, covariance, chi2: fitted.chi2, square, free, experiments })
     }
 
     /// Start values of an experiment with everything else held, and what the model then says.
@@ -97,7 +98,7 @@ impl Search<'_> {
 }
 
 fn prognosis(fit: &Fit<'_>, point: &Point, piece: usize, measurement: &Measurement) -> Option<Prognosis> {
-    let residuals = fit.residuals(piece, point, false)?.r;
+    let residuals = fit.residuals(piece, point)?;
     let mut at = 0;
     let predicted = measurement.series.iter().map(|s| {
         let part = &residuals[at..at + s.times.len()];
@@ -129,6 +130,7 @@ impl Calibrated {
                 role: m.role,
                 channels,
                 normalised: (sum / count.max(1) as f64).sqrt(),
+                in_windows: None,
             }
         };
         measurements.iter().zip(&self.experiments).map(error).collect()

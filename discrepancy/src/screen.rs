@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Residuals, dot};
-use crate::trace_of::{sizes, trace};
+use crate::trace_of::{View, sizes};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -22,7 +22,9 @@ pub struct Scene {
     /// Where the residuals of each piece begin.
     pub begins: Vec<usize>,
     /// Orthonormal directions that the unknowns can absorb.
-    pub basis: Vec<Vec<f64>>,
+    pub basis: Vec<Direction>,
+    /// Residuals and slopes of each piece.
+    pub slopes: Vec<Residuals>,
 }
 
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
@@ -52,7 +54,7 @@ pub struct Screened {
 impl Scene {
     /// The scene of a fit; `None` where a simulation fails.
     pub fn new(fit: &Fit<'_>, model: &WithEffects, fitted: &Fitted) -> Option<Self> {
-        let all = fit.all(&fitted.point, true)?;
+        let all = fit.slopes(&fitted.point)?;
         let pieces: Vec<usize> = (0..fit.pieces.len()).collect();
         let trajectories: Option<Vec<Trajectory>> =
             pieces.par_iter().map(|&piece| Trajectory::new(fit, model, piece, &fitted.point).ok()).collect();
@@ -61,54 +63,65 @@ impl Scene {
             begins.push(begins[begins.len() - 1] + piece.r.len());
         }
         let residuals = all.iter().flat_map(|piece| piece.r.iter().copied()).collect();
-        Some(Self { trajectories: trajectories?, residuals, basis: basis(&all, &begins, fit.globals.len()), begins })
+        let basis = basis(&all, &begins, fit.globals.len());
+        Some(Self { trajectories: trajectories?, residuals, basis, begins, slopes: all })
     }
 
     /// A trace without what the unknowns absorb.
     pub fn project(&self, trace: &[f64]) -> Vec<f64> {
         let mut left = trace.to_vec();
-        for q in &self.basis {
-            let along = dot(q, &left);
-            left.iter_mut().zip(q).for_each(|(l, q)| *l -= along * q);
-        }
+        self.basis.iter().for_each(|q| q.take_out_of(&mut left, 0));
         left
     }
 }
 
+/// A direction of length 1 in the residuals, 0 outside of a part.
+pub struct Direction {
+    /// Where the part begins.
+    pub begin: usize,
+    /// The direction there.
+    pub values: Vec<f64>,
+}
+
+impl Direction {
+    /// Takes the direction out of a vector, whose first element is that at `begin`.
+    fn take_out_of(&self, vector: &mut [f64], begin: usize) {
+        let part = &mut vector[self.begin - begin..][..self.values.len()];
+        let along = dot(&self.values, part);
+        part.iter_mut().zip(&self.values).for_each(|(v, q)| *v -= along * q);
+    }
+}
+
 /// An orthonormal basis of the slopes, by the modified Gram-Schmidt method with a second pass; what is left of a column
-/// that depends on others is dropped.
-fn basis(all: &[Residuals], begins: &[usize], globals: usize) -> Vec<Vec<f64>> {
-    let total = begins[begins.len() - 1];
-    let mut columns = Vec::new();
-    for g in 0..globals {
-        columns.push(all.iter().flat_map(|piece| piece.j[g].iter().copied()).collect::<Vec<f64>>());
-    }
+/// that depends on others is dropped. Locals, of which each moves its own piece alone, come first: so they stay short.
+fn basis(all: &[Residuals], begins: &[usize], globals: usize) -> Vec<Direction> {
+    let mut basis: Vec<Direction> = Vec::new();
     for (piece, &begin) in all.iter().zip(begins) {
+        let first = basis.len();
         for local in &piece.j[globals..] {
-            let mut column = vec![0.0; total];
-            column[begin..begin + local.len()].copy_from_slice(local);
-            columns.push(column);
+            let rest = rest(&basis[first..], begin, local.clone());
+            basis.extend(rest);
         }
     }
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for mut column in columns {
-        let before = dot(&column, &column).sqrt();
-        if before == 0.0 {
-            continue;
-        }
-        for _ in 0..2 {
-            for q in &basis {
-                let along = dot(q, &column);
-                column.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
-            }
-        }
-        let left = dot(&column, &column).sqrt();
-        if left > 1e-7 * before {
-            column.iter_mut().for_each(|c| *c /= left);
-            basis.push(column);
-        }
+    for g in 0..globals {
+        let column = all.iter().flat_map(|piece| piece.j[g].iter().copied()).collect();
+        let rest = rest(&basis, 0, column);
+        basis.extend(rest);
     }
     basis
+}
+
+/// What a column adds to a basis.
+fn rest(basis: &[Direction], begin: usize, mut column: Vec<f64>) -> Option<Direction> {
+    let before = dot(&column, &column).sqrt();
+    for _ in 0..2 {
+        basis.iter().for_each(|q| q.take_out_of(&mut column, begin));
+    }
+    let left = dot(&column, &column).sqrt();
+    (left > 1e-7 * before).then(|| {
+        column.iter_mut().for_each(|c| *c /= left);
+        Direction { begin, values: column }
+    })
 }
 
 /// Screens candidates; the best first.
@@ -144,6 +157,9 @@ fn best_of(
     let shared = |c: &[f64]| -> Vec<u64> {
         c.iter().enumerate().filter(|(k, _)| !own.contains(k)).map(|(_, v)| v.to_bits()).collect()
     };
+    let pieces = fit.pieces.iter().zip(&scene.trajectories);
+    let views: Option<Vec<View<'_>>> = pieces.map(|(piece, along)| View::new(candidate, model, piece, along)).collect();
+    let views = views?;
     let mut start = 0;
     while start < combinations.len() {
         let end = if own.is_empty() {
@@ -159,8 +175,7 @@ fn best_of(
         let mut fits = true;
         for (index, piece) in fit.pieces.iter().enumerate() {
             let r = &scene.residuals[scene.begins[index]..scene.begins[index + 1]];
-            let along = &scene.trajectories[index];
-            let traces = group.iter().filter_map(|s| Some((s, trace(candidate, s, model, piece, along)?)));
+            let traces = group.iter().filter_map(|s| Some((s, views[index].trace(s)?)));
             let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
             let found = traces.max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)));
             let Some((strengths, trace)) = found else {
@@ -202,7 +217,7 @@ fn best_of(
         }
         let length = rest.sqrt();
         best = Some(Screened {
-            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes },
+            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes, expected: None },
             gain,
             absorbed: 1.0 - rest / size,
             pull: along / rest.sqrt(),

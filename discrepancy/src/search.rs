@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Piece, dot};
+use crate::fit::{Fit, Fitted, Known, Piece, dot};
 use crate::screen::{Scene, Screened, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
@@ -64,6 +64,8 @@ pub struct Round<'a> {
     pub directions: f64,
     /// The criterion of what the round began with.
     pub before: f64,
+    /// Residuals and slopes of what the round began with.
+    known: Known,
 }
 
 impl<'a> Search<'a> {
@@ -178,13 +180,10 @@ impl<'a> Search<'a> {
                 chosen.push(i);
             }
         }
+        let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
-            .filter_map(|i| {
-                let last = self.neutral_start(&screened[i].added);
-                let added: Vec<Added> = from.added.iter().cloned().chain([last]).collect();
-                self.from(from, &added, 5)
-            })
+            .filter_map(|i| self.beside(from, &known, &[self.neutral_start(&screened[i].added)], 5))
             .collect();
         let mut trials = self.race(started);
         if from.windows > 1 {
@@ -199,14 +198,14 @@ impl<'a> Search<'a> {
             }
         }
         let directions = screened.iter().map(|s| s.directions).sum();
-        Some(Round { screened, trials, directions, before: from.score() })
+        Some(Round { screened, trials, directions, before: from.score(), known })
     }
 
     /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when
     /// another effect is in. Chosen by the normal equations of two traces, then fitted.
-    pub fn pairs(&self, from: &Trial<'a>, screened: &[Screened]) -> Vec<Trial<'a>> {
+    pub fn pairs(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
         const FEW: usize = 60;
-        let few = &screened[..screened.len().min(FEW)];
+        let few = &round.screened[..round.screened.len().min(FEW)];
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for i in 0..few.len() {
             for j in i + 1..few.len() {
@@ -243,8 +242,7 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|(i, j)| {
-                let added = [&few[i], &few[j]].map(|s| self.neutral_start(&s.added));
-                self.from(from, &[from.added.as_slice(), &added].concat(), 6)
+                self.beside(from, &round.known, &[&few[i], &few[j]].map(|s| self.neutral_start(&s.added)), 6)
             })
             .collect();
         self.race(started)
@@ -290,6 +288,21 @@ impl<'a> Search<'a> {
     pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
         self.trial(added, tuners, self.own_locals(from), from.windows, iterations)
+    }
+
+    /// The trial with effects that are at first neutral, where that is so: nothing is simulated twice.
+    fn beside(&self, from: &Trial<'a>, known: &Known, more: &[Added], iterations: usize) -> Option<Trial<'a>> {
+        let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
+        let added = [from.added.as_slice(), more].concat();
+        let (pieces, locals) = (self.pieces(from.windows), self.own_locals(from));
+        let (fit, point, variant) = problem(self.subject, &added, pieces, tuners, locals, &[], self.simulations);
+        let neutral = |a: &Added| a.candidate.effect.strengths()[0].neutral == Some(a.strengths[0]);
+        let fitted = if more.iter().all(neutral) {
+            fit.solve_beside(point, known, iterations)?
+        } else {
+            fit.solve(point, iterations)?
+        };
+        Some(Trial { added, windows: from.windows, fit, variant, fitted }.read())
     }
 
     /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
@@ -339,10 +352,11 @@ impl<'a> Search<'a> {
         if trial.added.is_empty() {
             return (trial, held);
         }
+        let mut covariance = trial.fit.covariance(&trial.fitted);
         for k in 0..self.subject.globals.len() {
             let global = &trial.fit.globals[k];
             let value = trial.fitted.point.globals[k];
-            let error = trial.fitted.covariance[(k, k)].max(0.0).sqrt();
+            let error = covariance[(k, k)].max(0.0).sqrt();
             let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
             let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
             if !(zero && (at_least || value.abs() < 2.0 * error)) {
@@ -359,12 +373,13 @@ impl<'a> Search<'a> {
                 held = all;
                 let (added, windows) = (trial.added.clone(), trial.windows);
                 trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
+                covariance = trial.fit.covariance(&trial.fitted);
             }
         }
         (trial, held)
     }
 
-    fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
+    pub fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
         let interface = self.subject.model.interface();
         let of = &self.subject.measurements;
         let mut measured: Vec<String> = of.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();
@@ -413,7 +428,7 @@ impl<'a> Trial<'a> {
 
     /// Fitted further.
     fn continued(self, iterations: usize) -> Option<Self> {
-        let fitted = self.fit.solve(self.fitted.point.clone(), iterations)?;
+        let fitted = self.fit.resume(&self.fitted, iterations)?;
         Some(Self { fitted, ..self }.read())
     }
 

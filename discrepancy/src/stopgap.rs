@@ -12,6 +12,9 @@ use crate::search::{Search, Trial};
 use crate::trace_of::sizes;
 use crate::variant::Added;
 
+/// What it is called.
+const NAME: &str = "table";
+
 /// The table as an effect: its strengths are the values at the points.
 struct Stopgap {
     over: Over,
@@ -55,7 +58,7 @@ impl Stopgap {
 
 impl Effect for Stopgap {
     fn name(&self) -> &'static str {
-        "table"
+        NAME
     }
 
     fn about(&self) -> &'static str {
@@ -122,6 +125,11 @@ impl<S: Scalar> Acting<S> for AtValues<S> {
     }
 }
 
+/// Whether an effect is such a table.
+pub fn is_table(added: &Added) -> bool {
+    added.candidate.effect.name() == NAME
+}
+
 /// Residuals, in units of the noise, below which no further table is tried.
 const GOOD: f64 = 1.15;
 
@@ -138,7 +146,7 @@ pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> 
         let effect = Stopgap { over: table.over, kind: [kind], points: table.points.iter().map(|p| p[0]).collect() };
         let candidate = Candidate { effect: Arc::new(effect), port: located.port.clone(), companion: None, only: None };
         let strengths = table.points.iter().map(|p| size * p[1]).collect();
-        let added = Added { candidate, strengths, own: Vec::new(), sizes };
+        let added = Added { candidate, strengths, own: Vec::new(), sizes, expected: table.expected.clone() };
         let all: Vec<Added> = from.added.iter().cloned().chain([added]).collect();
         Some((search.from(from, &all, 25)?, table.clone()))
     };

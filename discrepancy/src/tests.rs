@@ -2,7 +2,10 @@
 
 mod absorbed;
 mod correlated;
+mod derivatives;
+mod pairs;
 mod selection;
+mod sessions;
 mod signs;
 mod starts;
 mod tangents;

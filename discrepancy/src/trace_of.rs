@@ -1,11 +1,11 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Effect, Port};
+use mops_core::{Acting, At, Input, Port};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
 use crate::trajectory::Trajectory;
-use mops_models::WithEffects;
+use mops_models::{Moment, WithEffects};
 
 /// Indices of a candidate's places in a model.
 #[derive(Debug, Clone, Copy)]
@@ -148,126 +148,184 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
     Some(Sizes { output: positive(sizes.output), ..sizes })
 }
 
-/// What a candidate at these strengths adds to the residuals of a piece; `None` where it cannot act there.
-pub fn trace(
-    candidate: &Candidate,
-    strengths: &[f64],
-    model: &WithEffects,
-    piece: &Piece,
-    along: &Trajectory,
-) -> Option<Vec<f64>> {
-    let total: usize = piece.series.iter().map(|s| s.times.len()).sum();
-    if candidate.only.is_some_and(|only| only != piece.measurement) {
-        return Some(vec![0.0; total]);
-    }
-    let effect = candidate.effect.as_ref();
-    // What inertia adds changes the acceleration that it adds to: proportional to the strength only where that is small.
-    let small = if effect.is_inertial() { 1e-6 } else { 1.0 };
-    let mut strengths = strengths.to_vec();
-    strengths[0] *= small;
-    let acting = effect.act(&strengths);
-    let here = spot(&candidate.port, model, piece)?;
-    let companion = match &candidate.companion {
-        Some(port) => Some(spot(port, model, piece)?),
-        None => None,
-    };
-    match here {
-        Spot::Sensor(series) => {
-            let mut all = vec![0.0; total];
-            let offset: usize = piece.series[..series].iter().map(|s| s.times.len()).sum();
-            let change = measured(acting.as_ref(), effect, series, companion, piece, along);
-            all[offset..offset + change.len()].copy_from_slice(&change);
-            Some(all)
-        }
-        _ => {
-            let (column, mut signal) = signal(acting.as_ref(), effect, here, companion, piece, along, model)?;
-            signal.iter_mut().for_each(|s| *s /= small);
-            Some(along.response(column, &signal))
-        }
-    }
+/// A candidate's place in a piece, and what it sees there.
+pub struct View<'a> {
+    candidate: &'a Candidate,
+    piece: &'a Piece,
+    along: &'a Trajectory,
+    here: Spot,
+    /// At the nodes of the motion, at a sensor at its samples; nothing where the candidate does not act.
+    seen: Vec<At<'a, f64>>,
+    /// The input that an actuator commands.
+    input: Option<&'a Input>,
 }
 
-/// The signal that an effect adds at the nodes of a motion, and its column.
-fn signal(
-    acting: &dyn Acting<f64>,
-    effect: &dyn Effect,
-    here: Spot,
-    companion: Option<Spot>,
-    piece: &Piece,
-    along: &Trajectory,
-    model: &WithEffects,
-) -> Option<(usize, Vec<f64>)> {
-    let inputs = along.inputs();
-    let mut z = vec![0.0; effect.states()];
-    let mut memory = vec![f64::NAN; effect.memory()];
-    let mut signal = Vec::with_capacity(along.moments.len());
-    let command = |t: f64| match here {
-        Spot::Actuator(input) => {
-            let name = &model.model().interface().inputs[input].name;
-            piece.case.input(name).map_or(0.0, |input| input.at(t.max(0.0)))
+impl<'a> View<'a> {
+    /// Of a candidate in a piece; `None` where it cannot act there.
+    pub fn new(
+        candidate: &'a Candidate,
+        model: &'a WithEffects,
+        piece: &'a Piece,
+        along: &'a Trajectory,
+    ) -> Option<Self> {
+        let mut view = Self { candidate, piece, along, here: Spot::Actuator(0), seen: Vec::new(), input: None };
+        if candidate.only.is_some_and(|only| only != piece.measurement) {
+            return Some(view);
         }
-        _ => 0.0,
-    };
-    let look = |k: usize| {
-        let m = &along.moments[k];
+        view.here = spot(&candidate.port, model, piece)?;
+        let companion = match &candidate.companion {
+            Some(port) => Some(spot(port, model, piece)?),
+            None => None,
+        };
+        view.seen = match view.here {
+            Spot::Sensor(series) => {
+                (0..along.predicted[series].len()).map(|k| view.at_sample(series, companion, k)).collect()
+            }
+            _ => along.moments.iter().map(|m| view.at_node(companion, m)).collect(),
+        };
+        if let Spot::Actuator(input) = view.here {
+            view.input = piece.case.input(&model.model().interface().inputs[input].name);
+        }
+        Some(view)
+    }
+
+    fn at_node(&self, companion: Option<Spot>, m: &'a Moment) -> At<'a, f64> {
+        let inputs = self.along.inputs();
+        let inertial = self.candidate.effect.is_inertial();
         let (other, other_speed) = match companion {
             Some(Spot::Joint(_, q, v)) => (m.x[q], m.x[v]),
             Some(Spot::Process(_, s)) => (m.x[s], 0.0),
             Some(Spot::Actuator(i)) => (m.u[i], 0.0),
             Some(Spot::Sensor(_)) | None => (0.0, 0.0),
         };
-        let (value, q, v, a, mobility) = match here {
+        let (value, q, v, a, mobility) = match self.here {
             Spot::Joint(w, q, v) => {
-                let gain = m.b[(v, inputs + w)] * along.forward[w];
-                (0.0, m.x[q], m.x[v], if effect.is_inertial() { m.rates[v] } else { 0.0 }, gain)
+                let gain = m.b[(v, inputs + w)] * self.along.forward[w];
+                (0.0, m.x[q], m.x[v], if inertial { m.rates[v] } else { 0.0 }, gain)
             }
             Spot::Process(_, s) => (0.0, m.x[s], 0.0, 0.0, 0.0),
             Spot::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
             Spot::Sensor(_) => (0.0, 0.0, 0.0, 0.0, 0.0),
         };
-        At { t: m.t + piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u }
-    };
-    let delay = acting.delay();
-    for k in 0..along.moments.len() {
-        let at = look(k);
-        if k == 0 {
-            acting.start(&at, &mut z);
-        } else if !z.is_empty() {
-            advance(acting, &look(k - 1), &at, &mut z);
-        }
-        let value = if let Some(delay) = delay {
-            command(at.t - piece.case.begins - delay)
-        } else if memory.is_empty() {
-            acting.value(&at, &z)
-        } else {
-            acting.remember(&at, &mut memory);
-            acting.recall(&at, &memory)
-        };
-        let change = match here {
-            Spot::Actuator(_) => value - at.value,
-            _ => {
-                let friction = acting.friction(&at, &z).map_or(0.0, |f| match at.v {
-                    v if v > 0.0 => -f.sliding[0],
-                    v if v < 0.0 => f.sliding[1],
-                    _ => 0.0,
-                });
-                value + friction
-            }
-        };
-        if !change.is_finite() {
-            return None;
-        }
-        signal.push(change);
+        At { t: m.t + self.piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u }
     }
-    let column = match here {
-        Spot::Joint(w, ..) | Spot::Process(w, _) => {
-            signal.iter_mut().for_each(|s| *s *= along.forward[w]);
-            inputs + w
+
+    fn at_sample(&self, series: usize, companion: Option<Spot>, k: usize) -> At<'a, f64> {
+        let other = match companion {
+            Some(Spot::Sensor(other)) => self.along.predicted[other].get(k).copied().unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let y = self.along.predicted[series][k];
+        let t = self.piece.series[series].times[k] + self.piece.case.begins;
+        At { t, value: y, q: y, v: 0.0, a: 0.0, mobility: 0.0, other, other_speed: 0.0, u: &[] }
+    }
+
+    /// What the candidate at these strengths adds to the residuals of the piece; `None` where that is not finite.
+    pub fn trace(&self, strengths: &[f64]) -> Option<Vec<f64>> {
+        let series = &self.piece.series;
+        let total: usize = series.iter().map(|s| s.times.len()).sum();
+        if self.seen.is_empty() {
+            return Some(vec![0.0; total]);
         }
-        Spot::Actuator(input) => input,
-        Spot::Sensor(_) => return None,
-    };
-    Some((column, signal))
+        let effect = self.candidate.effect.as_ref();
+        // What inertia adds changes the acceleration that it adds to: proportional to the strength only where that is small.
+        let small = if effect.is_inertial() { 1e-6 } else { 1.0 };
+        let mut strengths = strengths.to_vec();
+        strengths[0] *= small;
+        let acting = effect.act(&strengths);
+        if let Spot::Sensor(index) = self.here {
+            let mut all = vec![0.0; total];
+            let offset: usize = series[..index].iter().map(|s| s.times.len()).sum();
+            let change = self.measured(acting.as_ref(), index);
+            all[offset..offset + change.len()].copy_from_slice(&change);
+            return Some(all);
+        }
+        let (column, mut signal) = self.signal(acting.as_ref())?;
+        signal.iter_mut().for_each(|s| *s /= small);
+        Some(self.along.response(column, &signal))
+    }
+
+    /// The signal that an effect adds at the nodes of a motion, and its column.
+    fn signal(&self, acting: &dyn Acting<f64>) -> Option<(usize, Vec<f64>)> {
+        let (effect, along) = (self.candidate.effect.as_ref(), self.along);
+        let inputs = along.inputs();
+        let mut z = vec![0.0; effect.states()];
+        let mut memory = vec![f64::NAN; effect.memory()];
+        let mut signal = Vec::with_capacity(self.seen.len());
+        let command = |t: f64| self.input.map_or(0.0, |input| input.at(t.max(0.0)));
+        let delay = acting.delay();
+        for (k, at) in self.seen.iter().enumerate() {
+            if k == 0 {
+                acting.start(at, &mut z);
+            } else if !z.is_empty() {
+                advance(acting, &self.seen[k - 1], at, &mut z);
+            }
+            let value = if let Some(delay) = delay {
+                command(at.t - self.piece.case.begins - delay)
+            } else if memory.is_empty() {
+                acting.value(at, &z)
+            } else {
+                acting.remember(at, &mut memory);
+                acting.recall(at, &memory)
+            };
+            let change = match self.here {
+                Spot::Actuator(_) => value - at.value,
+                _ => {
+                    let friction = acting.friction(at, &z).map_or(0.0, |f| match at.v {
+                        v if v > 0.0 => -f.sliding[0],
+                        v if v < 0.0 => f.sliding[1],
+                        _ => 0.0,
+                    });
+                    value + friction
+                }
+            };
+            if !change.is_finite() {
+                return None;
+            }
+            signal.push(change);
+        }
+        let column = match self.here {
+            Spot::Joint(w, ..) | Spot::Process(w, _) => {
+                signal.iter_mut().for_each(|s| *s *= along.forward[w]);
+                inputs + w
+            }
+            Spot::Actuator(input) => input,
+            Spot::Sensor(_) => return None,
+        };
+        Some((column, signal))
+    }
+
+    /// What an effect changes at a sensor, in units of the noise.
+    fn measured(&self, acting: &dyn Acting<f64>, series: usize) -> Vec<f64> {
+        let effect = self.candidate.effect.as_ref();
+        let s = &self.piece.series[series];
+        let y = &self.along.predicted[series];
+        let interpolate = |t: f64| {
+            let k = s.times.partition_point(|&x| x <= t).clamp(1, s.times.len() - 1);
+            let share = ((t - s.times[k - 1]) / (s.times[k] - s.times[k - 1])).clamp(0.0, 1.0);
+            y[k - 1] + share * (y[k] - y[k - 1])
+        };
+        let mut z = vec![0.0; effect.states()];
+        let mut memory = vec![f64::NAN; effect.memory()];
+        let delay = acting.delay();
+        let change = |(k, at): (usize, &At<'_, f64>)| {
+            if k == 0 {
+                acting.start(at, &mut z);
+            } else if !z.is_empty() {
+                advance(acting, &self.seen[k - 1], at, &mut z);
+            }
+            let value = if let Some(delay) = delay {
+                interpolate(s.times[k] - delay)
+            } else if memory.is_empty() {
+                acting.value(at, &z)
+            } else {
+                acting.remember(at, &mut memory);
+                acting.recall(at, &memory)
+            };
+            (value - y[k]) / s.noise
+        };
+        self.seen.iter().enumerate().map(change).collect()
+    }
 }
 
 /// Moves the states of an effect from one node to the next, in two steps of the classical Runge-Kutta method.
@@ -308,59 +366,3 @@ fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &m
 
 /// The largest number of states that an effect may have to be screened.
 const MOST_STATES: usize = 8;
-
-/// What an effect changes at a sensor, in units of the noise.
-fn measured(
-    acting: &dyn Acting<f64>,
-    effect: &dyn Effect,
-    series: usize,
-    companion: Option<Spot>,
-    piece: &Piece,
-    along: &Trajectory,
-) -> Vec<f64> {
-    let s = &piece.series[series];
-    let y = &along.predicted[series];
-    let interpolate = |t: f64| {
-        let k = s.times.partition_point(|&x| x <= t).clamp(1, s.times.len() - 1);
-        let share = ((t - s.times[k - 1]) / (s.times[k] - s.times[k - 1])).clamp(0.0, 1.0);
-        y[k - 1] + share * (y[k] - y[k - 1])
-    };
-    let mut z = vec![0.0; effect.states()];
-    let mut memory = vec![f64::NAN; effect.memory()];
-    let look = |k: usize| {
-        let other = match companion {
-            Some(Spot::Sensor(other)) => along.predicted[other].get(k).copied().unwrap_or(0.0),
-            _ => 0.0,
-        };
-        At {
-            t: s.times[k] + piece.case.begins,
-            value: y[k],
-            q: y[k],
-            v: 0.0,
-            a: 0.0,
-            mobility: 0.0,
-            other,
-            other_speed: 0.0,
-            u: &[],
-        }
-    };
-    (0..y.len())
-        .map(|k| {
-            let at = look(k);
-            if k == 0 {
-                acting.start(&at, &mut z);
-            } else if !z.is_empty() {
-                advance(acting, &look(k - 1), &at, &mut z);
-            }
-            let value = if let Some(delay) = acting.delay() {
-                interpolate(s.times[k] - delay)
-            } else if memory.is_empty() {
-                acting.value(&at, &z)
-            } else {
-                acting.remember(&at, &mut memory);
-                acting.recall(&at, &memory)
-            };
-            (value - y[k]) / s.noise
-        })
-        .collect()
-}

@@ -9,6 +9,7 @@ use mops_models::{Moment, WithEffects};
 use nalgebra::DMatrix;
 
 use crate::fit::{Fit, Point};
+use crate::subject::Series;
 
 /// A sample interval, or a part of it.
 struct Interval {
@@ -31,8 +32,12 @@ pub struct Trajectory {
     pub predicted: Vec<Vec<f64>>,
     /// Noise of each series.
     noise: Vec<f64>,
-    /// Row of each series in the outputs of the moments.
-    rows: Vec<usize>,
+    /// For each series, and each of its samples: slopes of the output by the states, then by the columns.
+    outputs: Vec<Vec<f64>>,
+    /// Number of states.
+    states: usize,
+    /// Number of columns: inputs, then forces.
+    columns: usize,
     /// Number of inputs.
     inputs: usize,
     /// Signs with which forces act forward.
@@ -72,8 +77,16 @@ impl Trajectory {
         let intervals =
             knots.windows(2).zip(moments.chunks(2)).map(|(ends, m)| interval(ends[1] - ends[0], m)).collect();
         let place = |t: f64| sampled.partition_point(|&s| s < t - 1e-9 * (1.0 + t.abs())) * parts;
-        let samples = p.series.iter().map(|s| s.times.iter().map(|&t| place(t)).collect()).collect();
-        let residuals = fit.residuals(piece, point, false).ok_or(Failure::Diverged(0.0))?.r;
+        let samples: Vec<Vec<usize>> = p.series.iter().map(|s| s.times.iter().map(|&t| place(t)).collect()).collect();
+        let row = |s: &Series| signals.iter().position(|&k| k == s.signal).expect("it is asked for");
+        let slopes = |(s, knots): (&Series, &Vec<usize>)| {
+            let row = row(s);
+            // What jumps at a sample has jumped when it is taken.
+            let at = knots.iter().map(|knot| &moments[(2 * knot).min(moments.len() - 1)]);
+            at.flat_map(|m| m.c.row(row).iter().chain(m.d.row(row).iter()).copied().collect::<Vec<f64>>()).collect()
+        };
+        let outputs = p.series.iter().zip(&samples).map(slopes).collect();
+        let residuals = fit.residuals(piece, point).ok_or(Failure::Diverged(0.0))?;
         let mut at = 0;
         let predicted = p.series.iter().map(|s| {
             let part = &residuals[at..at + s.times.len()];
@@ -95,11 +108,9 @@ impl Trajectory {
         Ok(Self {
             forward: forward.collect(),
             noise: p.series.iter().map(|s| s.noise).collect(),
-            rows: p
-                .series
-                .iter()
-                .map(|s| signals.iter().position(|&k| k == s.signal).expect("it is asked for"))
-                .collect(),
+            outputs,
+            states: moments.first().map_or(0, |m| m.x.len()),
+            columns: moments.first().map_or(0, |m| m.b.ncols()),
             moments,
             intervals,
             knots,
@@ -120,7 +131,38 @@ impl Trajectory {
 
     /// What a signal at the nodes, in a column (inputs, then forces), adds to the residuals.
     pub fn response(&self, column: usize, signal: &[f64]) -> Vec<f64> {
-        let n = self.moments.first().map_or(0, |m| m.x.len());
+        match self.states {
+            1 => self.response_of::<1>(column, signal),
+            2 => self.response_of::<2>(column, signal),
+            3 => self.response_of::<3>(column, signal),
+            4 => self.response_of::<4>(column, signal),
+            5 => self.response_of::<5>(column, signal),
+            6 => self.response_of::<6>(column, signal),
+            _ => self.response_of_many(column, signal),
+        }
+    }
+
+    /// The same for `N` states, which fit into registers: screening spends its time here.
+    fn response_of<const N: usize>(&self, column: usize, signal: &[f64]) -> Vec<f64> {
+        let mut states = vec![[0.0; N]; self.knots.len()];
+        // At rest until the signal begins.
+        let begin = signal.iter().position(|&f| f != 0.0).unwrap_or(signal.len()) / 2;
+        for (k, interval) in self.intervals.iter().enumerate().skip(begin) {
+            let (now, mut next) = (states[k], [0.0; N]);
+            for (gain, &f) in interval.gains.iter().zip(&signal[2 * k..2 * k + 2]) {
+                let gain = &gain.as_slice()[N * column..N * (column + 1)];
+                next.iter_mut().zip(gain).for_each(|(x, g)| *x += f * g);
+            }
+            for (slopes, x) in interval.transition.as_slice().chunks_exact(N).zip(now) {
+                next.iter_mut().zip(slopes).for_each(|(next, slope)| *next += slope * x);
+            }
+            states[k + 1] = next;
+        }
+        self.outputs(column, signal, |knot| &states[knot])
+    }
+
+    fn response_of_many(&self, column: usize, signal: &[f64]) -> Vec<f64> {
+        let n = self.states;
         // The states at the knots, one after the other; at rest until the signal begins.
         let mut states = vec![0.0; n * self.knots.len()];
         let begin = signal.iter().position(|&f| f != 0.0).unwrap_or(signal.len()) / 2;
@@ -134,17 +176,18 @@ impl Trajectory {
                 next.iter_mut().zip(slopes).for_each(|(next, slope)| *next += slope * x);
             }
         }
-        let mut residuals = Vec::new();
-        for ((samples, &row), noise) in self.samples.iter().zip(&self.rows).zip(&self.noise) {
-            residuals.extend(samples.iter().map(|&knot| {
-                // What jumps at a sample has jumped when it is taken.
+        self.outputs(column, signal, |knot| &states[n * knot..n * (knot + 1)])
+    }
+
+    /// The residuals of states at the knots, and of what a signal adds to the outputs itself.
+    fn outputs<'s>(&self, column: usize, signal: &[f64], states: impl Fn(usize) -> &'s [f64]) -> Vec<f64> {
+        let (n, row) = (self.states, self.states + self.columns);
+        let mut residuals = Vec::with_capacity(self.samples.iter().map(Vec::len).sum());
+        for ((samples, slopes), noise) in self.samples.iter().zip(&self.outputs).zip(&self.noise) {
+            residuals.extend(samples.iter().zip(slopes.chunks_exact(row.max(1))).map(|(&knot, slopes)| {
                 let node = (2 * knot).min(self.moments.len() - 1);
-                let m = &self.moments[node];
-                let mut y = 0.0;
-                for i in 0..n {
-                    y += m.c[(row, i)] * states[n * knot + i];
-                }
-                (y + m.d[(row, column)] * signal[node]) / noise
+                let y = slopes[..n].iter().zip(states(knot)).fold(0.0, |y, (c, x)| y + c * x);
+                (y + slopes[n + column] * signal[node]) / noise
             }));
         }
         residuals

@@ -104,7 +104,11 @@ impl Unknown {
 /// The absorbed directions as the columns of a matrix.
 pub fn basis(scene: &Scene) -> DMatrix<f64> {
     let rows = scene.residuals.len();
-    DMatrix::from_fn(rows, scene.basis.len(), |i, j| scene.basis[j][i])
+    let mut basis = DMatrix::zeros(rows, scene.basis.len());
+    for (mut column, q) in basis.column_iter_mut().zip(&scene.basis) {
+        column.rows_mut(q.begin, q.values.len()).copy_from_slice(&q.values);
+    }
+    basis
 }
 
 /// What a place looks like: at the nodes of the motion, or at the samples of a sensor.

@@ -5,10 +5,11 @@ use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Model, Scope, Strength};
 use mops_models::WithEffects;
+use nalgebra::DMatrix;
 
 use crate::base::globals;
 use crate::candidate::{Candidate, Sizes};
-use crate::fit::{Fit, Global, Piece, Point, Sets};
+use crate::fit::{Expected, Fit, Global, Piece, Point, Sets};
 use crate::subject::{Local, Subject};
 
 /// A candidate with strengths to start from.
@@ -22,6 +23,8 @@ pub struct Added {
     pub own: Vec<(usize, usize, f64)>,
     /// Typical sizes at its place.
     pub sizes: Sizes,
+    /// Turns the strengths into independent ones of variance 1, where something is expected of them.
+    pub expected: Option<Arc<DMatrix<f64>>>,
 }
 
 /// Where the strengths of an added effect stand among the parameters of the model.
@@ -83,8 +86,10 @@ pub fn problem<'a>(
         all[k].bounds = [tuners[k]; 2];
     }
     let mut values = tuners.to_vec();
+    let mut expected = Vec::new();
     for (a, &first) in added.iter().zip(&variant.first) {
         let effect = a.candidate.effect.as_ref();
+        expected.extend(a.expected.iter().map(|w| Expected { first: all.len(), whitening: Arc::clone(w) }));
         for (k, strength) in effect.strengths().iter().enumerate() {
             let (parameter, value) = (first + k, a.strengths[k]);
             let typical = a.sizes.of(strength.dimension);
@@ -121,6 +126,6 @@ pub fn problem<'a>(
         }
     }
     let model: Arc<dyn Model> = Arc::clone(&variant.model) as Arc<dyn Model>;
-    let fit = Fit { subject, model, globals: all, pieces, simulations };
+    let fit = Fit { subject, model, globals: all, pieces, expected, simulations };
     (fit, Point { globals: values, locals }, variant)
 }

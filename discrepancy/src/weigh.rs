@@ -21,13 +21,12 @@ impl Dispersion {
     /// Of what a model leaves.
     #[allow(clippy::cast_precision_loss)]
     pub fn of(trial: &Trial<'_>) -> Self {
-        let Some(all) = trial.fit.all(&trial.fitted.point, false) else { return Self::WHITE };
         let square = (trial.fitted.chi2 / trial.fitted.count.max(1) as f64).max(1.0);
         let (mut product, mut power, mut pairs) = (0.0, 0.0, 0.0);
-        for (piece, residuals) in trial.fit.pieces.iter().zip(&all) {
+        for (piece, residuals) in trial.fit.pieces.iter().zip(&trial.fitted.residuals) {
             let mut at = 0;
             for s in &piece.series {
-                let r = &residuals.r[at..at + s.times.len()];
+                let r = &residuals[at..at + s.times.len()];
                 at += s.times.len();
                 product += r.windows(2).map(|w| w[0] * w[1]).sum::<f64>();
                 power += r.iter().map(|r| r * r).sum::<f64>();

@@ -112,9 +112,9 @@ impl Scalar for f64 {
     }
 }
 
-/// Directions that one simulation carries: a compromise between many tuners and few. Every width is compiled for every
-/// model, which takes long, so that there is one.
-pub const DIRECTIONS: usize = 6;
+/// Directions that one simulation carries: a compromise between many tuners and few; with the value they are eight numbers,
+/// which fill the registers of processors. Every width is compiled for every model, which takes long, so that there is one.
+pub const DIRECTIONS: usize = 7;
 
 /// A number with the tangents that one simulation carries.
 pub type Along = Dual<DIRECTIONS>;

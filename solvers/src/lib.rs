@@ -19,6 +19,7 @@ pub mod pattern_search;
 mod penalty;
 mod population;
 mod ranking;
+mod rows;
 pub mod sqp;
 mod start;
 mod variation;

@@ -3,7 +3,8 @@
 use mops_core::{Objective, Oracle, Pareto, Shape, Usage};
 use nalgebra::DMatrix;
 
-use crate::epigraph::{Linear, Rows, dot, solve};
+use crate::active_set::dot;
+use crate::epigraph::{Linear, Rows, solve};
 
 /// Looks for a direction that lowers one row to be minimised and raises none, within the bounds and the active
 /// constraints. None: `certified-local`. One, that also holds a small step ahead: `no`. No slopes, or a direction that

@@ -4,7 +4,7 @@ use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Verdict};
 
 use super::tables::{number, table};
-use crate::diagnosis::words;
+use crate::diagnosis::{errors, words};
 use crate::report::significant;
 
 /// Effects of the ranking that are printed.
@@ -20,7 +20,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
         text += &plain(&format!("\ndeclared term taken away: `{}` {}\n", removed.term, words::at(&removed.place)));
     }
     if !diagnosis.before.is_empty() {
-        text += &format!("\n{}", errors(diagnosis));
+        text += &format!("\n{}", errors_table(diagnosis));
     }
     let told = diagnosis.found.iter().filter_map(words::confusable);
     let sentences: String = told.map(|sentence| format!("- {}\n", plain(&sentence))).collect();
@@ -87,31 +87,16 @@ fn role(role: Role) -> String {
     format!("{role:?}").to_lowercase()
 }
 
-fn errors(diagnosis: &Diagnosis) -> String {
+fn errors_table(diagnosis: &Diagnosis) -> String {
     let mut rows = Vec::new();
-    for before in &diagnosis.before {
-        let after = diagnosis.after.iter().find(|after| after.name == before.name).unwrap_or(before);
-        for (channel, error) in &before.channels {
-            let later = after.channels.iter().find(|(name, _)| name == channel).map_or(*error, |(_, error)| *error);
-            let prediction = diagnosis.predictions.iter().find(|p| p.experiment == before.name && p.signal == *channel);
-            let (noise, unit) = prediction.map_or((f64::NAN, ""), |p| (p.noise, p.unit.as_str()));
-            let raw = [*error, later, noise].map(|value| significant(value, 4));
-            let [now, then, noise_text] = raw;
-            rows.push(vec![
-                before.name.clone(),
-                role(before.role),
-                channel.clone(),
-                now,
-                then,
-                noise_text,
-                unit.to_owned(),
-                words::times(error / noise),
-                words::times(later / noise),
-            ]);
+    for line in errors::lines(diagnosis) {
+        let mut row = vec![line.experiment.name.clone(), role(line.experiment.role), line.label()];
+        if line.channel.is_some() {
+            row.extend(line.raw.map(|value| significant(value, 4)));
+            row.extend([significant(line.noise, 4), line.unit.to_owned()]);
         }
-        let mut row = vec![before.name.clone(), role(before.role), "together".to_owned()];
         row.resize(7, String::new());
-        row.extend([words::times(before.normalised), words::times(after.normalised)]);
+        row.extend(line.scaled.map(words::times));
         rows.push(row);
     }
     let header = ["experiment", "role", "channel", "before", "after", "noise", "unit", "before/noise", "after/noise"];

@@ -84,9 +84,18 @@ fn strengths(strengths: &[StrengthValue]) -> Value {
 
 /// Errors by experiment, and in each by channel.
 fn errors(errors: &[ExperimentError]) -> Value {
+    let by_channel = |channels: &[(String, f64)]| -> Map<String, Value> {
+        channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect()
+    };
     let error = |error: &ExperimentError| {
-        let channels: Map<_, _> = error.channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect();
-        (error.name.clone(), json!({ "role": error.role, "channels": channels, "normalised": error.normalised }))
+        let channels = by_channel(&error.channels);
+        let mut value = json!({ "role": error.role, "channels": channels, "normalised": error.normalised });
+        if let Some(w) = &error.in_windows {
+            let channels = by_channel(&w.channels);
+            value["windows"] =
+                json!({ "count": w.count, "length": w.length, "channels": channels, "normalised": w.normalised });
+        }
+        (error.name.clone(), value)
     };
     errors.iter().map(error).collect::<Map<_, _>>().into()
 }

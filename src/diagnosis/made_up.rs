@@ -46,6 +46,7 @@ fn error(name: &str, role: Role, [phi, theta, normalised]: [f64; 3]) -> Experime
         role,
         channels: vec![("phi".into(), phi), ("theta".into(), theta)],
         normalised,
+        in_windows: None,
     }
 }
 

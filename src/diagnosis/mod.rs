@@ -1,6 +1,7 @@
 //! What a diagnosis leaves behind beside its report: its block of `result.json`, predictions, the repaired model.
 
 mod block;
+pub(crate) mod errors;
 #[cfg(test)]
 pub(crate) mod made_up;
 mod predictions;

@@ -110,6 +110,7 @@ pub(crate) fn at(place: &str) -> String {
         Some(("extra_state", name)) => format!("in a further state at `{name}`"),
         Some(("actuator", name)) => format!("at the actuator `{name}`"),
         Some(("sensor", name)) => format!("at the sensor of `{name}`"),
+        _ if place.is_empty() => "somewhere".to_owned(),
         _ => format!("at `{place}`"),
     }
 }

@@ -41,6 +41,9 @@ pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
 
+/// The style sheet of all pages.
+pub(crate) const STYLE: &str = include_str!("style.css");
+
 /// Everything a report shows.
 pub struct Report<'a> {
     /// The result.

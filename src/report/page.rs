@@ -33,7 +33,7 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "mops " (outcome.mops) };
                 title { (outcome.study) ": " (task(outcome.task)) }
-                style { (PreEscaped(include_str!("style.css"))) }
+                style { (PreEscaped(super::STYLE)) }
             }
             body {
                 (header(report))

@@ -60,6 +60,7 @@ fn a_fall_of_the_sum_of_squares_is_worth_less_where_residuals_are_alike() {
                 model: trial.fit.model.clone(),
                 globals: trial.fit.globals.clone(),
                 pieces: trial.fit.pieces.clone(),
+                expected: Vec::new(),
                 simulations: trial.fit.simulations,
             };
             now - criterion(&Trial { added, windows: 1, fit, variant, fitted }, &dispersion)

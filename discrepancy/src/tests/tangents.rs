@@ -9,7 +9,7 @@ use mops_models::effects::effects;
 use crate::candidate::candidates;
 use crate::fit::dot;
 use crate::testing::{Record, fitted, subject};
-use crate::trace_of::{sizes, trace};
+use crate::trace_of::{View, sizes};
 use crate::variant::{Added, Variant};
 
 const PLANT: &str = r#"
@@ -48,12 +48,13 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
         }
         let Some(sizes) = sizes(&candidate.port, &variant.model, &fit.pieces, &scene.trajectories) else { continue };
         let Some(strengths) = sizes.combinations(effect.as_ref()).into_iter().next() else { continue };
-        let Some(screened) = trace(&candidate, &strengths, &variant.model, piece, &scene.trajectories[0]) else {
-            continue;
-        };
+        let view = View::new(&candidate, &variant.model, piece, &scene.trajectories[0]);
+        let Some(screened) = view.and_then(|view| view.trace(&strengths)) else { continue };
         let own = Vec::new();
-        let with =
-            Variant::new(&subject, &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, sizes }]);
+        let with = Variant::new(
+            &subject,
+            &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, sizes, expected: None }],
+        );
         let mut parameters = TRUTH.to_vec();
         parameters.extend(&strengths);
         parameters[TRUTH.len()] = 0.0;

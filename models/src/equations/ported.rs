@@ -1,14 +1,16 @@
 //! A model from text, opened at its ports.
 
-use mops_core::{Along, Failure, Open, Plant, Port, Scalar, Tolerance};
+use std::cell::RefCell;
 
-use super::bank::Large;
-use super::compiled::Compiled;
+use mops_core::{Along, Failure, Instant, Open, Plant, Port, Scalar, Tolerance};
+
+use super::Equations;
+use super::bank::{Bank, Large, Small};
+use super::compiled::{Compiled, Signal};
 use super::running::Running;
 use super::system::System;
-use super::{Equations, Many};
+use crate::kernel::Dynamics;
 use crate::kernel::drive::Drive;
-use crate::kernel::{Holds, Opened};
 
 impl Equations {
     fn opened(&self) -> &Compiled {
@@ -31,12 +33,21 @@ impl Equations {
         let model = self.opened();
         let ports = self.interface.ports.iter().filter(|port| matches!(port, Port::Process { .. })).count();
         let drives = vec![Drive::held(S::from(0.0)); self.definition.inputs.len() + ports];
-        let running: Running<'_, S, Vec<S>, Large<S>> = Running::new(model, drives, parameters, self.tolerance);
+        if model.layout.registers <= 256 {
+            self.ported::<S, Small<S>>(Running::new(model, drives, parameters, self.tolerance), parameters)
+        } else {
+            self.ported::<S, Large<S>>(Running::new(model, drives, parameters, self.tolerance), parameters)
+        }
+    }
+
+    fn ported<'a, S: Scalar, B: Bank<S> + 'a>(
+        &self,
+        running: Running<'a, S, Vec<S>, B>,
+        parameters: &[S],
+    ) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
         let start = self.start(&running, parameters);
         running.check_start(&start)?;
-        let signal =
-            |running: &Running<'_, S, Vec<S>, Many<S>>, signal: usize, t: f64, x: &Vec<S>| running.signal(signal, t, x);
-        Ok(Box::new(Opened::new(running, start, signal)))
+        Ok(Box::new(Ported { x: RefCell::new(start.clone()), start, running: RefCell::new(running) }))
     }
 }
 
@@ -54,8 +65,62 @@ impl Open for Equations {
     }
 }
 
-impl<S: Scalar> Holds<S> for Running<'_, S, Vec<S>, Many<S>> {
-    fn hold(&mut self, u: &[S], w: &[S]) {
-        self.hold_drives(u.iter().chain(w).copied());
+/// The equations as a plant. Rates, which are asked for most, take inputs and forces straight into their registers.
+struct Ported<'a, S, B> {
+    start: Vec<S>,
+    running: RefCell<Running<'a, S, Vec<S>, B>>,
+    /// A state to look at guards with.
+    x: RefCell<Vec<S>>,
+}
+
+impl<S: Scalar, B: Bank<S>> Ported<'_, S, B> {
+    fn hold(&self, at: &Instant<'_, S>) {
+        self.running.borrow_mut().hold_drives(at.u.iter().chain(at.w).copied());
+    }
+}
+
+impl<S: Scalar, B: Bank<S>> Plant<S> for Ported<'_, S, B> {
+    fn start(&self) -> Vec<S> {
+        self.start.clone()
+    }
+
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        self.running.borrow().open_rates(at, dx);
+    }
+
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        let model = self.running.borrow().model;
+        if let Signal::State(state) = &model.signals[signal] {
+            return at.x[*state];
+        }
+        self.hold(at);
+        self.running.borrow().signal(signal, at.t, at.x)
+    }
+
+    fn guards(&self) -> usize {
+        self.running.borrow().guards()
+    }
+
+    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+        self.hold(at);
+        let mut x = self.x.borrow_mut();
+        x.copy_from_slice(at.x);
+        self.running.borrow().guard(index, at.t, &x)
+    }
+
+    fn switch(&mut self, index: usize, at: &Instant<'_, S>, x: &mut [S]) -> &str {
+        self.hold(at);
+        let next = self.x.get_mut();
+        next.copy_from_slice(at.x);
+        let what = self.running.get_mut().switch(index, at.t, next);
+        x.copy_from_slice(next);
+        what
+    }
+
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.hold(at);
+        let x = self.x.get_mut();
+        x.copy_from_slice(at.x);
+        self.running.get_mut().pass_break(at.t, x);
     }
 }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::marker::PhantomData;
 
-use mops_core::{Dual, Failure, Scalar};
+use mops_core::{Dual, Failure, Instant, Scalar};
 
 use super::bank::{Bank, Large};
 use super::compiled::{Compiled, Signal};
@@ -89,6 +89,26 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         self.load(&mut bank, t, x);
         tape.run(&mut *bank);
         std::array::from_fn(|k| bank.get(tape.results[k]))
+    }
+
+    /// The derivative with inputs and forces from outside.
+    pub(super) fn open_rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let mut bank = self.bank.borrow_mut();
+        let bank = &mut *bank;
+        let layout = &self.model.layout;
+        for (i, &x) in at.x.iter().enumerate() {
+            bank.set(layout.state(i), x);
+        }
+        for (i, &value) in at.u.iter().chain(at.w).enumerate() {
+            // A drive that is held adds a slope of 0, which makes a negative zero positive.
+            bank.set(layout.input(i), value + 0.0);
+        }
+        bank.set(layout.time(), S::from(at.t));
+        let tape = &self.model.derivative;
+        tape.run(bank);
+        for (dx, &register) in dx.iter_mut().zip(&tape.results) {
+            *dx = bank.get(register);
+        }
     }
 
     /// Holds the inputs at these values.
@@ -256,6 +276,13 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                 self.armed[k] = (guard > 0.0 || self.rises(k, t, x), guard.min(0.0));
                 &happening.name
             }
+        }
+    }
+
+    fn shows(&self, signal: usize) -> Option<usize> {
+        match &self.model.signals[signal] {
+            Signal::State(state) => Some(*state),
+            _ => None,
         }
     }
 

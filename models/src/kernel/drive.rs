@@ -13,6 +13,8 @@ pub struct Drive<'a, S = f64> {
     since: f64,
     value: S,
     slope: f64,
+    /// The first of the samples after `since`.
+    after: usize,
     /// What goes on top of the value where the input is a sine.
     sine: Option<Sine>,
 }
@@ -37,14 +39,14 @@ impl Sine {
 impl<S: Scalar> Drive<'_, S> {
     /// A drive that stays at a value.
     pub fn held(value: S) -> Self {
-        Self { input: None, since: 0.0, value, slope: 0.0, sine: None }
+        Self { input: None, since: 0.0, value, slope: 0.0, after: 0, sine: None }
     }
 }
 
 impl<'a, S: Scalar> Drive<'a, S> {
     /// A drive at time 0; nothing drives where `input` is absent.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, sine: None };
+        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, sine: None };
         drive.pass_break(0.0);
         drive
     }
@@ -63,9 +65,33 @@ impl<'a, S: Scalar> Drive<'a, S> {
         self.slope
     }
 
-    /// The next time after `t` at which the value or its slope jumps.
+    /// The next time after `t` at which the value or its slope jumps; samples that are held and repeat themselves do not.
     pub fn next_break(&self, t: f64) -> f64 {
-        self.input.map_or(f64::INFINITY, |input| input.next_break(t))
+        let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
+        let mut after = self.first_after(times, t);
+        while after > 0 && after < times.len() && values[after] == values[after - 1] {
+            after += 1;
+        }
+        times.get(after).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The same with all samples.
+    pub fn next_sample(&self, t: f64) -> f64 {
+        match self.input {
+            Some(Input::Sampled { times, .. }) => {
+                times.get(self.first_after(times, t)).copied().unwrap_or(f64::INFINITY)
+            }
+            Some(input) => input.next_break(t),
+            None => f64::INFINITY,
+        }
+    }
+
+    /// The first sample after `t`, looked for near where the drive is.
+    fn first_after(&self, times: &[f64], t: f64) -> usize {
+        const NEAR: usize = 3;
+        let near = self.after..times.len().min(self.after + NEAR);
+        let behind = self.after == 0 || times.get(self.after - 1).is_some_and(|&before| before <= t);
+        near.into_iter().find(|&k| behind && times[k] > t).unwrap_or_else(|| times.partition_point(|&time| time <= t))
     }
 
     /// A sixteenth of the period of a sine, s; infinity for inputs that are straight between their breaks.
@@ -87,13 +113,18 @@ impl<'a, S: Scalar> Drive<'a, S> {
                 let angular = std::f64::consts::TAU * frequency;
                 self.sine = Some(Sine { amplitude: *amplitude, angular, phase: *phase });
             }
-            Input::Sampled { hold: Hold::First, .. } => {
+            Input::Sampled { times, hold: Hold::First, .. } => {
+                self.after = self.first_after(times, t);
                 let value = input.at(t);
                 self.value = S::from(value);
                 let next = input.next_break(t);
                 if next.is_finite() {
                     self.slope = (input.at(next) - value) / (next - t);
                 }
+            }
+            Input::Sampled { times, values, hold: Hold::Zero } => {
+                self.after = self.first_after(times, t);
+                self.value = S::from(values[self.after.saturating_sub(1)]);
             }
             _ => self.value = S::from(input.at(t)),
         }

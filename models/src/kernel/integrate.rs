@@ -32,6 +32,19 @@ impl<X> Step<X> {
         self.at(s * (self.taken / self.length), x);
     }
 
+    /// One component of [`Step::state`].
+    #[inline]
+    pub(super) fn component<S: Scalar>(&self, s: f64, i: usize) -> S
+    where
+        X: AsRef<[S]>,
+    {
+        let theta = s * (self.taken / self.length);
+        let back = 1.0 - theta;
+        let [r0, r1, r2, r3, r4] = &self.dense;
+        let (r0, r1, r2, r3, r4) = (r0.as_ref()[i], r1.as_ref()[i], r2.as_ref()[i], r3.as_ref()[i], r4.as_ref()[i]);
+        r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
+    }
+
     /// The state at `start + theta length`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
     #[inline]
     pub(super) fn at<S: Scalar>(&self, theta: f64, x: &mut X)

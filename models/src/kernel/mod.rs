@@ -52,6 +52,11 @@ pub trait Dynamics<S: Scalar> {
         ""
     }
 
+    /// The state that a signal shows as it is; `None` where it must be computed.
+    fn shows(&self, _signal: usize) -> Option<usize> {
+        None
+    }
+
     /// The next time after `t` at which an input jumps or a sample is taken; infinity if never.
     fn next_break(&self, _t: f64) -> f64 {
         f64::INFINITY

@@ -29,7 +29,7 @@ pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure
     model.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
 }
 
-/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: six directions in one simulation.
+/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: [`DIRECTIONS`] directions in one simulation.
 ///
 /// # Errors
 /// The failure of the simulation.
@@ -78,15 +78,20 @@ struct Recorder<'a, X, F> {
 
 impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D> for Recorder<'_, D::State, F> {
     fn step(&mut self, step: &Step<D::State>, dynamics: &D) {
-        for (state, s) in self.states.iter_mut().zip(Trace::NODES) {
-            step.state(s, state);
+        if self.signals.iter().any(|(signal, _)| dynamics.shows(*signal).is_none()) {
+            for (state, s) in self.states.iter_mut().zip(Trace::NODES) {
+                step.state(s, state);
+            }
         }
         let end = step.start + step.taken;
         for (i, (signal, _)) in self.signals.iter().enumerate() {
-            let values: [S; 5] = std::array::from_fn(|node| {
-                let t = step.start + Trace::NODES[node] * step.taken;
-                (self.output)(dynamics, *signal, t, &self.states[node])
-            });
+            let values: [S; 5] = match dynamics.shows(*signal) {
+                Some(state) => std::array::from_fn(|node| step.component(Trace::NODES[node], state)),
+                None => std::array::from_fn(|node| {
+                    let t = step.start + Trace::NODES[node] * step.taken;
+                    (self.output)(dynamics, *signal, t, &self.states[node])
+                }),
+            };
             self.traces[0][i].push(end, values.map(Scalar::value));
             for direction in 0..S::DIRECTIONS {
                 self.traces[1 + direction][i].push(end, std::array::from_fn(|node| values[node].tangents()[direction]));

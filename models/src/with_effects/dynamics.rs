@@ -71,9 +71,10 @@ impl<S: Scalar> Command<'_, S> {
         }
     }
 
-    fn next_break(&self, t: f64) -> f64 {
+    fn next_break(&self, t: f64, smooth: bool) -> f64 {
         let delay = self.delay.map_or(0.0, Scalar::value);
-        self.drive.next_break(if delay > 0.0 { self.out(t) } else { t }) + delay
+        let out = if delay > 0.0 { self.out(t) } else { t };
+        delay + if smooth { self.drive.next_break(out) } else { self.drive.next_sample(out) }
     }
 }
 
@@ -90,6 +91,10 @@ pub(super) struct Driven<'a, S> {
     longest_step: f64,
     /// For each signal the state that it shows as it is.
     shows: Vec<Option<usize>>,
+    /// Whether no effect sits at a sensor.
+    smooth: bool,
+    /// The same of those that no effect changes.
+    untouched: Vec<Option<usize>>,
     /// What a clock shows at time 0, s.
     begins: f64,
     started: bool,
@@ -127,6 +132,10 @@ impl<'a, S: Opening> Driven<'a, S> {
             let all = of.states.len() == own;
             of.states.iter().position(|state| all && state.signal.as_ref() == Some(&signal.name))
         };
+        let shows: Vec<Option<usize>> = of.signals.iter().map(shown).collect();
+        let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
+        let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
+        let smooth = !actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
         let begins = job.case.begins;
         let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
         let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
@@ -142,7 +151,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
-            shows: of.signals.iter().map(shown).collect(),
+            shows,
+            smooth,
+            untouched,
             begins,
             started: false,
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
@@ -464,8 +475,14 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own])
     }
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        self.untouched[signal]
+    }
+
     fn next_break(&self, t: f64) -> f64 {
-        let inputs = self.commands.iter().map(|command| command.next_break(t)).fold(f64::INFINITY, f64::min);
+        // What an effect makes of a signal may be rough: it is resolved where samples are taken.
+        let smooth = self.smooth;
+        let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
         self.breaks.iter().copied().find(|&at| at > t).map_or(inputs, |at| at.min(inputs))
     }
 

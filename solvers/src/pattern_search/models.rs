@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::epigraph::dot;
+use crate::active_set::dot;
 
 /// A quadratic `c + g y + y'H y / 2` of a row.
 #[derive(Debug, Clone)]

@@ -9,12 +9,11 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Debug)]
 pub(super) struct Hessian {
     matrix: DMatrix<f64>,
+    /// Curvature before anything is known.
+    first: f64,
     /// Whether it has seen a step yet.
     learned: bool,
 }
-
-/// Curvature before anything is known, where the objective has a slope of about 1.
-const FIRST: f64 = 1.0;
 
 /// Curvature along a step that is left at least, as a share of what was there. N.B.: Powell takes 0.2.
 const DAMPED: f64 = 0.1;
@@ -23,8 +22,11 @@ const DAMPED: f64 = 0.1;
 const LARGEST: f64 = 1e7;
 
 impl Hessian {
-    pub fn new(n: usize) -> Self {
-        Self { matrix: DMatrix::identity(n, n) * FIRST, learned: false }
+    /// Before anything is known, where the steepest objective has a slope of about 1: one objective alone is followed for
+    /// about a tenth of the box; several hold the step where they meet.
+    pub fn new(n: usize, objectives: usize) -> Self {
+        let first = if objectives > 1 { 1.0 } else { 10.0 };
+        Self { matrix: DMatrix::identity(n, n) * first, first, learned: false }
     }
 
     pub fn matrix(&self) -> &DMatrix<f64> {
@@ -38,7 +40,9 @@ impl Hessian {
 
     /// Forgets all it has seen.
     pub fn forget(&mut self) {
-        *self = Self::new(self.matrix.nrows());
+        self.matrix.fill_with_identity();
+        self.matrix *= self.first;
+        self.learned = false;
     }
 
     /// `1/2 d'Bd`.
@@ -55,7 +59,7 @@ impl Hessian {
             return;
         }
         if !self.learned {
-            let scale = if s.dot(y) > 0.0 { y.norm_squared() / s.dot(y) } else { FIRST };
+            let scale = if s.dot(y) > 0.0 { y.norm_squared() / s.dot(y) } else { self.first };
             self.matrix = DMatrix::identity(s.len(), s.len()) * scale.clamp(1e-2, 1e4);
             self.learned = true;
         }

@@ -41,7 +41,7 @@ pub struct SqpOptions {
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-10, radius: 0.05, max_iterations: 300 }
+        Self { tolerance: 1e-12, radius: 1.0, max_iterations: 300 }
     }
 }
 
@@ -63,7 +63,12 @@ struct Sqp {
 const SMALLEST_RADIUS: f64 = 1e-9;
 
 /// Slope of the Lagrangian that counts as none, where the steepest row has one of about 1 at the start.
-const STATIONARY: f64 = 1e-7;
+const STATIONARY: f64 = 1e-9;
+
+/// Change of objective and violation that is none, relative to 1 + |objective|; and so many steps of that kind in a row are
+/// enough: what is left is the noise of simulations.
+const IDLE: f64 = 1e-10;
+const MOST_IDLE: usize = 8;
 
 /// Share of the promise that a step must keep.
 const ENOUGH: f64 = 1e-4;
@@ -110,13 +115,20 @@ impl Solver for Sqp {
         let merit = state.merit(&state.rows);
         let promised =
             merit - (direction.level + state.penalty * direction.violation + state.hessian.half(&direction.step));
-        let size = state.scaling.objective() + state.rows.objective().abs();
+        let size = state.scaling.objective().min(1.0) + state.rows.objective().abs();
         let tolerance = self.options.tolerance * size;
         if promised <= tolerance || state.radius < SMALLEST_RADIUS {
             return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= tolerance));
         }
+        let before = [state.rows.objective(), state.rows.violation()];
         let tried = state.try_corrected(oracle, &direction, merit, promised)?;
         state.judge(oracle, tried, &direction, merit, promised)?;
+        let change = (before[0] - state.rows.objective()).abs().max((before[1] - state.rows.violation()).abs());
+        state.idle = if change <= IDLE * size { state.idle + 1 } else { 0 };
+        if state.idle >= MOST_IDLE {
+            state.idle = 0;
+            return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= 1e4 * tolerance));
+        }
         Ok(Progress::Continue)
     }
 }
@@ -131,7 +143,7 @@ impl State {
             self.fresh_at = Some(merit);
             self.bundle.clear();
             self.hessian.forget();
-            self.radius = 0.1 * radius;
+            self.radius = 0.01 * radius;
             return Progress::Continue;
         }
         if optimal && self.rows.violation() <= 10.0 * SATISFIED { Progress::Converged } else { Progress::Stalled }
@@ -167,10 +179,14 @@ impl State {
     ) -> Result<(), Halt> {
         let length = direction.step.iter().fold(0.0_f64, |a, d| a.max(d.abs()));
         let achieved = tried.as_ref().map_or(f64::NEG_INFINITY, |(_, rows)| merit - self.merit(rows));
-        // A step may also be measured from the worse of the two iterates before: the path along a curved constraint is not
-        // held up by a merit that rises a little.
+        // A step that is better in objective or violation may also be measured from the worst of the two iterates before:
+        // the path along a curved constraint is not held up by a merit that rises a little.
         let before = self.reference() - merit;
-        let ratio = (achieved / promised).max((achieved + before) / (promised + before));
+        let trades = tried.as_ref().is_some_and(|(_, rows)| {
+            rows.objective() < self.rows.objective() || rows.violation() < self.rows.violation()
+        });
+        let relaxed = if trades { (achieved + before) / (promised + before) } else { f64::NEG_INFINITY };
+        let ratio = (achieved / promised).max(relaxed);
         if ratio < 0.25 {
             // Where the parabola through both values, with the slope here, has its minimum.
             let slope = promised + self.hessian.half(&direction.step);
@@ -206,12 +222,12 @@ impl State {
 /// A step shorter than this that fails has met a kink, if the slopes say so: smooth rows are well described by them there.
 const KINK: f64 = 0.02;
 
-/// Whether a slope changes by as much as a third of the steepest.
+/// Whether a slope changes by as much as a tenth of the steepest.
 fn turns(before: &Rows, after: &Rows) -> bool {
     let pairs = |rows: fn(&Rows) -> &Vec<crate::epigraph::Linear>| rows(before).iter().zip(rows(after));
     let all = pairs(|rows| &rows.objectives).chain(pairs(|rows| &rows.inequalities));
     all.into_iter().any(|(a, b)| {
         let size = a.slope.iter().chain(&b.slope).fold(0.0_f64, |most, s| most.max(s.abs()));
-        a.slope.iter().zip(&b.slope).any(|(a, b)| (a - b).abs() > 0.33 * size)
+        a.slope.iter().zip(&b.slope).any(|(a, b)| (a - b).abs() > 0.1 * size)
     })
 }

@@ -15,7 +15,7 @@ pub(super) struct Scaling {
 impl Scaling {
     pub fn of(rows: &Rows) -> Self {
         let slope = rows.objectives.iter().map(steepest).fold(0.0, f64::max);
-        let usable = slope > 1e-12 && slope.is_finite();
+        let usable = slope > 1e-100 && slope.is_finite();
         Self {
             objective: if usable { 1.0 / slope } else { 1.0 },
             inequalities: rows.inequalities.iter().map(|row| shrink(steepest(row))).collect(),

@@ -24,6 +24,8 @@ pub(super) struct State {
     pub iterations: usize,
     /// Steps in a row that brought nothing.
     pub rejected: usize,
+    /// Steps in a row that changed almost nothing.
+    pub idle: usize,
     /// Objective and violation of the two iterates before.
     before: [Option<[f64; 2]>; 2],
     /// Merit at which the memory was last thrown away.
@@ -39,16 +41,18 @@ impl State {
         let n = at.at.point.len();
         let rows = Rows::of(shape, &at);
         let scaling = Scaling::of(&rows);
+        let hessian = Hessian::new(n, rows.objectives.len());
         Self {
             rows: scaling.apply(rows),
             scaling,
             bundle: Bundle::default(),
             at,
-            hessian: Hessian::new(n),
+            hessian,
             radius,
             penalty: 10.0,
             iterations: 0,
             rejected: 0,
+            idle: 0,
             before: [None; 2],
             fresh_at: None,
             subproblem: Subproblem::default(),
@@ -73,16 +77,15 @@ impl State {
 
     /// The step of the subproblem; the penalty grows until the violation falls as far as the trust region allows.
     pub fn direction(&mut self) -> Option<Direction> {
-        let rows = self.rows.clone();
-        let violation = rows.violation();
-        let mut direction = self.solve(&rows, self.penalty)?;
+        let violation = self.rows.violation();
+        let mut direction = self.solve(None, self.penalty)?;
         if direction.violation > SATISFIED {
             // What can be reached if nothing but the constraints counts.
-            let least = self.solve(&rows, LARGEST_PENALTY)?.violation;
+            let least = self.solve(None, LARGEST_PENALTY)?.violation;
             let wanted = least + 0.1 * (violation - least).max(0.0) + SATISFIED;
             while direction.violation > wanted && self.penalty < LARGEST_PENALTY {
                 self.penalty *= 10.0;
-                direction = self.solve(&rows, self.penalty)?;
+                direction = self.solve(None, self.penalty)?;
             }
         }
         // Exactness: the penalty must exceed the sum of the multipliers.
@@ -96,19 +99,22 @@ impl State {
     /// The step to where the same slopes lead from the values at a point that was tried.
     pub fn correction(&mut self, tried: &Rows, step: &[f64]) -> Option<Direction> {
         let corrected = self.rows.corrected(tried, step);
-        self.solve(&corrected, self.penalty)
+        self.solve(Some(&corrected), self.penalty)
     }
 
-    fn solve(&mut self, rows: &Rows, penalty: f64) -> Option<Direction> {
-        let here = &self.at.at.point;
-        let low: Vec<f64> = here.iter().map(|u| (-u).max(-self.radius)).collect();
-        let high: Vec<f64> = here.iter().map(|u| (1.0 - u).min(self.radius)).collect();
-        if self.bundle.is_empty() {
-            return self.subproblem.solve(rows, self.hessian.matrix(), &low, &high, penalty);
+    /// The step for the rows here, or for others in their place.
+    fn solve(&mut self, others: Option<&Rows>, penalty: f64) -> Option<Direction> {
+        let Self { at, rows, bundle, hessian, subproblem, radius, .. } = self;
+        let here = &at.at.point;
+        let low: Vec<f64> = here.iter().map(|u| (-u).max(-*radius)).collect();
+        let high: Vec<f64> = here.iter().map(|u| (1.0 - u).min(*radius)).collect();
+        let rows = others.unwrap_or(rows);
+        if bundle.is_empty() {
+            return subproblem.solve(rows, hessian.matrix(), &low, &high, penalty);
         }
         let mut all = rows.clone();
-        self.bundle.add_to(&mut all, here);
-        self.subproblem.solve(&all, self.hessian.matrix(), &low, &high, penalty)
+        bundle.add_to(&mut all, here);
+        subproblem.solve(&all, hessian.matrix(), &low, &high, penalty)
     }
 
     pub fn rows_of(&self, shape: &Shape, at: &Linearisation) -> Rows {

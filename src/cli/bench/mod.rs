@@ -1,6 +1,7 @@
-//! `mops bench diagnosis`: how well missing effects are found, over simulated experiments or a folder of cases.
+//! `mops bench`: how well missing effects are found, over simulated experiments or a folder of cases; how well solvers do.
 
 mod folder;
+mod suite;
 mod tables;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ enum What {
     /// effects at drawn places, of a strength at which the refitted base model has the error asked for, in units of the
     /// noise. Ctrl-C ends the benchmark with what it has.
     Diagnosis(Diagnosis),
+    #[command(flatten)]
+    Suite(suite::Chosen),
 }
 
 #[derive(Args)]
@@ -44,10 +47,10 @@ struct Diagnosis {
     /// Cases that lack what no catalogue has.
     #[arg(long, default_value_t = 20)]
     outside: usize,
-    /// Plants; all where absent.
+    /// Plants, separated by commas; all where absent.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
-    /// Effects, as the test bed calls them; all where absent.
+    /// Effects, as the test bed calls them, separated by commas; all where absent.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     effects: Vec<String>,
     /// Errors of the refitted base model, in units of the noise.
@@ -84,7 +87,10 @@ enum Rival {
 }
 
 pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let What::Diagnosis(arguments) = &arguments.what;
+    let arguments = match &arguments.what {
+        What::Diagnosis(arguments) => arguments,
+        What::Suite(chosen) => return suite::bench(catalogue, chosen),
+    };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let against = arguments.against.is_some();

@@ -1,50 +1,13 @@
 //! The table of errors before and after, with bars in units of the noise.
 
 use maud::{Markup, html};
-use mops_discrepancy::{Diagnosis, ExperimentError};
+use mops_discrepancy::Diagnosis;
 
 use super::super::figures::role_name;
 use super::super::numbers::{number, significant};
 use super::super::page::scrolling;
+use crate::diagnosis::errors::lines;
 use crate::diagnosis::words::times;
-
-/// Error of one channel, or of a whole experiment, in units of the noise; raw values where they have a unit.
-struct Line<'a> {
-    experiment: &'a ExperimentError,
-    /// `None`: all channels together.
-    channel: Option<&'a str>,
-    /// In units of the noise, before and after.
-    scaled: [f64; 2],
-    /// In the unit of the channel, before and after.
-    raw: [f64; 2],
-    noise: f64,
-    unit: &'a str,
-}
-
-fn lines(diagnosis: &Diagnosis) -> Vec<Line<'_>> {
-    let mut lines = Vec::new();
-    for before in &diagnosis.before {
-        let after = diagnosis.after.iter().find(|after| after.name == before.name).unwrap_or(before);
-        for (channel, error) in &before.channels {
-            let later = after.channels.iter().find(|(name, _)| name == channel).map_or(*error, |(_, error)| *error);
-            let prediction = diagnosis.predictions.iter().find(|p| p.experiment == before.name && p.signal == *channel);
-            let (noise, unit) = prediction.map_or((f64::NAN, ""), |p| (p.noise, p.unit.as_str()));
-            lines.push(Line {
-                experiment: before,
-                channel: Some(channel),
-                scaled: [error / noise, later / noise],
-                raw: [*error, later],
-                noise,
-                unit,
-            });
-        }
-        if before.channels.len() > 1 {
-            let scaled = [before.normalised, after.normalised];
-            lines.push(Line { experiment: before, channel: None, scaled, raw: scaled, noise: f64::NAN, unit: "" });
-        }
-    }
-    lines
-}
 
 /// All experiments and channels.
 pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
@@ -76,7 +39,7 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
                 @for line in &lines {
                     tr {
                         th scope="row" { (line.experiment.name) small { (role_name(line.experiment.role)) } }
-                        td { @if let Some(channel) = line.channel { (channel) } @else { strong { "together" } } }
+                        td { @if line.channel.is_some() { (line.label()) } @else { strong { (line.label()) } } }
                         @if !same { td class="number" { (times(line.scaled[0])) } }
                         td class="number" { strong { (times(line.scaled[1])) } }
                         td { (bars(line.scaled, largest, same)) }

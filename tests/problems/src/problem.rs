@@ -102,13 +102,15 @@ impl Problem {
         self.start.len()
     }
 
-    /// The known local minimum nearest to an objective reached; `None` where none is known. Below the smallest one, that.
+    /// The known minimum that an objective belongs to: a local one where it is that to 1e-4, relative to the larger of 1 and
+    /// its size; else the smallest. `None` where none is known.
     pub fn nearest_minimum(&self, objective: f64) -> Option<f64> {
         let Answer::Minima(minima) = &self.answer else { return None };
-        minima.iter().copied().min_by(|a, b| (a - objective).abs().total_cmp(&(b - objective).abs()))
+        let is = |minimum: &&f64| (objective - **minimum).abs() <= 1e-4 * minimum.abs().max(1.0);
+        minima.iter().find(is).or(minima.first()).copied()
     }
 
-    /// How far an objective lies above the nearest known minimum, relative to the larger of 1 and its size; negative below.
+    /// How far an objective lies above the minimum it belongs to, relative to the larger of 1 and its size; negative below.
     pub fn gap(&self, objective: f64) -> Option<f64> {
         self.nearest_minimum(objective).map(|minimum| (objective - minimum) / minimum.abs().max(1.0))
     }

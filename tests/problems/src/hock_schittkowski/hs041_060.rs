@@ -40,7 +40,11 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
             &[[0.0, 1.0], POSITIVE, POSITIVE, [0.0, 1.0], POSITIVE, POSITIVE],
             hs(55, &[1.0, 2.0, 0.0, 0.0, 0.0, 2.0], [0, 6], [19.0 / 3.0, 20.0 / 3.0], Functions::of(hs55, hs55)),
         ),
-        hs(56, &[1.0, 1.0, 1.0, a, a, a, b], [0, 4], -3.456, Functions::of(hs56, hs56)),
+        // One period of the angles.
+        within(
+            &[[[-9.0, 11.0]; 3].to_vec(), vec![[-1.6, 1.6]; 4]].concat(),
+            hs(56, &[1.0, 1.0, 1.0, a, a, a, b], [0, 4], -3.456, Functions::of(hs56, hs56)),
+        ),
         within(
             &[[0.0, 75.0], [0.0, 65.0]],
             hs(59, &[90.0, 10.0], [3, 0], [-7.8027894, -6.7495053], Functions::of(hs59, hs59)),

@@ -17,11 +17,11 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
         )),
         squares(within(
             &[[0.4, f64::INFINITY], [-4.0, f64::INFINITY]],
-            hs(57, &[0.42, 5.0], [1, 0], [0.02845966972, 0.03064630], Functions::of(hs57, hs57)),
+            hs(57, &[0.42, 5.0], [1, 0], [0.02845966972, 0.03064627605], Functions::of(hs57, hs57)),
         )),
         squares(within(
             &[[1e-5, 100.0], [1e-5, 100.0], [1e-5, 1.0], [1e-5, 100.0]],
-            hs(70, &[2.0, 4.0, 0.04, 2.0], [1, 0], 0.00749846, Functions::of(hs70, hs70)),
+            hs(70, &[2.0, 4.0, 0.04, 2.0], [1, 0], 0.0074984636, Functions::of(hs70, hs70)),
         )),
         within(
             &[
@@ -90,18 +90,21 @@ fn hs57<S: Scalar>(x: &[S]) -> Vec<S> {
     rows
 }
 
-/// Two gamma densities through 19 concentrations.
+/// Two gamma densities through 19 concentrations. N.B.: the optimum in the book belongs to Stirling's factor in the
+/// denominator and 7.658 throughout; the formula printed there has other signs and digits.
 fn hs70<S: Scalar>(x: &[S]) -> Vec<S> {
     const Y: [f64; 19] = [
         0.00189, 0.1038, 0.268, 0.506, 0.577, 0.604, 0.725, 0.898, 0.947, 0.845, 0.702, 0.528, 0.385, 0.257, 0.159,
         0.0869, 0.0453, 0.01509, 0.00189,
     ];
     let b = x[2] + (-x[2] + 1.0) * x[3];
+    // 2 pi to the digits of the book.
+    #[allow(clippy::approx_constant)]
     let density = |weight: S, shape: S, rate: S, time: f64| {
         let t = time / 7.658;
         let stirling = c::<S>(1.0) + c::<S>(1.0) / (shape * 12.0);
         let scale = power(rate, shape) * (shape / 6.2832).sqrt() * power(c(t), shape - 1.0);
-        stirling * weight * scale * (shape - rate * shape * t).exp()
+        weight / stirling * scale * (shape - rate * shape * t).exp()
     };
     let residual = |(i, y): (u32, &f64)| {
         let time = if i == 0 { 0.1 } else { f64::from(i) };

@@ -15,7 +15,7 @@ pub(super) fn problems() -> Vec<Problem> {
         Problem::new("OET5", &[1.0; 4], 0.2635973497e-2, Functions::of(oet5, oet5)),
         Problem::new("OET6", &[1.0, 1.0, -3.0, -1.0], 0.2016075379e-2, Functions::of(oet6, oet6)),
         Problem {
-            reach: 400.0,
+            reach: 100.0,
             accuracy: Some(1e-6),
             ..Problem::new("GAMMA", &[1.0, 1.0, 10.0, 1.0], 0.1198679749e-6, Functions::of(gamma, gamma))
         },

@@ -1,0 +1,208 @@
+//! The account of a diagnosis: candidates by probability, what is said of each effect found, how the parameters moved.
+
+use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue};
+use crate::fit::dot;
+use crate::plan::separating;
+use crate::repaired::Calibrated;
+use crate::screen::Screened;
+use crate::search::{Round, Trial};
+use crate::subject::Subject;
+use crate::weigh::{Dispersion, criterion, probabilities};
+
+/// Candidates by probability: those found first, then what else was fitted in each round.
+pub fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
+    let mut ranked: Vec<Ranked> = Vec::new();
+    let mut seen: Vec<(String, String)> = Vec::new();
+    let is_added =
+        |t: &Trial<'_>| t.added.last().is_some_and(|a| last.added.iter().any(|b| a.candidate.is(&b.candidate)));
+    for round in rounds {
+        let Some(best) = round.trials.first() else { continue };
+        // What was tried after the last effect is told by chance, and says nothing.
+        let accepted = round.trials.iter().any(is_added);
+        if !accepted && !last.added.is_empty() {
+            continue;
+        }
+        let dispersion = Dispersion::of(best);
+        let mut criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+        if !accepted {
+            // Nothing at all is a rival too, beforehand as likely as all candidates together.
+            #[allow(clippy::cast_precision_loss)]
+            let candidates = round.screened.len().max(1) as f64;
+            criteria.push(round.before / dispersion.weight() - 2.0 * candidates.ln());
+        }
+        let probabilities = probabilities(&criteria);
+        for (trial, probability) in round.trials.iter().zip(probabilities) {
+            let Some(a) = trial.added.last() else { continue };
+            let key = (a.candidate.effect.name().to_owned(), a.candidate.place());
+            if seen.contains(&key) {
+                continue;
+            }
+            seen.push(key.clone());
+            let screened = round.screened.iter().find(|s| s.added.candidate.is(&a.candidate));
+            let parameters = &mops_core::Model::interface(trial.variant.model.as_ref()).parameters;
+            let first = trial.variant.first[trial.added.len() - 1];
+            let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
+                name: s.name.to_owned(),
+                value: a.strengths[k],
+                unit: a.candidate.unit(s, &parameters[first + k].variable.unit),
+                std_error: None,
+                interval95: None,
+            });
+            ranked.push(Ranked {
+                effect: key.0,
+                place: key.1,
+                class: a.candidate.effect.class().name().to_owned(),
+                probability,
+                bic_gain: (round.before - criterion(trial, &Dispersion::WHITE)) / dispersion.weight(),
+                strengths: strengths.collect(),
+                absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
+                normalised: [Some(trial.fitted.normalised()), None],
+                fitted: true,
+            });
+        }
+    }
+    let is_found =
+        |r: &Ranked| last.added.iter().any(|a| a.candidate.effect.name() == r.effect && a.candidate.place() == r.place);
+    let (mut found, mut others): (Vec<Ranked>, Vec<Ranked>) = ranked.into_iter().partition(is_found);
+    others.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    found.append(&mut others);
+    found
+}
+
+/// What is said of an effect that was added.
+pub fn found(
+    index: usize,
+    last: &Trial<'_>,
+    after: &Calibrated,
+    rounds: &[Round<'_>],
+    ranking: &[Ranked],
+    dispersion: &Dispersion,
+) -> Found {
+    let a = &last.added[index];
+    let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
+    let own = ranking.iter().find(|r| r.effect == effect.name() && r.place == place);
+    let round = rounds
+        .iter()
+        .find(|round| round.trials.first().and_then(|t| t.added.last()).is_some_and(|b| b.candidate.is(&a.candidate)));
+    let mut rivals = Vec::new();
+    if let Some(round) = round {
+        let best = &round.trials[0];
+        let of = Dispersion::of(best);
+        let least = criterion(best, &of);
+        let screened = |t: &Trial<'_>| -> Option<&Screened> {
+            let last = t.added.last()?;
+            round.screened.iter().find(|s| s.added.candidate.is(&last.candidate))
+        };
+        let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &of)).collect();
+        let shares = probabilities(&criteria);
+        for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
+            let Some(b) = trial.added.last().filter(|_| value - least < 6.0) else { continue };
+            let likeness = match (screened(best), screened(trial)) {
+                (Some(x), Some(y)) => dot(&x.direction, &y.direction).abs(),
+                _ => f64::NAN,
+            };
+            rivals.push(Rival {
+                effect: b.candidate.effect.name().to_owned(),
+                place: b.candidate.place(),
+                probability,
+                bic_behind: value - least,
+                likeness,
+            });
+        }
+    }
+    let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
+    Found {
+        effect: effect.name().to_owned(),
+        name: format!("{tail}-{}", effect.name()),
+        companion: a.candidate.companion.as_ref().map(ToString::to_string),
+        class: effect.class().name().to_owned(),
+        formula: effect.formula().to_owned(),
+        strengths: after.strengths(index, &last.variant, dispersion.repeats),
+        probability: own.map_or(1.0, |r| r.probability),
+        bic_gain: own.map_or(f64::NAN, |r| r.bic_gain),
+        indistinguishable: rivals,
+        place,
+    }
+}
+
+/// The experiment that would best tell an effect found from its nearest rival.
+pub fn next_experiment(rounds: &[Round<'_>], found: &[Found]) -> Option<String> {
+    rounds.iter().zip(found).find_map(|(round, found)| {
+        let rival = found.indistinguishable.first()?;
+        let trial = |t: &&Trial<'_>| {
+            let last = t.added.last();
+            last.is_some_and(|a| a.candidate.effect.name() == rival.effect && a.candidate.place() == rival.place)
+        };
+        let names =
+            [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
+        separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])
+    })
+}
+
+/// The smallest strengths that would have been noticed, of the effects whose size is one number.
+pub fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
+    let Some(round) = rounds.first() else { return Vec::new() };
+    let one = |s: &Screened| {
+        let candidate = &s.added.candidate;
+        let strength = &candidate.effect.strengths()[0];
+        let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added));
+        let parameter = &mops_core::Model::interface(model.model.as_ref()).parameters[model.first[0]];
+        Some(Noticeable {
+            effect: candidate.effect.name().to_owned(),
+            place: candidate.place(),
+            strength: StrengthValue {
+                name: strength.name.to_owned(),
+                value: s.noticed.filter(|n| n.is_finite())?,
+                unit: candidate.unit(strength, &parameter.variable.unit),
+                std_error: None,
+                interval95: None,
+            },
+        })
+    };
+    let mut all: Vec<&Screened> = round.screened.iter().filter(|s| s.added.candidate.effect.rarity() == 0).collect();
+    all.sort_by_key(|s| s.added.candidate.place());
+    all.into_iter().filter_map(one).collect()
+}
+
+pub fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<ParameterMove> {
+    let one = |(k, &tuner): (usize, &usize)| {
+        let tuner = &subject.study.tuners[tuner];
+        let variance = after.covariance[(k, k)] * after.square;
+        ParameterMove {
+            name: tuner.name.clone(),
+            unit: tuner.unit.to_string(),
+            before: before.tuners[k],
+            after: after.tuners[k],
+            std_error: (variance > 0.0).then(|| variance.sqrt()),
+        }
+    };
+    subject.globals.iter().enumerate().map(one).collect()
+}
+
+pub fn predictions(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<Prediction> {
+    let mut all = Vec::new();
+    for (index, m) in subject.measurements.iter().enumerate() {
+        for (k, s) in m.series.iter().enumerate() {
+            all.push(Prediction {
+                experiment: m.name.clone(),
+                role: m.role,
+                signal: s.name.clone(),
+                unit: s.unit.clone(),
+                noise: s.noise,
+                times: s.times.clone(),
+                measured: s.values.clone(),
+                before: before.experiments[index].predicted[k].clone(),
+                after: after.experiments[index].predicted[k].clone(),
+            });
+        }
+    }
+    all
+}
+
+/// Start values of every experiment in the repaired model.
+pub fn starts(subject: &Subject, after: &Calibrated) -> Vec<(String, String, f64)> {
+    let of = |(m, said): (&crate::subject::Measurement, &crate::repaired::Prognosis)| {
+        said.starts.iter().map(|(name, value)| (m.name.clone(), name.clone(), *value)).collect::<Vec<_>>()
+    };
+    subject.measurements.iter().zip(&after.experiments).flat_map(of).collect()
+}

@@ -1,0 +1,118 @@
+//! The judgement: whether what was found explains the data, and a table where nothing does.
+
+use mops_core::Role;
+
+use crate::diagnose::UNEXPLAINED;
+use crate::diagnosis::{Unexplained, Verdict};
+use crate::fit::dot;
+use crate::held_out::predictive_gain;
+use crate::locate::{Located, locate};
+use crate::repaired::Calibrated;
+use crate::screen::Scene;
+use crate::search::{Search, Trial};
+use crate::stopgap::stopgap;
+use crate::subject::Subject;
+
+/// How many times the number of unknowns the sum of squares over calibration data may rise where all data are fitted: were
+/// the model right, it would rise by about that number.
+const CONTRADICTED: f64 = 4.0;
+
+/// Share by which a free signal must lower the error on samples left out to count as something that is missing.
+const FORETOLD: f64 = 0.1;
+
+/// Error of forecasts of selection data, in units of the noise, above which a model is mistaken; its parameters come from
+/// calibration data, and are uncertain.
+const MISTAKEN: f64 = 1.5;
+
+/// What is concluded of a model that grew.
+pub struct Judgement<'a> {
+    /// Whether something is missing.
+    pub verdict: Verdict,
+    /// The model, perhaps with a table in it.
+    pub last: Trial<'a>,
+    /// The same fitted to calibration data alone.
+    pub after: Calibrated,
+    /// What no effect explains.
+    pub unexplained: Option<Unexplained>,
+    /// A fact about what is left.
+    pub note: Option<String>,
+}
+
+/// Judges the model that the search ended with; `base` is the declared one, and `located` where its residual comes from.
+#[allow(clippy::cast_precision_loss)]
+pub fn judge<'a>(
+    search: &Search<'a>,
+    base: &Trial<'a>,
+    located: &[Located],
+    last: Trial<'a>,
+    after: Calibrated,
+) -> Judgement<'a> {
+    let (left, note) = if last.fitted.normalised() > UNEXPLAINED { left(&last) } else { (0.0, None) };
+    // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
+    // little they determine.
+    let mistaken = !last.added.is_empty()
+        && forecast(&after, search.subject) > MISTAKEN
+        && contradiction(&last, &after) > CONTRADICTED * after.covariance.nrows() as f64;
+    let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
+        (_, true) => Verdict::Unexplained,
+        (true, false) => Verdict::None,
+        (false, false) => Verdict::Effect,
+    };
+    let mut judgement = Judgement { verdict, last, after, unexplained: None, note };
+    if verdict == Verdict::Unexplained {
+        judgement.unexplained = located.first().and_then(Located::unexplained);
+        for place in located.iter().take(2) {
+            judgement.stand_in(search, base, place);
+        }
+    }
+    judgement
+}
+
+impl<'a> Judgement<'a> {
+    /// Puts a table at a place in, alone, where that is better.
+    fn stand_in(&mut self, search: &Search<'a>, base: &Trial<'a>, place: &Located) -> Option<()> {
+        let (table, found) = stopgap(search, base, place)?;
+        let table = search.over_whole(&table)?;
+        let calibrated = search.calibrate(&table, &[])?;
+        let now = forecast(&self.after, search.subject);
+        let better = if self.last.added.is_empty() {
+            table.fitted.chi2 < self.last.fitted.chi2
+        } else {
+            now > MISTAKEN && forecast(&calibrated, search.subject) < now
+        };
+        if better {
+            (self.after, self.last, self.unexplained) = (calibrated, table, Some(found));
+        }
+        Some(())
+    }
+}
+
+/// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.
+fn contradiction(last: &Trial<'_>, after: &Calibrated) -> f64 {
+    let own = |measurement: usize| last.fit.subject.measurements[measurement].role == Role::Calibration;
+    let together = last.fit.pieces.iter().zip(&last.fitted.residuals).filter(|(piece, _)| own(piece.measurement));
+    let together: f64 = together.map(|(_, residuals)| dot(residuals, residuals)).sum();
+    (together - after.chi2) / after.square
+}
+
+/// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out; and
+/// that in words.
+fn left(last: &Trial<'_>) -> (f64, Option<String>) {
+    let model = &last.variant.model;
+    let Some(scene) = Scene::new(&last.fit, model, &last.fitted) else { return (1.0, None) };
+    let Some(place) = locate(&last.fit, model, &scene).into_iter().next() else { return (0.0, None) };
+    let gain = predictive_gain(&place, &last.fit, model, &scene);
+    let (error, at, share) = (last.fitted.normalised(), &place.evidence.place, 100.0 * gain);
+    let note = format!(
+        "{error:.2} times the noise is left; a free signal at {at} would lower the error on samples left out by {share:.0} %"
+    );
+    (gain, (gain > 0.0).then_some(note))
+}
+
+/// Root mean square of the normalised errors on selection data; 0 without such data.
+#[allow(clippy::cast_precision_loss)]
+fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
+    let errors = after.errors(&subject.measurements);
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}

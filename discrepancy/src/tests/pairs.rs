@@ -1,0 +1,87 @@
+//! Greed: one effect at a time takes a wrong sign where only two together are physical.
+
+use std::sync::Arc;
+
+use mops_core::{Effect, Role};
+use mops_models::effects::effects;
+
+use crate::testing::{Record, integrated, study, subject, white};
+use crate::{Diagnosis, Options, diagnose};
+
+/// A pendulum that is declared with viscous friction, and has dry friction and the air instead.
+const PENDULUM: &str = r#"
+states     = { q = "rad", w = "rad/s" }
+parameters = { k = "1/s2", b = "1/s" }
+der        = { q = "w", w = "w' = -k*sin(q) - b*w" }
+"#;
+const K: f64 = 60.0;
+const DRY: f64 = 0.25;
+const AIR: f64 = 0.03;
+const NOISE: f64 = 5e-4;
+
+fn swing(label: &str, start: f64) -> Record {
+    const STEP: f64 = 0.02;
+    const COUNT: u32 = 400;
+    // The motion ends before the friction holds the pendulum for good.
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -K * x[0].sin() - DRY * x[1].signum() - AIR * x[1] * x[1].abs()];
+    let states = integrated(rates, [start, 0.0], STEP, COUNT as usize);
+    let times = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
+    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
+    Record { inputs: Vec::new(), times, signals: vec![("q", values, NOISE)] }
+}
+
+fn named(names: &[&str]) -> Vec<Arc<dyn Effect>> {
+    effects().into_iter().filter(|e| names.contains(&e.name())).collect()
+}
+
+fn diagnosis(effects: &[Arc<dyn Effect>], max_effects: usize) -> Diagnosis {
+    let records = vec![swing("wide", 2.4), swing("middle", 1.6), swing("other", 2.0)];
+    let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.0, 0.0], 2, records);
+    subject.measurements[2].role = Role::Selection;
+    for (measurement, start) in subject.measurements.iter_mut().zip([2.4, 1.6, 2.0]) {
+        measurement.locals[0].start = start;
+    }
+    let mut study = study(&subject);
+    // Friction takes energy: the coefficient is not negative.
+    study.tuners[1].bounds = [0.0, 1.0];
+    diagnose(&study, effects, &Options { max_effects, level: 0.01, seed: 1 }, &()).expect("it simulates")
+}
+
+#[test]
+fn dry_friction_and_quadratic_drag_are_found_together_and_no_coefficient_is_negative() {
+    let all = named(&["coulomb-friction", "quadratic-drag", "viscous-friction", "sensor-bias", "sensor-gain"]);
+    let found = diagnosis(&all, 3);
+    let mut names: Vec<&str> = found.found.iter().map(|f| f.effect.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["coulomb-friction", "quadratic-drag"], "{:?}", found.found);
+    for (effect, truth) in [("coulomb-friction", DRY), ("quadratic-drag", AIR)] {
+        let strength = &found.found.iter().find(|f| f.effect == effect).expect("it was found").strengths[0];
+        assert!((strength.value - truth).abs() < 0.05 * truth, "{strength:?}");
+    }
+    // What was declared is the wrong term, and goes.
+    let viscous = found.parameters.iter().find(|p| p.name == "b").expect("it is a tuner");
+    assert!(viscous.after >= 0.0 && viscous.after < 0.01 * viscous.before.max(0.05), "{viscous:?}");
+    assert_eq!((found.removed[0].term.as_str(), found.removed[0].place.as_str()), ("b", "joint:q"));
+    assert!(found.after.iter().all(|e| e.normalised < 1.1), "{:?}", found.after);
+}
+
+#[test]
+fn dry_friction_alone_would_want_a_negative_viscous_coefficient() {
+    let records = vec![swing("wide", 2.4)];
+    let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.4, 0.0], 2, records);
+    subject.measurements[0].locals[0].start = 2.4;
+    let simulations = std::sync::atomic::AtomicUsize::new(0);
+    let effects = named(&["coulomb-friction"]);
+    let limits = crate::search::Limits { refits: 10, finalists: 5 };
+    let search = crate::search::Search { subject: &subject, effects: &effects, limits, simulations: &simulations };
+    let declared = search.trial(&[], &subject.start(), vec![vec![2.4, 0.0]], 1, 60).expect("it simulates");
+    // Along the tangent it would have to drive the pendulum, which no friction does.
+    let alone = search.round(&declared).expect("it simulates");
+    assert!(alone.trials.is_empty() && alone.screened[0].gain == 0.0);
+    // Put in with what it has, it turns the viscous coefficient round: the subject's own bounds let that go below 0.
+    let mut dry = alone.screened[0].added.clone();
+    dry.strengths[0] = DRY;
+    let with_dry = search.from(&declared, &[dry], 40).expect("it simulates");
+    let (dry, viscous) = (with_dry.fitted.point.globals[2], with_dry.fitted.point.globals[1]);
+    assert!(dry > 0.5 * DRY && viscous < -0.01, "{:?}", with_dry.fitted.point);
+}

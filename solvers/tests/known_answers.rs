@@ -1,0 +1,77 @@
+//! Solvers on problems whose answers are published.
+
+use mops_problems::{Answer, Measured, Posed, Problem, Slope, measure, suites};
+
+fn problems(suite: &str) -> Vec<Problem> {
+    let suite = suites().into_iter().find(|known| known.name == suite).expect("the suite is registered");
+    (suite.problems)()
+}
+
+fn sqp(problem: &Problem, slope: Slope) -> Measured {
+    let posed = Posed::new(problem, slope);
+    let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "sqp").expect("sqp is a kind");
+    let mut solver = kind.default_choice().make();
+    measure(problem, &posed, &posed.start(), solver.as_mut(), 1000 * (problem.dimension() + 1))
+}
+
+fn check(suite: &str, names: &[&str], accuracy: f64) {
+    for problem in problems(suite).iter().filter(|problem| names.contains(&problem.name.as_str())) {
+        for slope in [Slope::Exact, Slope::Differences] {
+            let found = sqp(problem, slope);
+            assert!(found.evaluations_to(accuracy).is_some(), "{} {slope:?}: {:?}", problem.name, found.best);
+        }
+    }
+}
+
+#[test]
+fn min_max_problems_are_solved() {
+    check("minimax", &["CB2", "EVD52", "Rosen-Suzuki", "Polak6", "Bard", "OET6", "Filter", "Wong2", "EQUIL"], 1e-7);
+}
+
+#[test]
+fn problems_with_constraints_are_solved() {
+    let names = ["HS5", "HS7", "HS19", "HS23", "HS32", "HS43", "HS71", "HS86", "HS100", "HS109", "HS113", "HS118"];
+    check("hock-schittkowski", &names, 1e-6);
+}
+
+/// A definition with a wrong number in it has another optimum than the published one.
+#[test]
+fn every_definition_has_its_published_optimum() {
+    for suite in ["minimax", "hock-schittkowski"] {
+        for problem in problems(suite) {
+            let found = sqp(&problem, Slope::Exact);
+            // No constraint qualification holds at the solution of HS13: there are no multipliers to converge to.
+            let accuracy = if problem.name == "HS13" { 1e-4 } else { 1e-5 };
+            assert!(found.evaluations_to(accuracy).is_some(), "{}: {:?} {:?}", problem.name, found.best, found.target);
+        }
+    }
+}
+
+#[test]
+fn no_success_is_claimed_where_a_constraint_is_violated() {
+    for problem in problems("hock-schittkowski") {
+        for slope in [Slope::Exact, Slope::Differences] {
+            let found = sqp(&problem, slope);
+            assert!(!found.claims_what_is_violated(), "{} {slope:?}: {:?}", problem.name, found.best);
+        }
+    }
+}
+
+/// The box of a variable without bounds is an invention: a solution at its edge would be another problem's.
+#[test]
+fn solutions_lie_inside_boxes_that_are_not_the_problems_own() {
+    for suite in ["minimax", "hock-schittkowski"] {
+        for problem in problems(suite).iter().filter(|problem| matches!(problem.answer, Answer::Minima(_))) {
+            let posed = Posed::new(problem, Slope::Exact);
+            let own = |j: usize, side: usize| problem.bounds.get(j).is_some_and(|bounds| bounds[side].is_finite());
+            let mut run = mops_core::Run::new(&posed, mops_core::Budget { evaluations: 20_000 }, &());
+            let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "sqp").expect("sqp is a kind");
+            run.solve(kind.default_choice().make().as_mut(), &posed.start());
+            let best = mops_core::Oracle::best(&run).expect("the start has a value").point.clone();
+            for (j, u) in best.iter().enumerate() {
+                let at_edge = (*u < 0.02 && !own(j, 0)) || (*u > 0.98 && !own(j, 1));
+                assert!(!at_edge, "{}: variable {j} at {u}", problem.name);
+            }
+        }
+    }
+}

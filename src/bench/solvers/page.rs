@@ -1,0 +1,98 @@
+//! The page of a benchmark of solvers: profiles as pictures, and what the terminal says.
+
+use maud::{DOCTYPE, PreEscaped, html};
+
+use super::results::{Results, Row};
+use super::{ROUGH, Score, data_profile, performance_profile};
+use crate::report::{Curve, Ink, Plot};
+
+/// The page, from the tables as text, and from the results with their names.
+pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
+    let suite = all.first().map_or("", |(_, results)| results.suite.as_str());
+    let accuracy = all.first().map_or(0.0, |(_, results)| results.accuracy);
+    let rough = |row: &Row| row.to_rough;
+    let fine = |row: &Row| row.to_fine;
+    let plots = [
+        data(all, rough, ROUGH),
+        data(all, fine, accuracy),
+        performance(all, rough, ROUGH),
+        performance(all, fine, accuracy),
+    ];
+    let title = format!("Benchmark of solvers: {suite}");
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(crate::report::STYLE)) }
+            }
+            body {
+                header { p class="task" { "benchmark" } h1 { (title) } }
+                main {
+                    section {
+                        h2 { "Profiles" }
+                        @for plot in plots.iter().flatten() { figure { (PreEscaped(plot.svg())) } }
+                    }
+                    section { h2 { "Runs" } div class="wide" tabindex="0" { pre { (tables) } } }
+                }
+                footer { "Written by mops " (env!("CARGO_PKG_VERSION")) ". The numbers are in results.json." }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// The solvers of all results, with their names and scores.
+fn scored(all: &[(String, &Results)], count: impl Fn(&Row) -> Option<usize> + Copy) -> Vec<(String, Vec<Score>)> {
+    let of = |(name, results): &(String, &Results)| -> Vec<(String, Vec<Score>)> {
+        let named = |solver: &str| if name.is_empty() { solver.to_owned() } else { format!("{solver}, {name}") };
+        results.solvers().into_iter().map(|solver| (named(solver), Score::of(results, solver, count))).collect()
+    };
+    all.iter().flat_map(of).collect()
+}
+
+fn curves(profiles: Vec<(String, Vec<(f64, f64)>)>) -> Option<Vec<Curve>> {
+    let last = profiles.iter().flat_map(|(_, points)| points).map(|(x, _)| *x).fold(0.0, f64::max);
+    let curve = |(index, (name, mut points)): (usize, (String, Vec<(f64, f64)>))| {
+        // Up to the end of the picture.
+        if let Some(&(_, share)) = points.last() {
+            points.push((last, share));
+        }
+        Curve { name, points, ink: Ink::Series(index), ..Curve::default() }
+    };
+    (last > 0.0).then(|| profiles.into_iter().enumerate().map(curve).collect())
+}
+
+fn data(all: &[(String, &Results)], count: impl Fn(&Row) -> Option<usize> + Copy, accuracy: f64) -> Option<Plot> {
+    let scored = scored(all, count).into_iter().map(|(name, scores)| (name, data_profile(&scores)));
+    Some(Plot {
+        title: format!("Data profile, accuracy {accuracy:e}"),
+        x_label: "evaluations / (n + 1)".into(),
+        y_label: "share of problems solved".into(),
+        curves: curves(scored.collect())?,
+        log_x: true,
+        ..Plot::default()
+    })
+}
+
+fn performance(
+    all: &[(String, &Results)],
+    count: impl Fn(&Row) -> Option<usize> + Copy,
+    accuracy: f64,
+) -> Option<Plot> {
+    let (names, scores): (Vec<String>, Vec<Vec<Score>>) = scored(all, count).into_iter().unzip();
+    if names.len() < 2 || scores.iter().any(|of| of.len() != scores[0].len()) {
+        return None;
+    }
+    Some(Plot {
+        title: format!("Performance profile, accuracy {accuracy:e}"),
+        x_label: "evaluations / those of the best solver".into(),
+        y_label: "share of problems solved".into(),
+        curves: curves(names.into_iter().zip(performance_profile(&scores)).collect())?,
+        log_x: true,
+        ..Plot::default()
+    })
+}

@@ -1,0 +1,133 @@
+//! What a benchmark leaves behind, and what of it one line says.
+
+use mops_problems::Slope;
+use serde::{Deserialize, Serialize};
+
+use super::Plan;
+
+/// All rows, and what they were measured with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Results {
+    /// Version of this layout.
+    pub format: u32,
+    /// Version of mops.
+    pub mops: String,
+    pub suite: String,
+    /// `exact` or `differences`.
+    pub slopes: String,
+    /// Accuracy that counts as solved.
+    pub accuracy: f64,
+    /// Evaluations that a run may take, for every variable and one more.
+    pub budget: usize,
+    /// Relative noise that was added.
+    pub noise: f64,
+    pub rows: Vec<Row>,
+}
+
+/// A run of a solver on a problem.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Row {
+    pub problem: String,
+    pub solver: String,
+    pub seed: u64,
+    /// Number of variables.
+    pub variables: usize,
+    /// Number of objectives and constraints.
+    pub rows: usize,
+    /// The known minimum that is nearest.
+    pub known: Option<f64>,
+    /// The best objective.
+    pub reached: f64,
+    /// Largest violation of a constraint there.
+    pub violation: f64,
+    pub evaluations: usize,
+    /// Exact slopes taken.
+    pub linearisations: usize,
+    /// Evaluations to 1e-3 of the known minimum.
+    pub to_rough: Option<usize>,
+    /// Evaluations to the accuracy that counts as solved.
+    pub to_fine: Option<usize>,
+    pub solved: bool,
+    /// Whether the solver says that it has an optimum.
+    pub converged: bool,
+    /// Time of the whole run in s.
+    pub seconds: f64,
+    /// Time that was not spent in the problem's functions, in s.
+    pub solver_seconds: f64,
+}
+
+/// A solver in one line.
+pub(crate) struct Summary {
+    pub solver: String,
+    pub runs: usize,
+    pub solved: usize,
+    /// Runs that end with an optimum that violates a constraint.
+    pub false_claims: usize,
+    /// Medians over the solved runs.
+    pub median_rough: Option<usize>,
+    pub median_fine: Option<usize>,
+    pub seconds: f64,
+    /// Solver and engine, per evaluation, in ns.
+    pub nanoseconds: f64,
+}
+
+impl Results {
+    pub fn new(plan: &Plan, rows: Vec<Row>) -> Self {
+        Self {
+            format: 1,
+            mops: env!("CARGO_PKG_VERSION").to_owned(),
+            suite: plan.suite.name.to_owned(),
+            slopes: if plan.slope == Slope::Exact { "exact" } else { "differences" }.to_owned(),
+            accuracy: plan.suite.accuracy,
+            budget: plan.budget,
+            noise: plan.noise,
+            rows,
+        }
+    }
+
+    /// The solvers in the order of their rows.
+    pub fn solvers(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for row in &self.rows {
+            if !names.contains(&row.solver.as_str()) {
+                names.push(&row.solver);
+            }
+        }
+        names
+    }
+
+    pub fn of<'a>(&'a self, solver: &str) -> impl Iterator<Item = &'a Row> {
+        let solver = solver.to_owned();
+        self.rows.iter().filter(move |row| row.solver == solver)
+    }
+
+    /// The row of the same run in these results.
+    pub fn same(&self, wanted: &Row) -> Option<&Row> {
+        let same = |row: &&Row| row.problem == wanted.problem && row.seed == wanted.seed;
+        self.of(&wanted.solver).find(same).or_else(|| self.rows.iter().find(same))
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    pub fn summary(&self, solver: &str) -> Summary {
+        let rows: Vec<&Row> = self.of(solver).collect();
+        let evaluations: usize = rows.iter().map(|row| row.evaluations).sum();
+        let own: f64 = rows.iter().map(|row| row.solver_seconds).sum();
+        Summary {
+            solver: solver.to_owned(),
+            runs: rows.len(),
+            solved: rows.iter().filter(|row| row.solved).count(),
+            false_claims: rows.iter().filter(|row| row.converged && row.violation > mops_core::FEASIBLE).count(),
+            median_rough: median(rows.iter().filter_map(|row| row.to_rough)),
+            median_fine: median(rows.iter().filter_map(|row| row.to_fine)),
+            seconds: rows.iter().map(|row| row.seconds).sum(),
+            nanoseconds: 1e9 * own / evaluations.max(1) as f64,
+        }
+    }
+}
+
+/// The upper median.
+fn median(counts: impl Iterator<Item = usize>) -> Option<usize> {
+    let mut counts: Vec<usize> = counts.collect();
+    counts.sort_unstable();
+    counts.get(counts.len() / 2).copied()
+}

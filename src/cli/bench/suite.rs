@@ -1,0 +1,207 @@
+//! `mops bench SUITE`: how well solvers do on problems with known answers.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
+use mops_core::{Catalogue, Diagnostic, SolverChoice, suggestion};
+use mops_problems::{Slope, Suite, suites};
+
+use super::super::progress::Progress;
+use super::super::tables::{number, table};
+use super::super::{Trouble, cannot_write, print};
+use crate::bench::solvers::{self, Plan, Results, Row};
+
+/// What can be said to the benchmark of a suite.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Solver to measure; may be given more than once.
+    #[arg(long = "solver", value_name = "SOLVER", default_value = "sqp")]
+    solvers: Vec<String>,
+    /// Give solvers exact slopes instead of differences.
+    #[arg(long)]
+    gradients: bool,
+    /// Runs of every problem, with seeds 1, 2, ...
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Evaluations a run may take, for every variable and one more.
+    #[arg(long, default_value_t = 1000, value_name = "NUMBER")]
+    budget: usize,
+    /// Relative noise that is added to all values.
+    #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
+    noise: f64,
+    /// Problems by name; all where absent.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    problems: Vec<String>,
+    /// Problems solved at a time; all cores where absent. One gives the truest times.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Folder for results.json and a page with profiles.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Results of another time, to put beside these.
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// Show no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// One of the suites, each a command of its own.
+pub(super) struct Chosen {
+    suite: Suite,
+    arguments: Arguments,
+}
+
+impl Subcommand for Chosen {
+    fn augment_subcommands(command: Command) -> Command {
+        let one = |suite: &Suite| Arguments::augment_args(Command::new(suite.name)).about(suite.about);
+        command.subcommands(suites().iter().map(one))
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        suites().iter().any(|suite| suite.name == name)
+    }
+}
+
+impl FromArgMatches for Chosen {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, rest) = matches.subcommand().ok_or_else(missing)?;
+        let suite = suites().into_iter().find(|suite| suite.name == name).ok_or_else(missing)?;
+        Ok(Self { suite, arguments: Arguments::from_arg_matches(rest)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, Trouble> {
+    let Chosen { suite, arguments } = chosen;
+    let before = arguments.against.as_deref().map(read).transpose()?;
+    let plan = Plan {
+        suite: *suite,
+        solvers: arguments.solvers.iter().map(|name| solver(catalogue, name)).collect::<Result<_, _>>()?,
+        slope: if arguments.gradients { Slope::Exact } else { Slope::Differences },
+        seeds: arguments.seeds,
+        budget: arguments.budget,
+        noise: arguments.noise,
+        only: problems(suite, &arguments.problems)?,
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let progress = Progress::of_cases(!arguments.quiet);
+    let results = solvers::run(&plan, arguments.jobs.map_or(cores, usize::from), &progress);
+    progress.finish();
+    let text = text(&results, before.as_ref());
+    print(&text);
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+        let write = |name: &str, content: String| {
+            let path = folder.join(name);
+            std::fs::write(&path, content).map_err(cannot_write(&path))
+        };
+        let json = serde_json::to_string_pretty(&results).expect("numbers and names can be written");
+        write("results.json", json + "\n")?;
+        let mut all = vec![(String::new(), &results)];
+        all.extend(before.as_ref().map(|before| ("before".to_owned(), before)));
+        write("index.html", solvers::page(&text, &all))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic> {
+    let kind = catalogue.solvers.iter().find(|kind| kind.name == name);
+    let unknown = || {
+        let help = suggestion(name, catalogue.solvers.iter().map(|kind| kind.name));
+        Diagnostic::new(format!("there is no solver `{name}`")).with_help(help)
+    };
+    Ok(kind.ok_or_else(unknown)?.default_choice())
+}
+
+fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> {
+    let all: Vec<String> = (suite.problems)().into_iter().map(|problem| problem.name).collect();
+    match asked.iter().find(|name| !all.contains(name)) {
+        None => Ok(asked.to_vec()),
+        Some(unknown) => {
+            let help = suggestion(unknown, all.iter().map(String::as_str));
+            Err(Diagnostic::new(format!("`{}` has no problem `{unknown}`", suite.name)).with_help(help))
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Results, Diagnostic> {
+    let mistake = |why: String| Diagnostic::new(format!("{}: {why}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| mistake(error.to_string()))?;
+    serde_json::from_str(&text).map_err(|error| mistake(format!("no results of a benchmark of solvers: {error}")))
+}
+
+fn text(results: &Results, before: Option<&Results>) -> String {
+    let seeds = results.rows.iter().any(|row| row.seed > 1);
+    let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
+    header.extend(["all", "ms", "solved"]);
+    header.extend(before.map(|_| "before"));
+    let rows = results.rows.iter().map(|row| cells(row, seeds, before)).collect();
+    let mut text = table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 12], rows);
+    let fine = results.accuracy;
+    text.push_str(&format!(
+        "\nTo 1e-3, to the end: evaluations until the best feasible point is that near to f*, and {fine:e}, relative to the \
+         larger of 1 and |f*|; slopes by {}.\n",
+        if results.slopes == "exact" { "dual numbers, which count as no evaluation" } else { "differences" }
+    ));
+    for (name, results) in [(Some(results), ""), (before, "before: ")].into_iter().filter_map(|(r, n)| Some((n, r?))) {
+        for solver in results.solvers() {
+            text.push_str(&summary(name, results, solver));
+        }
+    }
+    text
+}
+
+fn cells(row: &Row, seeds: bool, before: Option<&Results>) -> Vec<String> {
+    let count = |count: Option<usize>| count.map_or("-".to_owned(), |count| count.to_string());
+    let name = if seeds { format!("{} ({})", row.problem, row.seed) } else { row.problem.clone() };
+    let mut cells = vec![
+        name,
+        row.solver.clone(),
+        row.variables.to_string(),
+        row.rows.to_string(),
+        row.known.map_or("-".to_owned(), number),
+        number(row.reached),
+        if row.violation > 0.0 { format!("{:.1e}", row.violation) } else { "0".to_owned() },
+        count(row.to_rough),
+        count(row.to_fine),
+        row.evaluations.to_string(),
+        format!("{:.2}", 1e3 * row.seconds),
+        if row.solved { "yes" } else { "no" }.to_owned(),
+    ];
+    cells.extend(before.map(|before| before.same(row).map_or_else(String::new, |old| count(old.to_fine))));
+    cells
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn summary(name: &str, results: &Results, solver: &str) -> String {
+    let of = results.summary(solver);
+    let count = |count: Option<usize>| count.map_or("-".to_owned(), |count| count.to_string());
+    let claims = if of.false_claims > 0 {
+        format!(", {} claim an optimum that violates a constraint", of.false_claims)
+    } else {
+        String::new()
+    };
+    format!(
+        "{name}{}: {} of {} solved ({:.1} %), median evaluations {} to 1e-3 and {} to the end, {:.2} s, {:.0} ns per \
+         evaluation of its own{claims}\n",
+        of.solver,
+        of.solved,
+        of.runs,
+        100.0 * of.solved as f64 / of.runs.max(1) as f64,
+        count(of.median_rough),
+        count(of.median_fine),
+        of.seconds,
+        of.nanoseconds,
+    )
+}
