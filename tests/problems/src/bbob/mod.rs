@@ -130,6 +130,7 @@ impl Formula for Instance {
 }
 
 #[cfg(test)]
+#[allow(clippy::excessive_precision)] // the digits as published
 mod tests {
     use super::*;
 

@@ -4,7 +4,7 @@ use mops_core::Scalar;
 
 use super::{best_of, evenly, problem, sampled};
 use crate::arithmetic::atan;
-use crate::{Problem, Suite};
+use crate::{Functions, Problem, Suite};
 
 pub(crate) const SUITE: Suite = Suite {
     name: "constrained-fronts",
@@ -17,12 +17,28 @@ pub(crate) const SUITE: Suite = Suite {
         let pi = std::f64::consts::PI;
         vec![
             with(
-                problem("BNH", vec![[0.0, 5.0], [0.0, 3.0]], (bnh, bnh), sampled(&[140.0, 50.0], 20_000, bnh_front)),
+                problem(
+                    "BNH",
+                    vec![[0.0, 5.0], [0.0, 3.0]],
+                    Functions::of(bnh, bnh),
+                    sampled(&[140.0, 50.0], 20_000, bnh_front),
+                ),
                 2,
             ),
-            with(problem("SRN", vec![[-20.0, 20.0]; 2], (srn, srn), sampled(&[250.0, 10.0], 20_000, srn_front)), 2),
-            with(problem("TNK", vec![[1e-9, pi]; 2], (tnk, tnk), sampled(&[1.1, 1.1], 20_000, tnk_front)), 2),
-            with(problem("OSY", osy_box, (osy, osy), sampled(&[-40.0, 80.0], 20_000, osy_front)), 6),
+            with(
+                problem(
+                    "SRN",
+                    vec![[-20.0, 20.0]; 2],
+                    Functions::of(srn, srn),
+                    sampled(&[250.0, 10.0], 20_000, srn_front),
+                ),
+                2,
+            ),
+            with(
+                problem("TNK", vec![[1e-9, pi]; 2], Functions::of(tnk, tnk), sampled(&[1.1, 1.1], 20_000, tnk_front)),
+                2,
+            ),
+            with(problem("OSY", osy_box, Functions::of(osy, osy), sampled(&[-40.0, 80.0], 20_000, osy_front)), 6),
         ]
     },
 };

@@ -5,7 +5,6 @@ mod constrained;
 mod dtlz;
 mod zdt;
 
-use mops_core::Along;
 use mops_core::front::{hypervolume, non_dominated};
 
 use crate::{Answer, Functions, Problem, Sense};
@@ -18,14 +17,9 @@ pub(crate) use zdt::SUITE as ZDT;
 type Points = fn(usize) -> Vec<Vec<f64>>;
 
 /// A problem over its bounds, starting in their middle.
-fn problem(
-    name: &str,
-    bounds: Vec<[f64; 2]>,
-    functions: (fn(&[f64]) -> Vec<f64>, fn(&[Along]) -> Vec<Along>),
-    front: Answer,
-) -> Problem {
+fn problem(name: &str, bounds: Vec<[f64; 2]>, functions: Functions, front: Answer) -> Problem {
     let start: Vec<f64> = bounds.iter().map(|[low, high]| 0.5 * (low + high)).collect();
-    Problem { sense: Sense::Each, bounds, ..Problem::new(name, &start, front, Functions::of(functions.0, functions.1)) }
+    Problem { sense: Sense::Each, bounds, ..Problem::new(name, &start, front, functions) }
 }
 
 /// A front whose hypervolume is known.
