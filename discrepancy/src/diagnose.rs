@@ -30,6 +30,10 @@ pub struct Options {
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 pub const UNEXPLAINED: f64 = 1.1;
 
+/// How often the verdict `unexplained` is right: 8 of 12 among 54 experiments of the test bed with errors of 20, 5 and 2 times
+/// the noise (`mops bench diagnosis`); where it is wrong, two effects of the catalogue were missing, or one that hardly shows.
+const TRULY_UNEXPLAINED: f64 = 0.67;
+
 /// Finds what the model of a calibration study lacks.
 ///
 /// # Errors
@@ -73,7 +77,7 @@ pub fn diagnose(
         // Nothing at all was weighed among the others.
         Verdict::None => 1.0 - ranked.iter().map(|r| r.probability).sum::<f64>(),
         Verdict::Effect => found.iter().map(|f| f.probability).product(),
-        Verdict::Unexplained => 0.9,
+        Verdict::Unexplained => TRULY_UNEXPLAINED,
     };
     Ok(Diagnosis {
         verdict,
