@@ -54,7 +54,7 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
     let calibration: Vec<usize> =
         (0..measurements.len()).filter(|&i| measurements[i].role == Role::Calibration).collect();
     let all = candidates(effects, subject.model.interface(), &measured, &calibration);
-    let screened = screen(&all, &fit, &variant.model, &scene);
+    let screened = screen(&all, &fit, &variant.model, &scene, &[]).screened;
     let refitted: Vec<Option<f64>> = screened
         .par_iter()
         .map(|candidate| {

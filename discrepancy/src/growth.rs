@@ -41,7 +41,7 @@ impl<'a> Search<'a> {
             let Some(round) = ahead.take().or_else(|| self.round(&growth.last)) else { break };
             if count == 0 {
                 // Of the screening itself: its gains are those of single directions.
-                growth.p_value = round.screened.first().map_or(1.0, |s| by_chance(s.gain, round.directions));
+                growth.p_value = round.screened.first().map_or(1.0, |s| by_chance(s.gain, round.independent));
             }
             let likely = |trial: &&Trial<'a>| chance(&growth.last, trial, round.directions) <= options.level;
             let single = round.trials.first().filter(likely);

@@ -3,12 +3,12 @@
 //! A score (Lagrange multiplier) test: source: C. R. Rao, Linear Statistical Inference and its Applications, 2nd edition
 //! (1973), section 6e.3.
 
-use mops_core::Scope;
+use mops_core::{Scope, Strength, Trials};
 use mops_models::WithEffects;
 use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
-use crate::fit::{Fit, Fitted, Residuals, dot};
+use crate::fit::{Fit, Fitted, Piece, Residuals, dot};
 use crate::trace_of::{View, sizes};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
@@ -124,33 +124,116 @@ fn rest(basis: &[Direction], begin: usize, mut column: Vec<f64>) -> Option<Direc
     })
 }
 
-/// Screens candidates; the best first.
-pub fn screen(candidates: &[Candidate], fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Vec<Screened> {
-    let mut screened: Vec<Screened> = candidates
+/// Candidates as screened, and what chance does.
+pub struct Screening {
+    /// The best first.
+    pub screened: Vec<Screened>,
+    /// The best gain in each of the draws of white noise.
+    pub by_chance: Vec<f64>,
+}
+
+impl Screening {
+    /// Independent directions that the draws look like: where nothing is missing, the best gain `g` of `n` directions has the
+    /// distribution `(1 - exp(-g/2))^n`, of which this is the likeliest `n`; `None` without draws.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn independent(&self) -> Option<f64> {
+        let logarithms: f64 = self.by_chance.iter().map(|gain| (-(-0.5 * gain).exp()).ln_1p()).sum();
+        (logarithms < 0.0).then(|| -(self.by_chance.len() as f64) / logarithms)
+    }
+}
+
+/// Screens candidates, and the same on draws of white noise in place of the residuals.
+pub fn screen(
+    candidates: &[Candidate],
+    fit: &Fit<'_>,
+    model: &WithEffects,
+    scene: &Scene,
+    draws: &[Vec<f64>],
+) -> Screening {
+    let looked: Vec<(Option<Screened>, Vec<f64>)> = candidates
         .par_iter()
         .filter_map(|candidate| {
             let sizes = sizes(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
-            best_of(candidate, &sizes, fit, model, scene)
+            best_of(candidate, &sizes, fit, model, scene, draws)
         })
         .collect();
+    let mut by_chance = vec![0.0_f64; draws.len()];
+    for (_, gains) in &looked {
+        by_chance.iter_mut().zip(gains).for_each(|(best, gain)| *best = best.max(*gain));
+    }
+    let mut screened: Vec<Screened> = looked.into_iter().filter_map(|(screened, _)| screened).collect();
     screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    screened
+    Screening { screened, by_chance }
 }
 
-/// The best of the strengths tried of a candidate.
+/// Strengths with their trace in a piece.
+type Tried<'a> = (&'a Vec<f64>, Vec<f64>);
+
+/// A group of strengths in each piece.
+type Traces<'a> = Vec<Vec<Tried<'a>>>;
+
+/// In every piece the trace that is most like what is left there, and its strengths; `None` where there is none.
+fn likest<'a, 'b>(traces: &'b Traces<'a>, left: &[f64], begins: &[usize]) -> Option<Vec<&'b Tried<'a>>> {
+    let one = |(piece, traces): (usize, &'b Vec<Tried<'a>>)| {
+        let r = &left[begins[piece]..begins[piece + 1]];
+        let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
+        traces.iter().max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)))
+    };
+    traces.iter().enumerate().map(one).collect()
+}
+
+/// A trace without what the unknowns absorb.
+struct Left {
+    trace: Vec<f64>,
+    size: f64,
+    rest: f64,
+}
+
+impl Left {
+    fn of(scene: &Scene, chosen: &[&Tried<'_>]) -> Option<Self> {
+        let total: Vec<f64> = chosen.iter().flat_map(|(_, trace)| trace.iter().copied()).collect();
+        let trace = scene.project(&total);
+        let (size, rest) = (dot(&total, &total), dot(&trace, &trace));
+        (size.is_finite() && rest > 1e-10 * size && rest > 1e-6).then_some(Self { trace, size, rest })
+    }
+
+    /// How the residuals pull, by which factor that wants the strengths, and what the sum of squares falls by.
+    fn against(&self, residuals: &[f64], first: &Strength, strength: f64) -> (f64, f64, f64) {
+        let along = -dot(&self.trace, residuals);
+        let mut factor = along / self.rest;
+        if is_linear(first) {
+            let value = factor * strength;
+            if value < first.bounds[0] || value > first.bounds[1] {
+                factor = 0.0;
+            }
+        } else {
+            factor = factor.clamp(0.0, 1.5);
+        }
+        (along, factor, 2.0 * factor * along - factor * factor * self.rest)
+    }
+}
+
+fn is_linear(strength: &Strength) -> bool {
+    matches!(strength.trials, Trials::Linear)
+}
+
+/// The best of the strengths tried of a candidate, and the best gains on the draws.
+#[allow(clippy::cast_precision_loss)]
 fn best_of(
     candidate: &Candidate,
     sizes: &Sizes,
     fit: &Fit<'_>,
     model: &WithEffects,
     scene: &Scene,
-) -> Option<Screened> {
+    draws: &[Vec<f64>],
+) -> Option<(Option<Screened>, Vec<f64>)> {
     let effect = candidate.effect.as_ref();
     let own: Vec<usize> =
         (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
     let mut best: Option<Screened> = None;
+    let mut by_chance = vec![0.0_f64; draws.len()];
     let combinations = sizes.combinations(effect);
-    let resolved = effect.strengths().iter().filter(|s| s.trials == mops_core::Trials::Frequencies);
+    let resolved = effect.strengths().iter().filter(|s| s.trials == Trials::Frequencies);
     let resolved = resolved.map(|s| sizes.values(s.dimension, s.trials, s.bounds).len()).max().unwrap_or(0);
     let periods = u32::try_from(resolved).unwrap_or(u32::MAX);
     // Combinations that differ in what each experiment has of its own come together.
@@ -160,72 +243,47 @@ fn best_of(
     let pieces = fit.pieces.iter().zip(&scene.trajectories);
     let views: Option<Vec<View<'_>>> = pieces.map(|(piece, along)| View::new(candidate, model, piece, along)).collect();
     let views = views?;
-    let mut start = 0;
-    while start < combinations.len() {
-        let end = if own.is_empty() {
-            start + 1
-        } else {
-            let key = shared(&combinations[start]);
-            (start..combinations.len()).find(|&k| shared(&combinations[k]) != key).unwrap_or(combinations.len())
-        };
-        let group = &combinations[start..end];
-        start = end;
-        let mut total = Vec::with_capacity(scene.residuals.len());
-        let mut chosen = Vec::new();
-        let mut fits = true;
-        for (index, piece) in fit.pieces.iter().enumerate() {
-            let r = &scene.residuals[scene.begins[index]..scene.begins[index + 1]];
-            let traces = group.iter().filter_map(|s| Some((s, views[index].trace(s)?)));
-            let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(1e-300);
-            let found = traces.max_by(|a, b| likeness(&a.1).total_cmp(&likeness(&b.1)));
-            let Some((strengths, trace)) = found else {
-                fits = false;
-                break;
+    let first = &effect.strengths()[0];
+    for group in combinations.chunk_by(|a, b| !own.is_empty() && shared(a) == shared(b)) {
+        let traces = views.iter().map(|view| group.iter().filter_map(|s| Some((s, view.trace(s)?))).collect());
+        let traces: Traces<'_> = traces.collect();
+        let Some(chosen) = likest(&traces, &scene.residuals, &scene.begins) else { continue };
+        let Some(left) = Left::of(scene, &chosen) else { continue };
+        for (draw, best) in draws.iter().zip(&mut by_chance) {
+            let gain = |left: &Left| left.against(draw, first, group[0][0]).2;
+            let gain = if group.len() == 1 {
+                gain(&left)
+            } else {
+                likest(&traces, draw, &scene.begins)
+                    .and_then(|own| Left::of(scene, &own))
+                    .map_or(0.0, |left| gain(&left))
             };
-            chosen.extend(own.iter().map(|&k| (piece.measurement, k, strengths[k])));
-            total.extend(trace);
+            *best = best.max(gain);
         }
-        if !fits {
-            continue;
-        }
-        let strengths = &group[0];
-        let left = scene.project(&total);
-        let (size, rest) = (dot(&total, &total), dot(&left, &left));
-        if !(size.is_finite() && rest > 1e-10 * size && rest > 1e-6) {
-            continue;
-        }
-        let along = -dot(&left, &scene.residuals);
-        let first = &effect.strengths()[0];
-        let linear = matches!(first.trials, mops_core::Trials::Linear);
-        let mut factor = along / rest;
-        if linear {
-            let allowed = |f: f64| f * strengths[0] >= first.bounds[0] && f * strengths[0] <= first.bounds[1];
-            if !allowed(factor) {
-                factor = 0.0;
-            }
-        } else {
-            factor = factor.clamp(0.0, 1.5);
-        }
-        let gain = 2.0 * factor * along - factor * factor * rest;
+        let (along, factor, gain) = left.against(&scene.residuals, first, group[0][0]);
         if best.as_ref().is_some_and(|best| best.gain >= gain) {
             continue;
         }
-        let mut strengths = strengths.clone();
-        let noticed = linear.then(|| strengths[0].abs() * (NOTICED / rest).sqrt());
-        if linear && factor != 0.0 {
+        let mut strengths = group[0].clone();
+        let noticed = is_linear(first).then(|| strengths[0].abs() * (NOTICED / left.rest).sqrt());
+        if is_linear(first) && factor != 0.0 {
             strengths[0] *= factor;
         }
-        let length = rest.sqrt();
+        let of_piece = |(piece, (s, _)): (&Piece, &&Tried<'_>)| {
+            own.iter().map(|&k| (piece.measurement, k, s[k])).collect::<Vec<_>>()
+        };
+        let own_strengths = fit.pieces.iter().zip(&chosen).flat_map(of_piece).collect();
+        let length = left.rest.sqrt();
         best = Some(Screened {
-            added: Added { candidate: candidate.clone(), strengths, own: chosen, sizes: *sizes, expected: None },
+            added: Added { candidate: candidate.clone(), strengths, own: own_strengths, sizes: *sizes, expected: None },
             gain,
-            absorbed: 1.0 - rest / size,
-            pull: along / rest.sqrt(),
+            absorbed: 1.0 - left.rest / left.size,
+            pull: along / length,
             one_sided: first.bounds[0] >= 0.0,
             noticed,
-            direction: left.iter().map(|l| l / length).collect(),
+            direction: left.trace.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),
         });
     }
-    best
+    Some((best, by_chance))
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Role, Trials};
+use mops_core::{Effect, Role, Trials, stream};
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::base;
@@ -62,10 +63,20 @@ pub struct Round<'a> {
     pub trials: Vec<Trial<'a>>,
     /// Directions that were looked in, as many as independent ones.
     pub directions: f64,
+    /// The same as white noise in place of the residuals shows it, where that was tried.
+    pub independent: f64,
     /// The criterion of what the round began with.
     pub before: f64,
     /// Residuals and slopes of what the round began with.
     known: Known,
+}
+
+/// Draws of white noise in place of residuals.
+const DRAWS: usize = 40;
+
+fn white(count: usize) -> Vec<Vec<f64>> {
+    let mut random = stream(0, "white");
+    (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
 }
 
 impl<'a> Search<'a> {
@@ -167,7 +178,10 @@ impl<'a> Search<'a> {
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
     pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
         let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
-        let screened = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene);
+        // What chance does is asked of the declared model alone.
+        let draws = if from.added.is_empty() { white(scene.residuals.len()) } else { Vec::new() };
+        let screening = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene, &draws);
+        let (independent, screened) = (screening.independent(), screening.screened);
         let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
         let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
         // Of every place the best, so that no place is lost for a bad linearisation.
@@ -198,7 +212,8 @@ impl<'a> Search<'a> {
             }
         }
         let directions = screened.iter().map(|s| s.directions).sum();
-        Some(Round { screened, trials, directions, before: from.score(), known })
+        let independent = independent.unwrap_or(directions);
+        Some(Round { screened, trials, directions, independent, before: from.score(), known })
     }
 
     /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when

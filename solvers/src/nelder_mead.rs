@@ -72,7 +72,9 @@ impl Solver for Simplex {
         let mut corners = vec![start.clone()];
         for (j, u) in start.iter().enumerate() {
             let mut corner = start.clone();
-            corner[j] = if u + self.size <= 1.0 { u + self.size } else { u - self.size };
+            // An edge shorter than the distance of two values has no length.
+            let edge = self.size.max(oracle.shape().spacing[j]);
+            corner[j] = if u + edge <= 1.0 { u + edge } else { u - edge };
             corners.push(corner);
         }
         let Ok(method) = NelderMead::new(corners).with_sd_tolerance(self.options.tolerance) else {

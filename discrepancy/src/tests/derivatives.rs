@@ -78,7 +78,7 @@ fn by_outputs(record: Record) -> String {
     assert_eq!(named.len(), TERMS.len());
     let limits = Limits { refits: 10, finalists: 5 };
     let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
-    let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene);
+    let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
     screened[0].added.candidate.effect.name().to_owned()
 }
 
