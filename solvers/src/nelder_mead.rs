@@ -71,8 +71,10 @@ impl Solver for Simplex {
         }
         let mut corners = vec![start.clone()];
         for (j, u) in start.iter().enumerate() {
+            // On a grid a shorter edge would end at the same value.
+            let edge = self.size.max(oracle.shape().spacing[j]);
             let mut corner = start.clone();
-            corner[j] = if u + self.size <= 1.0 { u + self.size } else { u - self.size };
+            corner[j] = if u + edge <= 1.0 { u + edge } else { u - edge };
             corners.push(corner);
         }
         let Ok(method) = NelderMead::new(corners).with_sd_tolerance(self.options.tolerance) else {
