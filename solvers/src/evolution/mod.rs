@@ -29,6 +29,11 @@ impl Pool {
         self.violations.len()
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.violations.is_empty()
+    }
+
     /// Objectives of a point.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.objectives[i * self.m..(i + 1) * self.m]
