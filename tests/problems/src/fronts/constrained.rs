@@ -53,10 +53,15 @@ fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// `x_1 = -5/2` from where the second constraint begins to where the first ends.
+/// Along the edge of the second constraint from the least of the first objective, `x_1 = -5/2`, then along the circle to the
+/// least of the second objective.
 fn srn_front(count: usize) -> Vec<Vec<f64>> {
     let top = (225.0_f64 - 6.25).sqrt();
-    evenly(2.5, top, count).map(|y| srn(&[-2.5, y])[..2].to_vec()).collect()
+    let pieces = evenly(2.5, 3.7, count)
+        .map(|y| [3.0 * y - 10.0, y])
+        .chain(evenly(2.5, top, count).map(|y| [-2.5, y]))
+        .chain(evenly((2.5_f64 / 15.0).asin(), 0.5, count).map(|angle| [-15.0 * angle.sin(), 15.0 * angle.cos()]));
+    best_of(&pieces.map(|x| srn(&x)[..2].to_vec()).collect::<Vec<_>>())
 }
 
 fn tnk<S: Scalar>(x: &[S]) -> Vec<S> {
