@@ -71,9 +71,9 @@ impl Solver for Simplex {
         }
         let mut corners = vec![start.clone()];
         for (j, u) in start.iter().enumerate() {
-            let mut corner = start.clone();
-            // An edge shorter than the distance of two values has no length.
+            // On a grid a shorter edge would end at the same value.
             let edge = self.size.max(oracle.shape().spacing[j]);
+            let mut corner = start.clone();
             corner[j] = if u + edge <= 1.0 { u + edge } else { u - edge };
             corners.push(corner);
         }

@@ -4,7 +4,7 @@ use mops_core::Scalar;
 
 use super::{best_of, evenly, problem, sampled};
 use crate::arithmetic::atan;
-use crate::{Functions, Problem, Suite};
+use crate::{Problem, Suite};
 
 pub(crate) const SUITE: Suite = Suite {
     name: "constrained-fronts",
@@ -17,28 +17,12 @@ pub(crate) const SUITE: Suite = Suite {
         let pi = std::f64::consts::PI;
         vec![
             with(
-                problem(
-                    "BNH",
-                    vec![[0.0, 5.0], [0.0, 3.0]],
-                    Functions::of(bnh, bnh),
-                    sampled(&[140.0, 50.0], 20_000, bnh_front),
-                ),
+                problem("BNH", vec![[0.0, 5.0], [0.0, 3.0]], (bnh, bnh), sampled(&[140.0, 50.0], 20_000, bnh_front)),
                 2,
             ),
-            with(
-                problem(
-                    "SRN",
-                    vec![[-20.0, 20.0]; 2],
-                    Functions::of(srn, srn),
-                    sampled(&[250.0, 10.0], 20_000, srn_front),
-                ),
-                2,
-            ),
-            with(
-                problem("TNK", vec![[1e-9, pi]; 2], Functions::of(tnk, tnk), sampled(&[1.1, 1.1], 20_000, tnk_front)),
-                2,
-            ),
-            with(problem("OSY", osy_box, Functions::of(osy, osy), sampled(&[-40.0, 80.0], 20_000, osy_front)), 6),
+            with(problem("SRN", vec![[-20.0, 20.0]; 2], (srn, srn), sampled(&[250.0, 10.0], 20_000, srn_front)), 2),
+            with(problem("TNK", vec![[1e-9, pi]; 2], (tnk, tnk), sampled(&[1.1, 1.1], 20_000, tnk_front)), 2),
+            with(problem("OSY", osy_box, (osy, osy), sampled(&[-40.0, 80.0], 20_000, osy_front)), 6),
         ]
     },
 };
@@ -69,10 +53,15 @@ fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// `x_1 = -5/2` from where the second constraint begins to where the first ends.
+/// Along the edge of the second constraint from the least of the first objective, `x_1 = -5/2`, then along the circle to the
+/// least of the second objective.
 fn srn_front(count: usize) -> Vec<Vec<f64>> {
     let top = (225.0_f64 - 6.25).sqrt();
-    evenly(2.5, top, count).map(|y| srn(&[-2.5, y])[..2].to_vec()).collect()
+    let pieces = evenly(2.5, 3.7, count)
+        .map(|y| [3.0 * y - 10.0, y])
+        .chain(evenly(2.5, top, count).map(|y| [-2.5, y]))
+        .chain(evenly((2.5_f64 / 15.0).asin(), 0.5, count).map(|angle| [-15.0 * angle.sin(), 15.0 * angle.cos()]));
+    best_of(&pieces.map(|x| srn(&x)[..2].to_vec()).collect::<Vec<_>>())
 }
 
 fn tnk<S: Scalar>(x: &[S]) -> Vec<S> {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use mops_core::Scalar;
 
 use super::{best_of, evenly, known, problem, sampled};
-use crate::{Functions, Suite};
+use crate::Suite;
 
 pub(crate) const SUITE: Suite = Suite {
     name: "dtlz",
@@ -20,13 +20,13 @@ pub(crate) const SUITE: Suite = Suite {
         let sphere = || known(&[1.1; 3], 1.1_f64.powi(3) - PI / 6.0, sphere_front);
         let curve = || sampled(&[1.1; 3], 20_000, curve_front);
         vec![
-            problem("DTLZ1", unit(7), Functions::of(dtlz1, dtlz1), plane),
-            problem("DTLZ2", unit(12), Functions::of(dtlz2, dtlz2), sphere()),
-            problem("DTLZ3", unit(12), Functions::of(dtlz3, dtlz3), sphere()),
-            problem("DTLZ4", unit(12), Functions::of(dtlz4, dtlz4), sphere()),
-            problem("DTLZ5", unit(12), Functions::of(dtlz5, dtlz5), curve()),
-            problem("DTLZ6", unit(12), Functions::of(dtlz6, dtlz6), curve()),
-            problem("DTLZ7", unit(22), Functions::of(dtlz7, dtlz7), sampled(&[1.0, 1.0, 6.5], 10_000, pieces_front)),
+            problem("DTLZ1", unit(7), (dtlz1, dtlz1), plane),
+            problem("DTLZ2", unit(12), (dtlz2, dtlz2), sphere()),
+            problem("DTLZ3", unit(12), (dtlz3, dtlz3), sphere()),
+            problem("DTLZ4", unit(12), (dtlz4, dtlz4), sphere()),
+            problem("DTLZ5", unit(12), (dtlz5, dtlz5), curve()),
+            problem("DTLZ6", unit(12), (dtlz6, dtlz6), curve()),
+            problem("DTLZ7", unit(22), (dtlz7, dtlz7), sampled(&[1.0, 1.0, 6.5], 10_000, pieces_front)),
         ]
     },
 };

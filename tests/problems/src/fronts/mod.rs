@@ -5,6 +5,7 @@ mod constrained;
 mod dtlz;
 mod zdt;
 
+use mops_core::Along;
 use mops_core::front::{hypervolume, non_dominated};
 
 use crate::{Answer, Functions, Problem, Sense};
@@ -13,13 +14,16 @@ pub(crate) use constrained::SUITE as CONSTRAINED;
 pub(crate) use dtlz::SUITE as DTLZ;
 pub(crate) use zdt::SUITE as ZDT;
 
+/// A plain generic function, for each kind of number.
+type Plain = (fn(&[f64]) -> Vec<f64>, fn(&[Along]) -> Vec<Along>);
+
 /// Points of a front.
 type Points = fn(usize) -> Vec<Vec<f64>>;
 
 /// A problem over its bounds, starting in their middle.
-fn problem(name: &str, bounds: Vec<[f64; 2]>, functions: Functions, front: Answer) -> Problem {
+fn problem(name: &str, bounds: Vec<[f64; 2]>, functions: Plain, front: Answer) -> Problem {
     let start: Vec<f64> = bounds.iter().map(|[low, high]| 0.5 * (low + high)).collect();
-    Problem { sense: Sense::Each, bounds, ..Problem::new(name, &start, front, functions) }
+    Problem { sense: Sense::Each, bounds, ..Problem::new(name, &start, front, Functions::of(functions.0, functions.1)) }
 }
 
 /// A front whose hypervolume is known.

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use mops_core::Scalar;
 
 use super::{Points, best_of, evenly, known, problem, sampled};
-use crate::{Functions, Suite};
+use crate::Suite;
 
 pub(crate) const SUITE: Suite = Suite {
     name: "zdt",
@@ -21,11 +21,11 @@ pub(crate) const SUITE: Suite = Suite {
         let square =
             |a: f64, points: Points| known(&REFERENCE, 0.1 * (1.0 - a) + (1.0 - a.powi(3)) / 3.0 + 0.11, points);
         vec![
-            problem("ZDT1", unit(30), Functions::of(zdt1, zdt1), root()),
-            problem("ZDT2", unit(30), Functions::of(zdt2, zdt2), square(0.0, concave)),
-            problem("ZDT3", unit(30), Functions::of(zdt3, zdt3), sampled(&REFERENCE, 20_000, disconnected)),
-            problem("ZDT4", wide, Functions::of(zdt4, zdt4), root()),
-            problem("ZDT6", unit(10), Functions::of(zdt6, zdt6), square(LEAST_F1, biased)),
+            problem("ZDT1", unit(30), (zdt1, zdt1), root()),
+            problem("ZDT2", unit(30), (zdt2, zdt2), square(0.0, concave)),
+            problem("ZDT3", unit(30), (zdt3, zdt3), sampled(&REFERENCE, 20_000, disconnected)),
+            problem("ZDT4", wide, (zdt4, zdt4), root()),
+            problem("ZDT6", unit(10), (zdt6, zdt6), square(LEAST_F1, biased)),
         ]
     },
 };
