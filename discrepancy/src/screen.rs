@@ -287,3 +287,20 @@ fn best_of(
     }
     Some((best, by_chance))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_many_directions_are_told_as_the_best_gain_was_drawn_from() {
+        for n in [3.0, 200.0] {
+            // Quantiles of the best of n gains: (1 - exp(-g/2))^n = u.
+            let quantile = |k: usize| -2.0 * (1.0 - ((k as f64 + 0.5) / 400.0).powf(1.0 / n)).ln();
+            let screening = Screening { screened: Vec::new(), by_chance: (0..400).map(quantile).collect() };
+            let told = screening.independent().expect("there are draws");
+            assert!((told - n).abs() < 0.02 * n, "{told}");
+        }
+        assert!(Screening { screened: Vec::new(), by_chance: Vec::new() }.independent().is_none());
+    }
+}
