@@ -60,6 +60,8 @@ pub(crate) struct Row {
 pub(crate) struct Summary {
     pub solver: String,
     pub runs: usize,
+    /// Runs on problems with a known minimum.
+    pub judged: usize,
     pub solved: usize,
     /// Runs that end with an optimum that violates a constraint.
     pub false_claims: usize,
@@ -115,6 +117,7 @@ impl Results {
         Summary {
             solver: solver.to_owned(),
             runs: rows.len(),
+            judged: rows.iter().filter(|row| row.known.is_some()).count(),
             solved: rows.iter().filter(|row| row.solved).count(),
             false_claims: rows.iter().filter(|row| row.converged && row.violation > mops_core::FEASIBLE).count(),
             median_rough: median(rows.iter().filter_map(|row| row.to_rough)),

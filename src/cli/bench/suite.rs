@@ -177,7 +177,12 @@ fn cells(row: &Row, seeds: bool, before: Option<&Results>) -> Vec<String> {
         count(row.to_fine),
         row.evaluations.to_string(),
         format!("{:.2}", 1e3 * row.seconds),
-        if row.solved { "yes" } else { "no" }.to_owned(),
+        match (row.known, row.solved) {
+            (None, _) => "-",
+            (_, true) => "yes",
+            (_, false) => "no",
+        }
+        .to_owned(),
     ];
     cells.extend(before.map(|before| before.same(row).map_or_else(String::new, |old| count(old.to_fine))));
     cells
@@ -192,13 +197,20 @@ fn summary(name: &str, results: &Results, solver: &str) -> String {
     } else {
         String::new()
     };
+    if of.judged == 0 {
+        return format!(
+            "{name}{}: {} runs on problems without one known minimum: none is called solved; {:.2} s, {:.0} ns per \
+             evaluation of its own{claims}\n",
+            of.solver, of.runs, of.seconds, of.nanoseconds
+        );
+    }
     format!(
         "{name}{}: {} of {} solved ({:.1} %), median evaluations {} to 1e-3 and {} to the end, {:.2} s, {:.0} ns per \
          evaluation of its own{claims}\n",
         of.solver,
         of.solved,
-        of.runs,
-        100.0 * of.solved as f64 / of.runs.max(1) as f64,
+        of.judged,
+        100.0 * of.solved as f64 / of.judged as f64,
         count(of.median_rough),
         count(of.median_fine),
         of.seconds,
