@@ -1,6 +1,7 @@
 //! Benchmarks: many cases whose truth is known, one after the other on every thread.
 
 pub(crate) mod diagnosis;
+mod page;
 pub(crate) mod solvers;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,30 +1,13 @@
 //! The page of a benchmark: what the terminal says, and the reliability of stated probabilities as a picture.
 
-use maud::{DOCTYPE, PreEscaped, html};
-
 use super::statistics::{Bin, reliability};
 use crate::report::{Curve, CurveStyle, Ink, Plot};
 
 /// The page, from the tables as text, and stated probabilities beside what came true, by what they are of.
 pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String {
-    let plots =
-        stated.iter().filter(|(_, pairs)| !pairs.is_empty()).map(|(of, pairs)| plot(of, &reliability(pairs)).svg());
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Benchmark of the diagnosis" }
-                style { "body { font-family: sans-serif; max-width: 60em; margin: 2em auto; } svg { max-width: 100%; }" }
-            }
-            body {
-                h1 { "Benchmark of the diagnosis" }
-                @for plot in plots { (PreEscaped(plot)) }
-                pre { (tables) }
-            }
-        }
-    };
-    page.into_string()
+    let told = stated.iter().filter(|(_, pairs)| !pairs.is_empty());
+    let pictures: Vec<String> = told.map(|(of, pairs)| plot(of, &reliability(pairs)).svg()).collect();
+    super::super::page::page("Benchmark of the diagnosis", "Stated probabilities", &pictures, tables, "cases.csv")
 }
 
 /// What was stated, and what came true with its interval; where both agree, points lie on the diagonal.

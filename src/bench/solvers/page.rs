@@ -1,7 +1,5 @@
 //! The page of a benchmark of solvers: profiles as pictures, and what the terminal says.
 
-use maud::{DOCTYPE, PreEscaped, html};
-
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
 use crate::report::{Curve, Ink, Plot};
@@ -19,30 +17,8 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
         performance(all, fine, accuracy),
     ];
     let title = format!("Benchmark of solvers: {suite}");
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                style { (PreEscaped(crate::report::STYLE)) }
-            }
-            body {
-                header { p class="task" { "benchmark" } h1 { (title) } }
-                main {
-                    section {
-                        h2 { "Profiles" }
-                        @for plot in plots.iter().flatten() { figure { (PreEscaped(plot.svg())) } }
-                    }
-                    section { h2 { "Runs" } div class="wide" tabindex="0" { pre { (tables) } } }
-                }
-                footer { "Written by mops " (env!("CARGO_PKG_VERSION")) ". The numbers are in results.json." }
-            }
-        }
-    };
-    page.into_string()
+    let pictures: Vec<String> = plots.iter().flatten().map(Plot::svg).collect();
+    super::super::page::page(&title, "Profiles", &pictures, tables, "results.json")
 }
 
 /// The solvers of all results, with their names and scores.

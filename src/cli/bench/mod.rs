@@ -110,18 +110,20 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let text = tables::all(&results);
     print(&text);
     if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-        let write = |name: &str, content: String| {
-            let path = folder.join(name);
-            std::fs::write(&path, content).map_err(cannot_write(&path))
-        };
-        write("cases.csv", diagnosis::csv(&results.rows))?;
+        write(folder, "cases.csv", &diagnosis::csv(&results.rows))?;
         if against {
-            write("brute-force.csv", diagnosis::csv(&results.brute))?;
+            write(folder, "brute-force.csv", &diagnosis::csv(&results.brute))?;
         }
-        write("index.html", diagnosis::page(&text, &tables::stated(&results.rows)))?;
+        write(folder, "index.html", &diagnosis::page(&text, &tables::stated(&results.rows)))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a file of a benchmark in its folder, which is made where it is not there yet.
+fn write(folder: &Path, name: &str, content: &str) -> Result<(), Trouble> {
+    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+    let path = folder.join(name);
+    std::fs::write(&path, content).map_err(cannot_write(&path))
 }
 
 /// What is asked for, names checked.

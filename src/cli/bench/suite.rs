@@ -9,7 +9,8 @@ use mops_problems::{Slope, Suite, suites};
 
 use super::super::progress::Progress;
 use super::super::tables::{number, table};
-use super::super::{Trouble, cannot_write, print};
+use super::super::{Trouble, print};
+use super::write;
 use crate::bench::solvers::{self, Plan, Results, Row};
 
 /// What can be said to the benchmark of a suite.
@@ -101,16 +102,11 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     let text = text(&results, before.as_ref());
     print(&text);
     if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-        let write = |name: &str, content: String| {
-            let path = folder.join(name);
-            std::fs::write(&path, content).map_err(cannot_write(&path))
-        };
         let json = serde_json::to_string_pretty(&results).expect("numbers and names can be written");
-        write("results.json", json + "\n")?;
+        write(folder, "results.json", &(json + "\n"))?;
         let mut all = vec![(String::new(), &results)];
         all.extend(before.as_ref().map(|before| ("before".to_owned(), before)));
-        write("index.html", solvers::page(&text, &all))?;
+        write(folder, "index.html", &solvers::page(&text, &all))?;
     }
     Ok(ExitCode::SUCCESS)
 }
