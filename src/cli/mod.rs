@@ -16,6 +16,7 @@ mod new;
 mod places;
 mod progress;
 mod remains;
+mod robustness;
 mod run;
 mod schema;
 mod simulate;
