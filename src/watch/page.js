@@ -149,6 +149,7 @@ function show(state) {
   document.body.dataset.shown = String(state.evaluations);
 }
 
+show(JSON.parse(at("now").textContent));
 const events = new EventSource("events");
 events.onmessage = (event) => show(JSON.parse(event.data));
 events.addEventListener("over", (event) => { show(JSON.parse(event.data)); events.close(); });

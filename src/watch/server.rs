@@ -118,7 +118,7 @@ fn serve(mut stream: TcpStream, port: u16, token: &str, shared: &Shared) -> io::
     let wanted = read(&mut stream, port, token)?;
     let style = || [crate::report::STYLE, OWN_STYLE].concat();
     match wanted {
-        Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", PAGE),
+        Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
         Answer::Style => whole(&mut stream, "200 OK", "text/css; charset=utf-8", &style()),
         Answer::Script => whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", SCRIPT),
         Answer::Events => events(&mut stream, shared),
@@ -127,6 +127,13 @@ fn serve(mut stream: TcpStream, port: u16, token: &str, shared: &Shared) -> io::
         }
         Answer::More => Ok(()),
     }
+}
+
+/// The page with the state of this moment in it.
+fn page(shared: &Shared) -> String {
+    let (_, _, state) = shared.live.after(0, Duration::ZERO);
+    // In a page, `<` could end the block that the state is in.
+    PAGE.replace("{{state}}", &state.replace('<', "\\u003c"))
 }
 
 /// Reads the head of a request: all of it within [`PATIENCE`], however slowly it comes.
