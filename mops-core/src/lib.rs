@@ -16,6 +16,7 @@ pub mod expression;
 pub mod file;
 pub mod front;
 pub mod identification;
+mod known;
 pub mod linear;
 mod linearised;
 mod model;
@@ -51,6 +52,7 @@ pub use effect::{
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
+pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting};
 pub use model::{

@@ -43,7 +43,10 @@ pub struct Outcome {
     pub stop: Stop,
     /// Points evaluated.
     pub evaluations: usize,
-    /// Models run.
+    /// Of a run that uses points of another again: how many of its own were known, and not simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reused: Option<usize>,
+    /// Models run; points that were known count as if they were simulated.
     pub simulations: usize,
     /// Wall-clock time, s.
     pub seconds: f64,

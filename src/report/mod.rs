@@ -21,6 +21,7 @@ mod robustness;
 mod sampling;
 mod scene;
 mod sensitivity;
+mod side_by_side;
 mod surface;
 mod svg;
 mod sweep;
@@ -42,6 +43,7 @@ pub(crate) use numbers::{FileNames, file_name, significant};
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
+pub(crate) use side_by_side::{Responses, comparison_page};
 
 /// The style sheet of all pages.
 pub(crate) const STYLE: &str = include_str!("style.css");
