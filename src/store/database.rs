@@ -154,6 +154,7 @@ impl Database {
             return Ok(None);
         }
         if writes {
+            connection.pragma_update(None, "journal_mode", "WAL")?;
             connection.pragma_update(None, "synchronous", "NORMAL")?;
         }
         Ok(Some(Self { connection }))
@@ -207,6 +208,8 @@ impl Database {
     pub(super) fn end(&self, run: i64, state: RunState, reused: usize) -> rusqlite::Result<()> {
         let sql = "UPDATE runs SET ended = ?, state = ?, reused = ? WHERE id = ?";
         self.connection.execute(sql, params![now(), state.name(), integer(reused), run])?;
+        // One file, which can be read where nothing can be written; while somebody reads it stays as it is.
+        let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         Ok(())
     }
 

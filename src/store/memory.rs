@@ -12,7 +12,7 @@ use super::database::{PointRow, Points, Slopes};
 
 /// Bytes that residuals and derivatives may take in a database; beyond them points keep their criteria alone, and what a
 /// solver needs of their residuals is simulated again.
-pub(super) const ROOM: usize = 64 << 20;
+pub(super) const ROOM: usize = 256 << 20;
 
 /// What goes to the writer, in the order in which it happened.
 pub(super) enum Message {
