@@ -472,6 +472,31 @@ fn a_worst_case_inside_the_box_on_a_jump_is_found() {
     assert_eq!(settling["at"][0]["at_bound"], Json::Null);
 }
 
+/// The three cases of table 5.3 do not cover the box: its controller needs 16.948 s at (0.0167, -4.8, -1.2).
+#[test]
+fn a_worst_case_inside_an_edge_of_the_box_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = ["tuners.k.start=5.81163", "tuners.Ti.start=6.53286", "tuners.Td.start=0.931463"];
+    let settling = &run("pid-worst-case", folder.path(), &design)["worst-case"]["criteria"][1];
+    assert!((settling["value"].as_f64().unwrap() - 16.948).abs() < 1e-3, "{settling}");
+    for (j, (exact, accurate)) in [(0.0167, 2e-3), (-4.8, 1e-9), (-1.2, 1e-9)].into_iter().enumerate() {
+        assert!((settling["at"][j]["value"].as_f64().unwrap() - exact).abs() < accurate, "{settling}");
+    }
+}
+
+#[test]
+fn effects_over_the_ranges_are_told_of_a_study_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for (method, key) in [("morris", "magnitude"), ("sobol", "total")] {
+        let sensitivity = format!("sensitivity={{at='start',method='{method}',samples=16}}");
+        let result = run("pid-worst-case", folder.path(), &["study.task='sensitivity'", &sensitivity]);
+        let effects = &result["global-sensitivity"]["criteria"][0]["effects"];
+        assert!(effects.as_array().unwrap().len() == 3 && !effects[0][key].is_null(), "{effects}");
+        let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+        assert!(page.contains("Effects of uncertain parameters"));
+    }
+}
+
 #[test]
 fn samples_are_written_beside_the_result() {
     let folder = tempfile::tempdir().unwrap();
