@@ -51,7 +51,7 @@ impl From<Refusal> for Trouble {
 /// Whether the points of a task can be kept.
 fn keeps(task: Task) -> bool {
     match task {
-        Task::Design | Task::Calibration | Task::Sensitivity | Task::Sweep => true,
+        Task::Design | Task::Calibration | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => true,
         Task::Excitation | Task::Diagnosis => false,
     }
 }
