@@ -179,15 +179,24 @@ fn profile(one: &ProfileReport) -> Figure {
     Figure { plots: vec![(format!("profile-{}", one.parameter), plot)], caption: Vec::new() }
 }
 
+/// What bands lie around.
+#[derive(Clone, Copy)]
+pub(super) enum Around {
+    /// The prediction.
+    Prediction,
+    /// Zero, as residuals do.
+    Zero,
+}
+
 /// The curves of the bands of a channel, to lie over its plot.
-pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str) -> Vec<Curve> {
+pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, around: Around) -> Vec<Curve> {
     let Some(band) = found.bands.iter().find(|b| b.experiment == experiment && b.channel == channel) else {
         return Vec::new();
     };
     let percent = significant(100.0 * found.level, 4);
     let curve = |name: String, half: &[f64], sign: f64, ink: Ink| Curve {
         name,
-        points: points(band, half, sign),
+        points: points(band, half, sign, around),
         ink,
         style: CurveStyle::Dashed,
         may_leave: true,
@@ -201,6 +210,10 @@ pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str) 
     ]
 }
 
-fn points(band: &BandReport, half: &[f64], sign: f64) -> Vec<(f64, f64)> {
-    band.times.iter().zip(&band.value).zip(half).map(|((&t, v), h)| (t, v + sign * h)).collect()
+fn points(band: &BandReport, half: &[f64], sign: f64, around: Around) -> Vec<(f64, f64)> {
+    let middle = |value: f64| match around {
+        Around::Prediction => value,
+        Around::Zero => 0.0,
+    };
+    band.times.iter().zip(&band.value).zip(half).map(|((&t, &value), half)| (t, middle(value) + sign * half)).collect()
 }
