@@ -26,13 +26,16 @@ mod plant;
 mod port;
 mod problem;
 mod random;
+mod robustness;
 mod run;
 mod scalar;
 mod solver;
+pub mod statistics;
 mod study;
 mod tolerance;
 mod trace;
 mod tuner;
+mod uncertainty;
 mod unit;
 
 pub use case::Case;
@@ -63,17 +66,25 @@ pub use outcome::{
 pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
-pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
+pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, SignalSlopes, Slopes};
 pub use random::{Stream, stream};
+pub use robustness::{
+    AddedReport, CoordinateReport, DistributionReport, EffectReport, EffectsReport, FailedAt, GlobalSensitivityReport,
+    MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject, UncertainReport,
+    WorstCaseReport, WorstReport, uncertain_reports,
+};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
-    Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, DiagnosisTask, Draft, ExcitationDraft, ExcitationTask,
-    Free, JobPlan, Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask,
-    Row, SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
+    Axis, AxisDraft, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DiagnosisTask, Distribution, DistributionDraft,
+    Draft, ExcitationDraft, ExcitationTask, Free, JobPlan, Measured, Mistake, ModelDraft, MonteCarloTask, Objective,
+    ParameterSource, Place, RegressionDraft, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod,
+    SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft, Uncertain, UncertainDraft,
+    UncertaintyTask, WorstCaseTask,
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
 pub use tuner::{Grid, Scale, Tuner};
+pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};
 pub use unit::{Quantity, Unit};

@@ -21,6 +21,7 @@ mod places;
 mod progress;
 mod remains;
 mod report;
+mod robustness;
 mod run;
 mod schema;
 mod simulate;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Mistake, Place, Study, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Place, Study, Task, Watch, suggestion};
 
 use super::progress::Progress;
 use super::remains::leave;
@@ -239,12 +239,14 @@ fn introduction(study: &Study, options: &Options) -> String {
 }
 
 /// Whether the task of a study needs a solver.
-fn solves(study: &Study) -> bool {
+pub(super) fn solves(study: &Study) -> bool {
     match study.task {
         Task::Design | Task::Calibration => true,
         Task::Excitation | Task::Diagnosis => false,
         Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
         Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
+        Task::WorstCase => study.tasks.worst_case.at == Place::Optimum,
+        Task::MonteCarlo => study.tasks.monte_carlo.at == Place::Optimum,
     }
 }
 
@@ -255,10 +257,27 @@ fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), T
     std::fs::write(&result, json).map_err(cannot_write(&result))?;
     let evaluations = folder.join("evaluations.csv");
     write_evaluations(&evaluations, solved).map_err(|e| cannot_write(&evaluations)(std::io::Error::other(e)))?;
+    if let Some(found) = &solved.outcome.found.monte_carlo {
+        let samples = folder.join("samples.csv");
+        write_samples(&samples, found).map_err(|e| cannot_write(&samples)(std::io::Error::other(e)))?;
+    }
     let Solved { outcome, problem, best, archive, diagnosis } = solved;
     Report { outcome, problem, best, archive, diagnosis: diagnosis.as_ref(), text }
         .write(folder)
         .map_err(cannot_write(folder))
+}
+
+/// One line per sample: uncertain parameters, criteria.
+fn write_samples(path: &Path, found: &MonteCarloReport) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
+    let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
+    writer.write_record(parameters.chain(criteria))?;
+    for (parameters, values) in &found.table {
+        writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
+    }
+    writer.flush()?;
+    Ok(())
 }
 
 /// One line per point: tuners, criteria, objective, violation.

@@ -7,6 +7,7 @@ mod entries;
 mod experiment;
 mod frequency;
 mod parts;
+mod robustness;
 mod schema;
 mod sections;
 mod shape;

@@ -3,7 +3,9 @@
 mod build;
 mod diagnosis;
 mod draft;
+mod robustness;
 mod tasks;
+mod uncertain;
 
 use std::sync::Arc;
 
@@ -12,10 +14,12 @@ use serde::{Deserialize, Serialize};
 
 pub use diagnosis::DiagnosisTask;
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
+pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 pub use tasks::{
     Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
     SweepDraft, SweepTask, Tasks, TasksDraft,
 };
+pub use uncertain::{Distribution, DistributionDraft, Scenario, Uncertain, UncertainDraft};
 
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
@@ -26,7 +30,7 @@ use crate::unit::Unit;
 
 /// What a study is for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Task {
     /// Choose the tuners so that the worst scaled criterion is as small as it can be.
     #[default]
@@ -41,6 +45,10 @@ pub enum Task {
     Sweep,
     /// Find the physical effect that the model lacks.
     Diagnosis,
+    /// Find the largest scaled value of every criterion over a box of uncertain parameters.
+    WorstCase,
+    /// Tell how the criteria are distributed where parameters are uncertain.
+    MonteCarlo,
 }
 
 /// How the scaled values become one number to minimise.
