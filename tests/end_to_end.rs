@@ -340,8 +340,18 @@ fn a_benchmark_of_solvers_leaves_results_that_can_be_compared() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("bench");
     let results = out.join("results.json");
-    let bench =
-        ["bench", "minimax", "--problems", "CB2,Bard", "--gradients", "--quiet", "--out", out.to_str().unwrap()];
+    let bench = [
+        "bench",
+        "minimax",
+        "--solver",
+        "sqp",
+        "--problems",
+        "CB2,Bard",
+        "--gradients",
+        "--quiet",
+        "--out",
+        out.to_str().unwrap(),
+    ];
     let first = mops(&bench).output().unwrap();
     let text = String::from_utf8(first.stdout).unwrap();
     assert!(first.status.success() && text.contains("sqp: 2 of 2 solved"), "{text}");
@@ -352,4 +362,37 @@ fn a_benchmark_of_solvers_leaves_results_that_can_be_compared() {
     let text = String::from_utf8(again.stdout).unwrap();
     assert!(text.contains("before: sqp: 2 of 2 solved"), "{text}");
     mops(&["bench", "minimax", "--problems", "CB22"]).assert().code(2);
+}
+
+/// What `mops bench` prints for the given arguments.
+fn benched(arguments: &[&str]) -> String {
+    let done = mops(&[&["bench"], arguments, &["--quiet"]].concat()).output().unwrap();
+    let text = String::from_utf8(done.stdout).unwrap();
+    assert!(done.status.success(), "{text}");
+    text
+}
+
+#[test]
+fn the_default_solver_finds_known_optima_of_control_design_and_calibration() {
+    let problems =
+        "lq-double-integrator,itae-third-order,settling-second-order,minimum-time,absorber-h2,tank,misra1a,boxbod";
+    let text = benched(&["control", "--seeds", "2", "--problems", problems]);
+    assert!(text.contains("auto: 16 of 16 solved"), "{text}");
+}
+
+#[test]
+fn a_benchmark_of_fronts_has_mean_hypervolume_and_distance_over_seeds() {
+    let text = benched(&["zdt", "--problems", "ZDT6", "--seeds", "2"]);
+    let row = text.lines().find(|line| line.contains("ZDT6")).unwrap();
+    let cells: Vec<&str> = row.split_whitespace().collect();
+    let of = |i: usize| cells[i].parse::<f64>().unwrap();
+    // problem, solver, seeds, evaluations, volume, sd, of front, all points, distance, sd
+    let (volume, front, all) = (of(4), of(6), of(7));
+    assert!((0.45..=front).contains(&volume) && all >= volume && all <= front && of(8) < 0.05, "{row}");
+}
+
+#[test]
+fn problems_without_known_minima_are_measured_by_the_best_of_all_solvers() {
+    let text = benched(&["more-wild", "--problems", "1 n9 m45,4 n2 m2", "--solver", "auto"]);
+    assert!(text.contains("simplex gradients: ") && text.contains("auto: 2 of 2 solved"), "{text}");
 }

@@ -24,6 +24,7 @@ mod outcome;
 mod placement;
 mod plant;
 mod port;
+mod prediction;
 mod problem;
 mod random;
 mod robustness;
@@ -66,12 +67,13 @@ pub use outcome::{
 pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
-pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, SignalSlopes, Slopes};
+pub use prediction::SignalSlopes;
+pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
 pub use random::{Stream, stream};
 pub use robustness::{
-    AddedReport, CoordinateReport, DistributionReport, EffectReport, EffectsReport, FailedAt, GlobalSensitivityReport,
-    MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject, UncertainReport,
-    WorstCaseReport, WorstReport, uncertain_reports,
+    AddedReport, CoordinateReport, DistributionReport, EffectReport, EffectsReport, Estimated, FailedAt,
+    GlobalSensitivityReport, MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject,
+    UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
 };
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};

@@ -294,10 +294,19 @@ pub struct EffectReport {
     pub deviation: Option<f64>,
     /// Share of the variance by the parameter alone, and its interval.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub first: Option<(f64, [f64; 2])>,
+    pub first: Option<Estimated>,
     /// Share of the variance by the parameter alone and together with others, and its interval.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub total: Option<(f64, [f64; 2])>,
+    pub total: Option<Estimated>,
+}
+
+/// A number that is known within an interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimated {
+    /// The estimate.
+    pub value: f64,
+    /// Its interval.
+    pub interval: [f64; 2],
 }
 
 impl Subject {

@@ -165,4 +165,9 @@ pub trait Solver: Send {
     /// # Errors
     /// The run is over.
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt>;
+
+    /// The points it holds at present, where it is one that has members; else none.
+    fn members(&self) -> &[Vec<f64>] {
+        &[]
+    }
 }

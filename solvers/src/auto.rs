@@ -48,9 +48,28 @@ enum Stage {
     Front(Box<dyn Solver>),
     /// From several starts.
     Global(Multistart),
-    /// From the best point; with whether the first stage met a test of an optimum.
-    Polish(Box<dyn Solver>, bool),
+    /// From the best point on, without slopes.
+    Polish(Box<dyn Solver>, Standing),
+    /// From several starts around the best point.
+    Around(Multistart, Standing),
 }
+
+/// What is known when a stage begins.
+#[derive(Debug, Clone, Copy)]
+struct Standing {
+    /// Whether a stage before met a test of an optimum.
+    converged: bool,
+    /// Whether two starts have led to the same optimum.
+    agreed: bool,
+    /// The objective when the last rounds around the best point began.
+    before: f64,
+}
+
+/// Relative change of the objective that is none.
+const SAME: f64 = 1e-4;
+
+/// Half the widths of the box around the best point, in turn.
+const AROUND: &[f64] = &[0.05, 0.02, 0.005];
 
 impl Solver for Auto {
     fn accepts(&self, _: &Shape) -> Result<(), String> {
@@ -81,19 +100,71 @@ impl Solver for Auto {
                 if progress == Progress::Continue || oracle.shape().residuals > 0 {
                     return Ok(progress);
                 }
-                let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(progress) };
-                let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
-                pattern.begin(oracle, &best)?;
-                self.stage = Some(Stage::Polish(pattern, progress == Progress::Converged));
-                Ok(Progress::Continue)
+                let converged = progress == Progress::Converged;
+                let standing = Standing { converged, agreed: global.agrees(SAME), before: f64::INFINITY };
+                self.polish(oracle, standing)
             }
-            Stage::Polish(pattern, converged) => match pattern.step(oracle)? {
-                Progress::Continue => Ok(Progress::Continue),
-                Progress::Stalled if !*converged => Ok(Progress::Stalled),
-                _ => Ok(Progress::Converged),
-            },
+            Stage::Polish(pattern, standing) => {
+                let standing = *standing;
+                match pattern.step(oracle)? {
+                    Progress::Continue => Ok(Progress::Continue),
+                    progress => self.settle(oracle, standing, progress),
+                }
+            }
+            Stage::Around(around, standing) => {
+                let standing = *standing;
+                match around.step(oracle)? {
+                    Progress::Continue => Ok(Progress::Continue),
+                    _ if gains(oracle, standing.before) => self.polish(oracle, standing),
+                    progress => Ok(standing.ending(progress)),
+                }
+            }
         }
     }
+
+    fn members(&self) -> &[Vec<f64>] {
+        match &self.stage {
+            Some(Stage::Front(front)) => front.members(),
+            _ => &[],
+        }
+    }
+}
+
+impl Standing {
+    fn ending(self, progress: Progress) -> Progress {
+        if progress == Progress::Stalled && !self.converged { Progress::Stalled } else { Progress::Converged }
+    }
+}
+
+impl Auto {
+    /// A pattern search from the best point.
+    fn polish(&mut self, oracle: &mut dyn Oracle, standing: Standing) -> Result<Progress, Halt> {
+        let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
+        let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
+        pattern.begin(oracle, &best)?;
+        self.stage = Some(Stage::Polish(pattern, standing));
+        Ok(Progress::Continue)
+    }
+
+    /// The end, or, where no two starts have led to the same optimum, rounds around the best point.
+    fn settle(&mut self, oracle: &mut dyn Oracle, standing: Standing, progress: Progress) -> Result<Progress, Halt> {
+        let sloped = oracle.shape().spacing.iter().all(|&spacing| spacing == 0.0);
+        if self.options.starts < 2 || !sloped || standing.agreed || !gains(oracle, standing.before) {
+            return Ok(standing.ending(progress));
+        }
+        let before = oracle.best().map_or(f64::INFINITY, |best| best.merit.objective);
+        let mut around = Multistart::around(SqpOptions::default().build(), AROUND, SAME);
+        if !around.begin_around(oracle)? {
+            return Ok(standing.ending(progress));
+        }
+        self.stage = Some(Stage::Around(around, Standing { before, ..standing }));
+        Ok(Progress::Continue)
+    }
+}
+
+/// Whether the best objective is less than `before` by more than nothing.
+fn gains(oracle: &dyn Oracle, before: f64) -> bool {
+    oracle.best().is_some_and(|best| before.is_infinite() || before - best.merit.objective > SAME * before.abs())
 }
 
 /// Crowding spreads two objectives evenly, reference directions more of them.

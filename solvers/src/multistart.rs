@@ -1,7 +1,7 @@
 //! Runs a local solver from several starts, one after the other: the study's own first, then the best of a sample of the
 //! box, then, if wanted, around the best point found, again and again until nothing changes.
 
-use mops_core::{Halt, Merit, Oracle, Progress, Solver};
+use mops_core::{Evaluation, Halt, Linearisation, Merit, Oracle, Progress, Shape, Solver, Stream};
 
 use crate::start::{best_of, latin_hypercube};
 
@@ -16,8 +16,16 @@ pub struct Multistart {
     best: Option<(Merit, Progress)>,
     /// Whether to go on around the best point.
     restarts: bool,
+    /// Half the widths of the box around the best point, in turn: as many rounds may find nothing.
+    reach: &'static [f64],
+    /// Relative change of the objective that is something.
+    gain: f64,
     /// Rounds around the best point that were begun, rounds in a row that found nothing, and the objective before.
     round: Round,
+    /// The best that the present run has seen itself.
+    own: Merit,
+    /// The same of the runs that have ended.
+    ends: Vec<Merit>,
 }
 
 /// A round of restarts around the best point.
@@ -32,22 +40,36 @@ impl Round {
     const NONE: Self = Self { begun: 0, idle: 0, objective: f64::INFINITY };
     /// Starts of a round.
     const STARTS: usize = 3;
-    /// Half the width of the box around the best point, wide and narrow in turn.
-    const REACH: [f64; 2] = [0.15, 0.05];
-    /// Rounds that may find nothing, one of each width.
-    const IDLE: usize = 2;
 }
 
 impl Multistart {
     /// Runs `local` from `starts` points.
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
-        Self { local, extra: starts.saturating_sub(1), left: None, best: None, restarts: false, round: Round::NONE }
+        Self {
+            local,
+            extra: starts.saturating_sub(1),
+            left: None,
+            best: None,
+            restarts: false,
+            reach: &[0.15, 0.05],
+            gain: 1e-3,
+            round: Round::NONE,
+            own: Merit::FAILED,
+            ends: Vec::new(),
+        }
     }
 
-    /// Goes on around the best point until two rounds of restarts improve it by less than a thousandth.
+    /// Goes on around the best point until two rounds of restarts, a wide and a narrow one, improve it by less than a
+    /// thousandth.
     #[must_use]
     pub fn until_nothing_changes(self) -> Self {
         Self { restarts: true, ..self }
+    }
+
+    /// Rounds from the best point on, within these distances of it in turn, until none of them improves it by as much as
+    /// `gain`, relative to its size.
+    pub fn around(local: Box<dyn Solver>, reach: &'static [f64], gain: f64) -> Self {
+        Self { restarts: true, reach, gain, left: Some(Vec::new()), ..Self::new(local, 1) }
     }
 
     /// Begins the first run.
@@ -58,7 +80,34 @@ impl Multistart {
         self.left = None;
         self.best = None;
         self.round = Round::NONE;
-        self.local.begin(oracle, start)
+        self.ends.clear();
+        self.begin_run(oracle, start)
+    }
+
+    /// Begins the first round around the best point; `false` where there is none.
+    ///
+    /// # Errors
+    /// The run is over.
+    pub fn begin_around(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        self.begin_round(oracle)
+    }
+
+    /// Whether two runs have ended within `accuracy` of the best, relative to its size.
+    pub fn agrees(&self, accuracy: f64) -> bool {
+        let best =
+            self.ends.iter().fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
+        let near = |end: &&Merit| {
+            end.is_feasible()
+                && end.objective - best.objective <= accuracy * best.objective.abs().max(f64::MIN_POSITIVE)
+        };
+        self.ends.iter().filter(near).count() > 1
+    }
+
+    fn begin_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        let mut seen = Seen { oracle, best: Merit::FAILED };
+        let begun = self.local.begin(&mut seen, start);
+        self.own = seen.best;
+        begun
     }
 
     /// An iteration of the present run, or the beginning of the next.
@@ -66,10 +115,13 @@ impl Multistart {
     /// # Errors
     /// The run is over.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let progress = self.local.step(oracle)?;
+        let mut seen = Seen { oracle: &mut *oracle, best: self.own };
+        let progress = self.local.step(&mut seen)?;
+        self.own = seen.best;
         if progress == Progress::Continue {
             return Ok(progress);
         }
+        self.ends.push(self.own);
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
             self.best = Some((found, progress));
@@ -79,7 +131,7 @@ impl Multistart {
         }
         match self.left.as_mut().and_then(Vec::pop) {
             Some(start) => {
-                self.local.begin(oracle, &start)?;
+                self.begin_run(oracle, &start)?;
                 Ok(Progress::Continue)
             }
             None if self.restarts && self.begin_round(oracle)? => Ok(Progress::Continue),
@@ -92,13 +144,14 @@ impl Multistart {
         let Some(best) = oracle.best().map(|best| (best.point.clone(), best.merit.objective)) else { return Ok(false) };
         let (centre, objective) = best;
         let Round { begun, idle, objective: before } = self.round;
-        let idle = if objective < before * (1.0 - 1e-3) { 0 } else { idle + 1 };
-        if idle >= Round::IDLE || centre.is_empty() {
+        let gained = before.is_infinite() || objective < before - self.gain * before.abs();
+        let idle = if gained { 0 } else { idle + 1 };
+        if idle >= self.reach.len() || centre.is_empty() {
             return Ok(false);
         }
         self.round = Round { begun: begun + 1, idle, objective };
         let n = centre.len();
-        let reach = Round::REACH[begun % 2];
+        let reach = self.reach[begun % self.reach.len()];
         let mut random = oracle.stream(&format!("restart {begun}"));
         let mut sample = latin_hypercube(2 * (n + 1), n, &mut random);
         for point in &mut sample {
@@ -107,7 +160,7 @@ impl Multistart {
         let mut starts = best_of(oracle, &sample, Round::STARTS)?;
         let Some(start) = starts.pop() else { return Ok(false) };
         self.left = Some(starts);
-        self.local.begin(oracle, &start)?;
+        self.begin_run(oracle, &start)?;
         Ok(true)
     }
 
@@ -119,5 +172,39 @@ impl Multistart {
         let mut random = oracle.stream("multistart");
         let sample = latin_hypercube(self.extra * 5 * (n + 1), n, &mut random);
         best_of(oracle, &sample, self.extra)
+    }
+}
+
+/// An oracle that remembers the best it has answered.
+struct Seen<'a> {
+    oracle: &'a mut dyn Oracle,
+    best: Merit,
+}
+
+impl Oracle for Seen<'_> {
+    fn shape(&self) -> &Shape {
+        self.oracle.shape()
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        let answers = self.oracle.evaluate(points)?;
+        for answer in &answers {
+            if answer.merit.is_better_than(&self.best) {
+                self.best = answer.merit;
+            }
+        }
+        Ok(answers)
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        self.oracle.linearise(point, reach)
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.oracle.best()
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        self.oracle.stream(label)
     }
 }

@@ -11,7 +11,7 @@ fn sqp(problem: &Problem, slope: Slope) -> Measured {
     let posed = Posed::new(problem, slope);
     let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "sqp").expect("sqp is a kind");
     let mut solver = kind.default_choice().make();
-    measure(problem, &posed, &posed.start(), solver.as_mut(), 1000 * (problem.dimension() + 1))
+    measure(&problem.answer, &posed, &posed.start(), solver.as_mut(), 1000 * (problem.dimension() + 1))
 }
 
 fn check(suite: &str, names: &[&str], accuracy: f64) {

@@ -1,8 +1,8 @@
 //! Worst cases, distributions and effects over uncertain parameters, as tables and sentences on the terminal.
 
 use mops_core::{
-    Findings, GlobalSensitivityReport, MonteCarloReport, RobustReport, SensitivityMethod, Subject, UncertainReport,
-    UncertaintyReport, WorstCaseReport, WorstReport,
+    Estimated, Findings, GlobalSensitivityReport, MonteCarloReport, RobustReport, SensitivityMethod, Subject,
+    UncertainReport, UncertaintyReport, WorstCaseReport, WorstReport,
 };
 
 use super::findings::{known, sentences, share};
@@ -30,7 +30,8 @@ pub(super) fn text(found: &Findings) -> String {
     text
 }
 
-fn parameters(list: &[UncertainReport]) -> String {
+/// What is uncertain.
+pub(super) fn parameters(list: &[UncertainReport]) -> String {
     let rows = list.iter().map(|p| {
         let [low, high] = p.bounds.map(known);
         vec![p.name.clone(), number(p.nominal), low, high, p.unit.clone(), p.distribution.clone()]
@@ -126,8 +127,8 @@ fn global_sensitivity(found: &GlobalSensitivityReport) -> String {
             let mut row = subject(&c.of).to_vec();
             row.push(effect.parameter.clone());
             let bare = |value: Option<f64>| value.map_or_else(String::new, |v| significant(v, 4));
-            let told = |share: Option<(f64, [f64; 2])>| {
-                share.map_or_else(String::new, |(value, [low, high])| {
+            let told = |share: Option<Estimated>| {
+                share.map_or_else(String::new, |Estimated { value, interval: [low, high] }| {
                     format!("{} [{}, {}]", significant(value, 3), significant(low, 3), significant(high, 3))
                 })
             };

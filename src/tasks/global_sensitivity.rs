@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use mops_core::statistics::{MOST_DIMENSIONS, elementary_effects, radial, trajectories, variance_shares};
 use mops_core::{
-    EffectReport, EffectsReport, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Stop, Study, Subject, Watch,
-    stream, uncertain_reports,
+    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Stop, Study,
+    Subject, Watch, stream, uncertain_reports,
 };
 
 use super::batches::{Stage, each};
@@ -112,8 +112,8 @@ fn effects(
     let mut random = stream(study.seed, &format!("bootstrap {index} {}", row.name));
     let found = variance_shares(values, LEVEL, REPLICATES, &mut random).unwrap_or_default();
     let one = |(report, shares): (EffectReport, mops_core::statistics::VarianceShares)| EffectReport {
-        first: Some((shares.first, shares.first_interval)),
-        total: Some((shares.total, shares.total_interval)),
+        first: Some(Estimated { value: shares.first, interval: shares.first_interval }),
+        total: Some(Estimated { value: shares.total, interval: shares.total_interval }),
         ..report
     };
     names.zip(found).map(one).collect()
@@ -124,7 +124,7 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
     let mut words = Vec::new();
     for found in &report.criteria {
         let place = format!("`{}` in case `{}`", found.of.criterion, found.of.case);
-        let size = |e: &EffectReport| e.magnitude.or(e.total.map(|t| t.0)).unwrap_or(0.0);
+        let size = |e: &EffectReport| e.magnitude.or(e.total.map(|t| t.value)).unwrap_or(0.0);
         let mut sorted: Vec<&EffectReport> = found.effects.iter().collect();
         sorted.sort_by(|a, b| size(b).total_cmp(&size(a)));
         let Some(strongest) = sorted.first().filter(|e| size(e) > 0.0) else {
@@ -133,8 +133,8 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
         };
         let unit = if found.of.unit == "1" { String::new() } else { format!(" {}", found.of.unit) };
         words.push(match strongest.total {
-            Some((total, _)) => {
-                let first: f64 = found.effects.iter().filter_map(|e| e.first).map(|f| f.0).sum();
+            Some(Estimated { value: total, .. }) => {
+                let first: f64 = found.effects.iter().filter_map(|e| e.first).map(|f| f.value).sum();
                 let together = 1.0 - first;
                 let rest = if together > 0.05 {
                     format!("; {} of it come about by several parameters together", percent(together))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::{
     AddedReport, Budget, Ending, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask, RoundReport, Run,
-    Scenario, Stop, Study, Usage, Watch, conclude, uncertain_reports,
+    RunState, Scenario, Stop, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
 use super::batches::Stage;
@@ -25,7 +25,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let (mut stop, mut archive, mut simulations) = (Stop::Stalled, Vec::new(), 0);
     let mut last: Option<Solved>;
     loop {
-        let solved = search(rounds.to_solve(), &Options { max_evaluations: left, ..options.clone() }, watch)?;
+        let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len() };
+        let solved = search(rounds.to_solve(), &Options { max_evaluations: left, ..options.clone() }, &designing)?;
         left = left.saturating_sub(solved.outcome.evaluations);
         simulations += solved.outcome.simulations;
         archive.extend(solved.archive.iter().cloned());
@@ -57,6 +58,30 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     archive.iter_mut().for_each(|record: &mut Record| record.values.resize(rows, f64::NAN));
     solved.archive = archive;
     Ok(solved)
+}
+
+/// Shows a round's search for a design as a stage: its points are no share of the whole.
+struct Designing<'a> {
+    watch: &'a dyn Watch,
+    round: usize,
+    cases: usize,
+}
+
+impl Watch for Designing<'_> {
+    fn wants_stop(&self) -> bool {
+        self.watch.wants_stop()
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn evaluated(&self, state: &RunState) {
+        let what = format!(
+            "round {}: designing with {} worst cases, best {}",
+            self.round,
+            self.cases,
+            significant(state.best.objective, 5)
+        );
+        self.watch.stage(&what, state.evaluations as f64 / state.budget as f64);
+    }
 }
 
 /// What was done so far.
@@ -152,13 +177,15 @@ impl Rounds {
     /// The round whose design has the best worst case.
     fn chosen(&self) -> Option<usize> {
         let tolerance = self.task.tolerance;
-        let worth = |round: &RoundReport| {
-            let violation = round.violation_found;
-            (if violation > tolerance { violation } else { 0.0 }, round.found)
+        let worth = |i: usize| {
+            let RoundReport { violation_found: violation, found, .. } = self.done[i];
+            // A search that was ended knows nothing.
+            let known = !self.worst[i].is_empty();
+            if known { (if violation > tolerance { violation } else { 0.0 }, found) } else { (f64::INFINITY, found) }
         };
         let failing = |i: usize| self.worst[i].iter().any(|w| w.report.failed > 0 || w.at.is_empty());
         (0..self.done.len()).min_by(|&i, &j| {
-            let (a, b) = (worth(&self.done[i]), worth(&self.done[j]));
+            let (a, b) = (worth(i), worth(j));
             failing(i).cmp(&failing(j)).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1))
         })
     }

@@ -37,7 +37,7 @@ const TABLE: [(usize, u32, &[u32]); MOST_DIMENSIONS - 1] = [
 /// The first `count` points in `dimensions` dimensions, as 32-bit fractions, in the order of the Gray code; the first is
 /// the origin.
 ///
-/// Source: as [`TABLE`]; I. A. Antonov, V. M. Saleev, USSR Computational Mathematics and Mathematical Physics 19 (1979)
+/// Source: as the table; I. A. Antonov, V. M. Saleev, USSR Computational Mathematics and Mathematical Physics 19 (1979)
 /// 252-256 (the order of the Gray code: each point differs from the one before by one direction number).
 ///
 /// # Panics
@@ -60,7 +60,7 @@ pub fn sobol_sequence(count: usize, dimensions: usize) -> Vec<Vec<u32>> {
 /// `m_k = 2 a_1 m_(k-1) ^ 4 a_2 m_(k-2) ^ ... ^ 2^(s-1) a_(s-1) m_(k-s+1) ^ 2^s m_(k-s) ^ m_(k-s)`.
 fn directions(dimension: usize) -> [u32; BITS] {
     assert!(dimension < MOST_DIMENSIONS, "a Sobol sequence has at most {MOST_DIMENSIONS} dimensions here");
-    let mut m = vec![1u32; BITS];
+    let mut m = [1u32; BITS];
     if dimension > 0 {
         let (degree, coefficients, first) = TABLE[dimension - 1];
         m[..degree].copy_from_slice(first);

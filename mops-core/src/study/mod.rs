@@ -2,8 +2,10 @@
 
 mod build;
 mod diagnosis;
+mod distribution;
 mod draft;
 mod robustness;
+mod scenarios;
 mod tasks;
 mod uncertain;
 
@@ -13,13 +15,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use diagnosis::DiagnosisTask;
+pub use distribution::{Distribution, Uncertain};
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
 pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
+pub use scenarios::Scenario;
 pub use tasks::{
     Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
     SweepDraft, SweepTask, Tasks, TasksDraft,
 };
-pub use uncertain::{Distribution, DistributionDraft, Scenario, Uncertain, UncertainDraft};
+pub use uncertain::{DistributionDraft, UncertainDraft};
 
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};

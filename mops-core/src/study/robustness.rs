@@ -132,14 +132,12 @@ impl Default for UncertaintyTask {
 /// Checks what the tasks over uncertain parameters are asked; `tasks.uncertain` is checked already.
 pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
     let global = study.task == Task::Sensitivity && tasks.sensitivity.method != SensitivityMethod::Local;
-    let robust = tasks.robust.is_some();
+    // Other tasks of the same study leave the table aside.
+    let robust = tasks.robust.is_some() && study.task == Task::Design;
     let worst = matches!(study.task, Task::WorstCase);
-    if robust && study.task != Task::Design {
-        return Err(Mistake::new(
-            "robust",
-            "only a design is made against worst cases, and this study is for something else",
-        )
-        .with_help("remove [robust], or the `task`"));
+    if tasks.robust.is_some() && study.task == Task::Calibration {
+        return Err(Mistake::new("robust", "only a design is made against worst cases, and this is a calibration")
+            .with_help("remove [robust]; [uncertainty] tells how well the data determine the estimates"));
     }
     if robust && study.objective != Objective::Max {
         return Err(Mistake::new(
@@ -231,7 +229,7 @@ fn monte_carlo(task: &MonteCarloTask) -> Result<(), Mistake> {
 
 fn uncertainty(task: Option<&UncertaintyTask>, study: &Study) -> Result<(), Mistake> {
     let Some(task) = task else { return Ok(()) };
-    if study.task != Task::Calibration {
+    if study.cases.iter().all(|case| case.experiment.is_none()) {
         return Err(Mistake::here("only a calibration has estimates whose uncertainty can be told")
             .with_help("remove [uncertainty]; what parameters are known to lie in stands in [uncertain]"));
     }

@@ -1,9 +1,10 @@
 //! What tasks other than design and calibration are asked: as it is written down, and checked.
 
 use super::diagnosis::{self, DiagnosisTask};
+use super::distribution::Uncertain;
 use super::draft::Mistake;
 use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
-use super::uncertain::{self, Uncertain, UncertainDraft};
+use super::uncertain::{self, UncertainDraft};
 use super::{Study, Task};
 use crate::diagnostic::suggestion;
 use crate::experiment::Role;

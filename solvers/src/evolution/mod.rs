@@ -90,11 +90,6 @@ impl<S: Survival> Evolution<S> {
     pub fn new(survival: S, variation: fn(usize) -> Variation, generations: usize) -> Self {
         Self { survival, variation, generations, state: None }
     }
-
-    /// The members after the last whole generation.
-    pub fn members(&self) -> Option<&Pool> {
-        self.state.as_ref().map(|state| &state.members)
-    }
 }
 
 impl<S: Survival> Solver for Evolution<S> {
@@ -144,6 +139,11 @@ impl<S: Survival> Solver for Evolution<S> {
         state.members.append(oracle.shape(), &answers);
         self.keep_fittest();
         Ok(Progress::Continue)
+    }
+
+    /// Those of the last whole generation.
+    fn members(&self) -> &[Vec<f64>] {
+        self.state.as_ref().map_or(&[], |state| &state.members.points)
     }
 }
 

@@ -1,19 +1,24 @@
 //! How well solvers do on problems with known answers: how many they solve, with how many evaluations, in what time.
 
+mod fronts;
 mod page;
 mod profiles;
+mod relative;
 mod results;
+mod suite;
 mod timed;
 
 use std::time::Instant;
 
-use mops_core::{Evaluator, SolverChoice, Stop, Watch};
-use mops_problems::{Posed, Problem, Slope, Suite, measure};
+use mops_core::{Catalogue, Evaluator, Merit, SolverChoice, Stop, Watch};
+use mops_problems::{Posed, Slope, measure};
 
 use super::each;
+pub(crate) use fronts::{Spread, published, spreads};
 pub(crate) use page::page;
 pub(crate) use profiles::{Score, data_profile, performance_profile};
-pub(crate) use results::{Results, Row};
+pub(crate) use results::{Front, Results, Row};
+pub(crate) use suite::{Subject, Suite, suites};
 use timed::Timed;
 
 /// What is run.
@@ -23,52 +28,96 @@ pub(crate) struct Plan {
     pub slope: Slope,
     /// Seeds 1 to this.
     pub seeds: u64,
-    /// Evaluations a run may take, for every variable and one more.
-    pub budget: usize,
+    /// Evaluations a run may take, for every variable and one more; as the suite has it where absent.
+    pub budget: Option<usize>,
     /// Relative noise that is added to all values.
     pub noise: f64,
     /// Problems by name; all where empty.
     pub only: Vec<String>,
 }
 
+impl Plan {
+    fn evaluations(&self, variables: usize) -> usize {
+        self.budget.map_or_else(|| (self.suite.budget)(variables), |budget| budget * (variables + 1))
+    }
+}
+
 /// Accuracy of the first count of evaluations.
 pub(crate) const ROUGH: f64 = 1e-3;
 
+/// A run, with what every point of it was worth.
+struct Done {
+    row: Row,
+    history: Vec<Merit>,
+}
+
 /// Runs a plan on so many threads; every run has one to itself, so that times are comparable.
-pub(crate) fn run(plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {
-    let problems: Vec<Problem> = (plan.suite.problems)();
-    let chosen = |problem: &&Problem| plan.only.is_empty() || plan.only.contains(&problem.name);
-    let problems: Vec<&Problem> = problems.iter().filter(chosen).collect();
-    let tasks: Vec<(&SolverChoice, &Problem, u64)> = plan
-        .solvers
-        .iter()
-        .flat_map(|solver| {
-            problems.iter().flat_map(move |problem| (1..=plan.seeds).map(move |s| (solver, *problem, s)))
-        })
-        .collect();
-    let rows = each(&tasks, jobs, watch, |(solver, problem, seed)| one(plan, solver, problem, *seed));
-    Results::new(plan, rows)
+pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {
+    let subjects: Vec<Subject> = plan.suite.subjects();
+    let chosen = |subject: &&Subject| plan.only.is_empty() || plan.only.iter().any(|name| name == subject.name());
+    let subjects: Vec<&Subject> = subjects.iter().filter(chosen).collect();
+    let mut tasks: Vec<Task<'_>> = Vec::new();
+    for solver in &plan.solvers {
+        for &subject in &subjects {
+            tasks.extend((1..=plan.seeds).map(|seed| Task { solver, subject, seed, slope: plan.slope }));
+        }
+    }
+    let done = |tasks: &[Task<'_>]| each(tasks, jobs, watch, |task| one(catalogue, plan, task));
+    let mut found = done(&tasks);
+    if plan.suite.relative {
+        let rivals = relative::rivals(catalogue);
+        let mut rivalling: Vec<Task<'_>> = Vec::new();
+        for &subject in &subjects {
+            rivalling.extend(rivals.iter().map(|(solver, slope)| Task { solver, subject, seed: 1, slope: *slope }));
+        }
+        let others = done(&rivalling);
+        relative::judge(&mut found, &others, plan.suite.accuracy);
+    }
+    Results::new(plan, found.into_iter().map(|done| done.row).collect())
+}
+
+/// A run to be done.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    solver: &'a SolverChoice,
+    subject: &'a Subject,
+    seed: u64,
+    slope: Slope,
+}
+
+fn one(catalogue: &Catalogue, plan: &Plan, task: &Task<'_>) -> Option<Done> {
+    match task.subject {
+        Subject::Formula(problem) => {
+            let posed = Posed::new(problem, task.slope).with_noise(plan.noise).with_seed(task.seed);
+            go(plan, task, &posed, &posed.start())
+        }
+        Subject::Study(known) => {
+            let posed = suite::posing(catalogue, known, task.seed);
+            let start = posed.start();
+            go(plan, task, &posed, &start)
+        }
+    }
 }
 
 /// `None` where the solver does not accept the problem.
-fn one(plan: &Plan, choice: &SolverChoice, problem: &Problem, seed: u64) -> Option<Row> {
-    let posed = Posed::new(problem, plan.slope).with_noise(plan.noise).with_seed(seed);
+fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64]) -> Option<Done> {
+    let Task { solver: choice, subject, seed, .. } = *task;
     let mut solver = choice.make();
     solver.accepts(posed.shape()).ok()?;
-    let timed = Timed::new(&posed);
+    let timed = Timed::new(posed);
     let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
-    let budget = plan.budget * (problem.dimension() + 1);
+    let (budget, answer) = (plan.evaluations(start.len()), subject.answer());
     let (measured, seconds) = thread.install(|| {
         let begun = Instant::now();
-        let measured = measure(problem, &timed, &posed.start(), solver.as_mut(), budget);
+        let measured = measure(&answer, &timed, start, solver.as_mut(), budget);
         (measured, begun.elapsed().as_secs_f64())
     });
-    let fine = measured.evaluations_to(problem.accuracy.unwrap_or(plan.suite.accuracy));
-    Some(Row {
-        problem: problem.name.clone(),
+    let fine = measured.evaluations_to(subject.accuracy(&plan.suite));
+    let row = Row {
+        problem: subject.name().to_owned(),
         solver: choice.kind.to_owned(),
         seed,
-        variables: problem.dimension(),
+        variables: start.len(),
         rows: posed.shape().rows.len(),
         known: measured.target,
         reached: measured.best.objective,
@@ -81,5 +130,7 @@ fn one(plan: &Plan, choice: &SolverChoice, problem: &Problem, seed: u64) -> Opti
         converged: measured.stop == Stop::Converged,
         seconds,
         solver_seconds: (seconds - timed.seconds()).max(0.0),
-    })
+        front: measured.front.map(Front::from),
+    };
+    Some(Done { row, history: measured.history })
 }

@@ -1,6 +1,6 @@
 //! What a benchmark leaves behind, and what of it one line says.
 
-use mops_problems::Slope;
+use mops_problems::{FrontFound, Slope};
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
@@ -17,8 +17,9 @@ pub(crate) struct Results {
     pub slopes: String,
     /// Accuracy that counts as solved.
     pub accuracy: f64,
-    /// Evaluations that a run may take, for every variable and one more.
-    pub budget: usize,
+    /// Evaluations that a run may take, for every variable and one more; as the suite has it where absent.
+    #[serde(default)]
+    pub budget: Option<usize>,
     /// Relative noise that was added.
     pub noise: f64,
     pub rows: Vec<Row>,
@@ -54,6 +55,29 @@ pub(crate) struct Row {
     pub seconds: f64,
     /// Time that was not spent in the problem's functions, in s.
     pub solver_seconds: f64,
+    /// The front, where the problem has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub front: Option<Front>,
+}
+
+/// How good a front is that was found.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct Front {
+    /// Hypervolume of the solver's members.
+    pub hypervolume: f64,
+    /// Hypervolume of all points.
+    pub archive: f64,
+    /// Inverted generational distance of the members.
+    pub distance: f64,
+    /// Hypervolume of the true front.
+    pub known: f64,
+}
+
+impl From<FrontFound> for Front {
+    fn from(found: FrontFound) -> Self {
+        let FrontFound { hypervolume, distance, archive, known } = found;
+        Self { hypervolume, archive, distance, known }
+    }
 }
 
 /// A solver in one line.

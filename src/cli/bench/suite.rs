@@ -5,19 +5,19 @@ use std::process::ExitCode;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 use mops_core::{Catalogue, Diagnostic, SolverChoice, suggestion};
-use mops_problems::{Slope, Suite, suites};
+use mops_problems::Slope;
 
 use super::super::progress::Progress;
 use super::super::tables::{number, table};
 use super::super::{Trouble, print};
 use super::write;
-use crate::bench::solvers::{self, Plan, Results, Row};
+use crate::bench::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
 
 /// What can be said to the benchmark of a suite.
 #[derive(Args)]
 pub(super) struct Arguments {
     /// Solver to measure; may be given more than once.
-    #[arg(long = "solver", value_name = "SOLVER", default_value = "sqp")]
+    #[arg(long = "solver", value_name = "SOLVER", default_value = "auto")]
     solvers: Vec<String>,
     /// Give solvers exact slopes instead of differences.
     #[arg(long)]
@@ -25,9 +25,9 @@ pub(super) struct Arguments {
     /// Runs of every problem, with seeds 1, 2, ...
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Evaluations a run may take, for every variable and one more.
-    #[arg(long, default_value_t = 1000, value_name = "NUMBER")]
-    budget: usize,
+    /// Evaluations a run may take, for every variable and one more; as is usual for the suite where absent.
+    #[arg(long, value_name = "NUMBER")]
+    budget: Option<usize>,
     /// Relative noise that is added to all values.
     #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
     noise: f64,
@@ -97,7 +97,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let progress = Progress::of_cases(!arguments.quiet);
-    let results = solvers::run(&plan, arguments.jobs.map_or(cores, usize::from), &progress);
+    let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
     progress.finish();
     let text = text(&results, before.as_ref());
     print(&text);
@@ -121,7 +121,7 @@ fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic>
 }
 
 fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> {
-    let all: Vec<String> = (suite.problems)().into_iter().map(|problem| problem.name).collect();
+    let all: Vec<String> = suite.subjects().iter().map(|subject| subject.name().to_owned()).collect();
     match asked.iter().find(|name| !all.contains(name)) {
         None => Ok(asked.to_vec()),
         Some(unknown) => {
@@ -138,6 +138,9 @@ fn read(path: &Path) -> Result<Results, Diagnostic> {
 }
 
 fn text(results: &Results, before: Option<&Results>) -> String {
+    if results.rows.iter().any(|row| row.front.is_some()) {
+        return fronts(results, before);
+    }
     let seeds = results.rows.iter().any(|row| row.seed > 1);
     let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
     header.extend(["all", "ms", "solved"]);
@@ -154,6 +157,70 @@ fn text(results: &Results, before: Option<&Results>) -> String {
         for solver in results.solvers() {
             text.push_str(&summary(name, results, solver));
         }
+        if suites().iter().any(|suite| suite.name == results.suite && suite.relative) {
+            text.push_str(&shares(name, results));
+        }
+    }
+    text
+}
+
+/// Shares of problems solved within 10, 30 and 100 simplex gradients.
+fn shares(name: &str, results: &Results) -> String {
+    let mut text = String::new();
+    for solver in results.solvers() {
+        let of = |count: fn(&Row) -> Option<usize>| {
+            let profile = data_profile(&Score::of(results, solver, count));
+            let within =
+                |gradients: f64| profile.iter().rfind(|(x, _)| *x <= gradients).map_or(0.0, |(_, share)| *share);
+            [10.0, 30.0, 100.0].map(|gradients| format!("{:.2}", within(gradients))).join(" / ")
+        };
+        text.push_str(&format!(
+            "{name}{solver}: share solved within 10 / 30 / 100 simplex gradients: {} to 1e-3, {} to {:e} of what the best \
+             solver gains\n",
+            of(|row| row.to_rough),
+            of(|row| row.to_fine),
+            results.accuracy
+        ));
+    }
+    text
+}
+
+/// Fronts: one line for every problem, over all seeds.
+fn fronts(results: &Results, before: Option<&Results>) -> String {
+    let mut header = vec!["problem", "solver", "seeds", "evaluations", "volume", "sd", "of front", "all points"];
+    header.extend(["distance", "sd", "pymoo volume", "distance"]);
+    header.extend(before.map(|_| "before"));
+    let earlier = before.map(spreads).unwrap_or_default();
+    let row = |spread: solvers::Spread| {
+        let published = published(&spread.problem).map_or(["-".to_owned(), "-".to_owned()], |[volume, distance]| {
+            [format!("{volume:.5}"), format!("{distance:.4}")]
+        });
+        let mut cells = vec![
+            spread.problem.clone(),
+            spread.solver.clone(),
+            spread.seeds.to_string(),
+            spread.evaluations.to_string(),
+            format!("{:.5}", spread.hypervolume[0]),
+            format!("{:.5}", spread.hypervolume[1]),
+            format!("{:.5}", spread.known),
+            format!("{:.5}", spread.archive),
+            format!("{:.5}", spread.distance[0]),
+            format!("{:.5}", spread.distance[1]),
+        ];
+        cells.extend(published);
+        let same = earlier.iter().find(|e| e.problem == spread.problem && e.solver == spread.solver);
+        cells.extend(before.map(|_| same.map_or(String::new(), |e| format!("{:.5}", e.hypervolume[0]))));
+        cells
+    };
+    let mut text =
+        table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], spreads(results).into_iter().map(row).collect());
+    text.push_str(
+        "\nVolume, distance: hypervolume and inverted generational distance of the members of the last generation, mean and \
+         standard deviation over seeds; all points: hypervolume of everything evaluated. pymoo: NSGA-II with 100 members over \
+         250 generations, of three objectives NSGA-III with 92 (DTLZ1: over 400 generations).\n",
+    );
+    for solver in results.solvers() {
+        text.push_str(&summary("", results, solver));
     }
     text
 }

@@ -1,7 +1,7 @@
 //! Effects of uncertain parameters over their whole ranges: by Morris and by Sobol.
 
 use maud::{Markup, html};
-use mops_core::{EffectReport, EffectsReport, GlobalSensitivityReport, SensitivityMethod};
+use mops_core::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, SensitivityMethod};
 
 use super::super::figures::{Figure, Group};
 use super::super::numbers::{labelled, significant};
@@ -38,9 +38,9 @@ pub(super) fn section(found: &GlobalSensitivityReport) -> Section {
 
 fn table(criterion: &EffectsReport, morris: bool) -> Markup {
     let bare = |value: Option<f64>| value.map_or_else(String::new, |v| significant(v, 4));
-    let told = |share: Option<(f64, [f64; 2])>| {
+    let told = |share: Option<Estimated>| {
         html! {
-            @if let Some((value, [low, high])) = share {
+            @if let Some(Estimated { value, interval: [low, high] }) = share {
                 (significant(value, 3)) small { "[" (significant(low, 3)) ", " (significant(high, 3)) "]" }
             }
         }
@@ -112,15 +112,16 @@ fn plane(criterion: &EffectsReport) -> Figure {
 /// Shares with their intervals, side by side; the parameters are counted along x.
 #[allow(clippy::cast_precision_loss)]
 fn shares(criterion: &EffectsReport) -> Figure {
-    let of = |name: &str, ink: Ink, aside: f64, pick: fn(&EffectReport) -> Option<(f64, [f64; 2])>| {
-        let known: Vec<(f64, (f64, [f64; 2]))> = criterion
+    let of = |name: &str, ink: Ink, aside: f64, pick: fn(&EffectReport) -> Option<Estimated>| {
+        let known: Vec<(f64, Estimated)> = criterion
             .effects
             .iter()
             .enumerate()
             .filter_map(|(i, e)| Some(((i + 1) as f64 + aside, pick(e)?)))
             .collect();
-        let bars = known.iter().flat_map(|(x, (_, [low, high]))| [(*x, *low), (*x, *high), (*x, f64::NAN)]).collect();
-        let dots = known.iter().map(|(x, (value, _))| (*x, *value)).collect();
+        let bar = |(x, share): &(f64, Estimated)| [share.interval[0], share.interval[1], f64::NAN].map(|end| (*x, end));
+        let bars = known.iter().flat_map(bar).collect();
+        let dots = known.iter().map(|(x, share)| (*x, share.value)).collect();
         [
             Curve { points: bars, ink, ..Curve::default() },
             Curve { name: name.into(), points: dots, style: CurveStyle::Dots, ink, ..Curve::default() },

@@ -9,6 +9,8 @@ use mops_core::statistics::t_quantile;
 use mops_core::{Budget, Evaluation, Oracle, Problem, Run, Stop, Study, UncertaintyReport, Watch};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
+use profile::Profiles;
+
 use super::batches::Quiet;
 use crate::report::significant;
 use crate::solve::Solved;
@@ -50,11 +52,15 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
         bootstrap: None,
         bands: Vec::new(),
     };
-    let mut simulations = 0;
-    (report.profiles, simulations) = {
-        let (profiles, cost) = profile::profiles(&calibrated, &task.profile, watch);
-        (profiles, simulations + cost)
-    };
+    let Profiles { profiles, mut simulations, better } = profile::profiles(&calibrated, &task.profile, watch);
+    report.profiles = profiles;
+    if let Some(better) = better {
+        solved.outcome.warnings.push(format!(
+            "a better fit was met while profiling, with an objective of {} instead of {}: solve again with more starts",
+            significant(better, 5),
+            significant(best.merit.objective, 5)
+        ));
+    }
     if task.bootstrap > 0 {
         match bootstrap::bootstrap(&calibrated, &task, watch) {
             Ok((found, cost)) => {

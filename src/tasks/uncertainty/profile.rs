@@ -12,6 +12,9 @@ const FARTHEST: f64 = 10.0;
 /// The root of the likelihood ratio meets its limit to this share.
 const ACCURATE: f64 = 1e-3;
 
+/// An objective lower by more than this share is a better fit, not the solver's tolerance.
+const BETTER: f64 = 1e-4;
+
 /// One side of a profile.
 struct Side {
     /// Value and signed root of the likelihood ratio, away from the estimate.
@@ -19,15 +22,25 @@ struct Side {
     end: f64,
     why: &'static str,
     simulations: usize,
+    /// The least objective that was met.
+    least: f64,
 }
 
-/// Profiles of the tuners that are chosen, and the simulations that they took.
+/// What profiling brought.
+pub(super) struct Profiles {
+    pub profiles: Vec<ProfileReport>,
+    pub simulations: usize,
+    /// An objective below that of the estimates, if one was met: they are then not the best fit.
+    pub better: Option<f64>,
+}
+
+/// Profiles of the tuners that are chosen.
 ///
 /// With `S(v)` the least sum of squares where the parameter is held at `v`, and `s^2` that at the estimate per degree of
 /// freedom, the interval holds where `(S(v) - S_min)/s^2 <= t^2`; for a linear model it is the t interval exactly.
 ///
 /// Source: D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.2.
-pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn Watch) -> (Vec<ProfileReport>, usize) {
+pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn Watch) -> Profiles {
     let problem = calibrated.problem;
     let study = problem.study();
     let picked: Vec<usize> =
@@ -55,7 +68,13 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
             limit: calibrated.limit,
         }
     };
-    (picked.iter().zip(found.chunks_exact(2)).map(report).collect(), simulations)
+    let best = calibrated.best.merit.objective;
+    let least = found.iter().map(|side| side.least).fold(best, f64::min);
+    Profiles {
+        profiles: picked.iter().zip(found.chunks_exact(2)).map(report).collect(),
+        simulations,
+        better: (least < best * (1.0 - BETTER)).then_some(least),
+    }
 }
 
 fn side(calibrated: &Calibrated<'_>, k: usize, sign: f64, watch: &dyn Watch) -> Side {
@@ -66,7 +85,7 @@ fn side(calibrated: &Calibrated<'_>, k: usize, sign: f64, watch: &dyn Watch) -> 
     let bound = if sign < 0.0 { tuner.bounds[0] } else { tuner.bounds[1] };
     let known = covariance.matrix[(k, k)].sqrt();
     let error = if known > 0.0 && known.is_finite() { known } else { 0.05 * (tuner.bounds[1] - tuner.bounds[0]) };
-    let mut side = Side { points: Vec::new(), end: f64::NAN, why: "open", simulations: 0 };
+    let mut side = Side { points: Vec::new(), end: f64::NAN, why: "open", simulations: 0, least: best.merit.objective };
     let mut at = best.tuners.clone();
     let mut next = value + sign * 0.5 * limit * error;
     for _ in 0..STEPS {
@@ -82,6 +101,7 @@ fn side(calibrated: &Calibrated<'_>, k: usize, sign: f64, watch: &dyn Watch) -> 
         let (found, simulations) = refit(study, watch);
         side.simulations += simulations;
         let Some(found) = found else { break };
+        side.least = side.least.min(found.merit.objective);
         let excess = (found.merit.objective - best.merit.objective).max(0.0);
         let root = sign * excess.sqrt() / covariance.deviation;
         at.clone_from(&found.tuners);

@@ -1,5 +1,6 @@
 //! `task = "worst-case"`: the largest scaled value of every criterion over a box of uncertain parameters.
 
+mod climb;
 mod search;
 
 use mops_core::{

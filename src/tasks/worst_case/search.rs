@@ -7,14 +7,12 @@ use std::sync::Arc;
 
 use mops_core::statistics::{Sampling, draw};
 use mops_core::{
-    Budget, CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Role, Row, Run, SolverOptions, Study,
-    Subject, Usage, Watch, WorstReport, stream,
+    CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Role, Row, Study, Subject, Usage, Watch,
+    WorstReport, stream,
 };
-use mops_solvers::cma_es::CmaEsOptions;
-use mops_solvers::pattern_search::PatternSearchOptions;
-use mops_solvers::sqp::SqpOptions;
 
-use crate::tasks::batches::{Quiet, Stage, each};
+use super::climb::{End, Goal, local, whole};
+use crate::tasks::batches::{Stage, each};
 
 /// Corners of the box are all looked at up to this dimension.
 const MOST_CORNERS: usize = 8;
@@ -74,20 +72,6 @@ fn severity(usage: Usage, scaled: f64) -> f64 {
     if usage == Usage::Equality { (scaled - 1.0).abs() } else { scaled }
 }
 
-/// What a search of a criterion in one direction is: upwards, or downwards for the other side of an equality.
-struct Goal {
-    row: usize,
-    problem: Problem,
-    upwards: bool,
-}
-
-/// Where a search ended.
-struct End {
-    evaluation: Option<Evaluation>,
-    simulations: usize,
-    failed: Vec<(String, Vec<f64>)>,
-}
-
 impl Region {
     /// The box around a design, and the rows that `wanted` picks.
     pub fn new(study: &Study, design: &[f64], wanted: impl Fn(&Row) -> bool, question: Question) -> Self {
@@ -121,46 +105,39 @@ impl Region {
         points
     }
 
-    /// The worst of every row, in their order; fewer where the user ends the search. Also the simulations it took.
+    /// The worst of every row, in their order; none where the user ends the search. Also the simulations it took.
     pub fn search(&self, watch: &dyn Watch, stage: Stage<'_>) -> (Vec<Worst>, usize) {
         let every = self.every();
-        let middle = stage.from + 0.2 * (stage.to - stage.from);
-        let first = Stage { to: middle, ..stage };
         let points = self.points(&every);
-        let seen = each(&points, first, watch, |point| every.evaluate(point));
+        let middle = stage.from + 0.2 * (stage.to - stage.from);
+        let seen = each(&points, Stage { to: middle, ..stage }, watch, |point| every.evaluate(point));
         let shared = seen.len() * every.simulations();
         if seen.len() < points.len() {
             return (Vec::new(), shared);
         }
-        let goals = self.goals();
-        let searches: Vec<(usize, Option<Vec<f64>>)> = goals
+        let goals = Goal::all(&self.study);
+        // The first search for each goal goes over the whole box, from the worst point seen.
+        let searches: Vec<(usize, bool, Vec<f64>)> = goals
             .iter()
             .enumerate()
             .flat_map(|(g, goal)| {
                 let starts = self.starts(goal, &seen);
-                // The first search goes over the whole box, from the worst point seen.
-                let whole = starts.first().map(|_| (g, None));
-                whole.into_iter().chain(starts.into_iter().map(move |start| (g, Some(start))))
+                let first = starts.first().map(|start| (g, true, start.clone()));
+                first.into_iter().chain(starts.into_iter().map(move |start| (g, false, start)))
             })
             .collect();
-        let second = Stage { from: middle, ..stage };
-        let ends = each(&searches, second, watch, |(g, start)| match start {
-            Some(start) => local(&goals[*g], start, watch),
-            None => {
-                let starts = self.starts(&goals[*g], &seen);
-                whole(&goals[*g], &starts[0], watch)
-            }
+        let ends = each(&searches, Stage { from: middle, ..stage }, watch, |(g, everywhere, start)| {
+            if *everywhere { whole(&goals[*g], start, watch) } else { local(&goals[*g], start, watch) }
         });
-        if ends.len() < searches.len() {
-            return (Vec::new(), shared);
-        }
         let simulations = shared + ends.iter().map(|end| end.simulations).sum::<usize>();
-        let of_goal = |g: usize| searches.iter().zip(&ends).filter(move |((of, _), _)| *of == g).map(|(_, end)| end);
-        let worst = (0..self.study.rows.len()).map(|row| {
-            let ends: Vec<&End> = (0..goals.len()).filter(|&g| goals[g].row == row).flat_map(&of_goal).collect();
-            self.worst(row, &seen, &ends)
-        });
-        (worst.collect(), simulations)
+        if ends.len() < searches.len() {
+            return (Vec::new(), simulations);
+        }
+        let worst = |row: usize| {
+            let of_row = searches.iter().zip(&ends).filter(|((g, ..), _)| goals[*g].row == row);
+            self.worst(row, &seen, &of_row.map(|(_, end)| end).collect::<Vec<_>>())
+        };
+        ((0..self.study.rows.len()).map(worst).collect(), simulations)
     }
 
     /// The problem in which every row counts and has a scaled value.
@@ -173,25 +150,6 @@ impl Region {
             }
         }
         Problem::new(Arc::new(study))
-    }
-
-    fn goals(&self) -> Vec<Goal> {
-        let one = |row: usize, upwards: bool| {
-            let mut study = self.study.clone();
-            let mut only = study.rows[row].clone();
-            (only.usage, only.weight) = (Usage::Minimise, 1.0);
-            if upwards {
-                only.demand = reversed(only.demand);
-            }
-            study.rows = vec![only];
-            Goal { row, problem: Problem::new(Arc::new(study)), upwards }
-        };
-        let rows = self.study.rows.iter().enumerate();
-        rows.flat_map(|(i, row)| {
-            let down = (row.usage == Usage::Equality).then(|| one(i, false));
-            std::iter::once(one(i, true)).chain(down)
-        })
-        .collect()
     }
 
     /// The worst points that were seen, apart from each other where there are enough.
@@ -232,16 +190,7 @@ impl Region {
         };
         let demanded = row.demand != Demand::None;
         let (value, scaled) = worst.as_ref().map_or((f64::NAN, f64::NAN), |w| (w.0, w.1));
-        let failed_seen = seen.iter().filter(|e| e.readings[index].is_none());
-        let why = |e: &Evaluation| {
-            let of_job = e.failures.iter().find(|(job, _)| *job == row.job).or(e.failures.first());
-            of_job.map_or_else(String::new, |(_, failure)| failure.to_string())
-        };
-        let mut failed: Vec<(String, Vec<f64>)> =
-            failed_seen.map(|e| (why(e), self.uncertain(&e.tuners).to_vec())).collect();
-        failed.extend(
-            ends.iter().flat_map(|end| &end.failed).map(|(why, at)| (why.clone(), self.uncertain(at).to_vec())),
-        );
+        let failed = self.failed(index, seen, ends);
         let at: Vec<f64> = worst.as_ref().map_or_else(Vec::new, |w| self.uncertain(&w.2.tuners).to_vec());
         let subject = Subject::of(&self.study, row, nominal);
         let report = WorstReport {
@@ -259,6 +208,18 @@ impl Region {
             slices: Vec::new(),
         };
         Worst { subject, row: index, case: self.study.jobs[row.job].case, weight: row.weight, scaled, at, report }
+    }
+
+    /// Why simulations failed that would have given a row its value, and where.
+    fn failed(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Vec<(String, Vec<f64>)> {
+        let job = self.study.rows[index].job;
+        let why = |e: &Evaluation| {
+            let of_job = e.failures.iter().find(|(of, _)| *of == job);
+            of_job.map_or_else(String::new, |(_, failure)| failure.to_string())
+        };
+        let looked = seen.iter().filter(|e| e.readings[index].is_none()).map(|e| (why(e), &e.tuners));
+        let searched = ends.iter().flat_map(|end| &end.failed).map(|(why, tuners)| (why.clone(), tuners));
+        looked.chain(searched).map(|(why, tuners)| (why, self.uncertain(tuners).to_vec())).collect()
     }
 
     /// Values of the uncertain parameters, with what a reader wants to know of each.
@@ -280,65 +241,4 @@ fn scale(row: &Row, value: f64) -> f64 {
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-/// The demand by which the scaled value is that of another with its sign reversed.
-fn reversed(demand: Demand) -> Demand {
-    let (good, bad) = match demand {
-        Demand::Value(demand) => (0.0, demand),
-        Demand::Pair { good, bad } => (good, bad),
-        Demand::None => (0.0, 1.0),
-    };
-    Demand::Pair { good, bad: 2.0 * good - bad }
-}
-
-/// From one start: along slopes, then without them, since the worst case may lie on a jump.
-fn local(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
-    let n = start.len();
-    let steps: [(_, usize); 2] = [
-        (SqpOptions { radius: 0.25, ..SqpOptions::default() }.build(), 40 * (n + 1)),
-        (PatternSearchOptions { size: 0.02, tolerance: 1e-6, ..PatternSearchOptions::default() }.build(), 60 * (n + 1)),
-    ];
-    let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
-    for (mut solver, evaluations) in steps {
-        let from = end.evaluation.as_ref().map_or_else(|| start.to_vec(), |e| e.point.clone());
-        search_once(goal, solver.as_mut(), &from, evaluations, watch, &mut end);
-    }
-    end
-}
-
-/// Over the whole box by CMA-ES, then locally.
-fn whole(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
-    let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
-    let mut solver = CmaEsOptions { restarts: 0, tolerance: 1e-6, ..CmaEsOptions::default() }.build();
-    search_once(goal, solver.as_mut(), start, 80 * (start.len() + 1), watch, &mut end);
-    let from = end.evaluation.as_ref().map_or_else(|| start.to_vec(), |e| e.point.clone());
-    let polished = local(goal, &from, watch);
-    end.simulations += polished.simulations;
-    end.failed.extend(polished.failed);
-    End { evaluation: polished.evaluation, ..end }
-}
-
-fn search_once(
-    goal: &Goal,
-    solver: &mut dyn mops_core::Solver,
-    from: &[f64],
-    evaluations: usize,
-    watch: &dyn Watch,
-    end: &mut End,
-) {
-    let quiet = Quiet(watch);
-    let mut run = Run::new(&goal.problem, Budget { evaluations }, &quiet);
-    run.solve(solver, from);
-    end.simulations += (run.archive().len() + run.linearisations()) * goal.problem.simulations();
-    let why = run.failures().first().map_or_else(String::new, |failure| failure.first.to_string());
-    let failed = run.archive().iter().filter(|record| record.merit.objective.is_infinite());
-    end.failed.extend(failed.map(|record| (why.clone(), record.tuners.clone())));
-    let found = mops_core::Oracle::best(&run).filter(|best| best.scaled.is_some());
-    if let Some(found) = found {
-        let better = end.evaluation.as_ref().is_none_or(|known| found.merit.is_better_than(&known.merit));
-        if better {
-            end.evaluation = Some(found.clone());
-        }
-    }
 }

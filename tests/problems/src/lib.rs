@@ -16,7 +16,7 @@ mod posed;
 mod problem;
 
 pub use formula::{Formula, Functions, Outputs};
-pub use measure::{Measured, measure};
+pub use measure::{FrontFound, Measured, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
 
@@ -31,6 +31,8 @@ pub struct Suite {
     pub source: &'static str,
     /// Accuracy that counts as solved, relative to the larger of 1 and the size of the optimum.
     pub accuracy: f64,
+    /// Points a run may evaluate, for so many variables.
+    pub budget: fn(usize) -> usize,
     /// Its problems.
     pub problems: fn() -> Vec<Problem>,
 }

@@ -1,8 +1,9 @@
 //! How a solver does on a problem.
 
-use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Run, Solver, Stop};
+use mops_core::front::{hypervolume, inverted_generational_distance, non_dominated};
+use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Oracle, Run, Solver, Stop};
 
-use crate::problem::Problem;
+use crate::problem::Answer;
 
 /// What a solver made of a problem.
 #[derive(Debug, Clone)]
@@ -17,6 +18,21 @@ pub struct Measured {
     pub history: Vec<Merit>,
     /// Number of times that exact slopes were taken.
     pub linearisations: usize,
+    /// The front, where the answer is one.
+    pub front: Option<FrontFound>,
+}
+
+/// How good a front is that was found.
+#[derive(Debug, Clone, Copy)]
+pub struct FrontFound {
+    /// Hypervolume of the solver's members, of all points where it has none.
+    pub hypervolume: f64,
+    /// Inverted generational distance of the same, to 1000 points of the true front.
+    pub distance: f64,
+    /// Hypervolume of all points that were evaluated.
+    pub archive: f64,
+    /// Hypervolume of the true front.
+    pub known: f64,
 }
 
 impl Measured {
@@ -35,9 +51,9 @@ impl Measured {
     }
 }
 
-/// Solves a problem from a point of the unit box with at most `budget` points.
+/// Solves a problem with this answer from a point of the unit box with at most `budget` points.
 pub fn measure<E: Evaluator>(
-    problem: &Problem,
+    answer: &Answer,
     posed: &E,
     start: &[f64],
     solver: &mut dyn Solver,
@@ -50,6 +66,31 @@ pub fn measure<E: Evaluator>(
         .iter()
         .copied()
         .fold(Merit::FAILED, |best, merit| if merit.is_better_than(&best) { merit } else { best });
-    let target = problem.nearest_minimum(best.objective);
-    Measured { stop, best, target, history, linearisations: run.linearisations() }
+    let target = answer.nearest_minimum(best.objective);
+    let linearisations = run.linearisations();
+    let front = front(answer, &mut run, solver);
+    Measured { stop, best, target, history, linearisations, front }
+}
+
+fn front<E: Evaluator>(answer: &Answer, run: &mut Run<'_, E>, solver: &dyn Solver) -> Option<FrontFound> {
+    let Answer::Front { reference, hypervolume: known, points } = answer else { return None };
+    let m = reference.len();
+    let all: Vec<f64> = run.front().into_iter().flat_map(|i| run.archive()[i].objectives.clone()).collect();
+    // Every member has been evaluated: asking again costs nothing.
+    let members = run.evaluate(solver.members()).unwrap_or_default();
+    let shape = run.shape();
+    let feasible = members.iter().filter(|member| member.merit.is_feasible());
+    let members: Vec<f64> =
+        feasible.flat_map(|member| member.scaled.as_ref().map(|s| shape.objectives(s)).unwrap_or_default()).collect();
+    let kept: Vec<f64> = if members.is_empty() {
+        all.clone()
+    } else {
+        non_dominated(&members, m).into_iter().flat_map(|i| members[i * m..(i + 1) * m].to_vec()).collect()
+    };
+    Some(FrontFound {
+        hypervolume: hypervolume(&kept, reference),
+        distance: inverted_generational_distance(&kept, m, &points(1000)),
+        archive: hypervolume(&all, reference),
+        known: *known,
+    })
 }

@@ -67,6 +67,16 @@ pub enum Answer {
     },
 }
 
+impl Answer {
+    /// The known minimum that an objective belongs to: a local one where it is that to 1e-4, relative to the larger of 1 and
+    /// its size; else the smallest. `None` where none is known.
+    pub fn nearest_minimum(&self, objective: f64) -> Option<f64> {
+        let Self::Minima(minima) = self else { return None };
+        let is = |minimum: &&f64| (objective - **minimum).abs() <= 1e-4 * minimum.abs().max(1.0);
+        minima.iter().find(is).or(minima.first()).copied()
+    }
+}
+
 impl From<f64> for Answer {
     fn from(minimum: f64) -> Self {
         Self::Minima(vec![minimum])
@@ -102,12 +112,9 @@ impl Problem {
         self.start.len()
     }
 
-    /// The known minimum that an objective belongs to: a local one where it is that to 1e-4, relative to the larger of 1 and
-    /// its size; else the smallest. `None` where none is known.
+    /// The known minimum that an objective belongs to ([`Answer::nearest_minimum`]).
     pub fn nearest_minimum(&self, objective: f64) -> Option<f64> {
-        let Answer::Minima(minima) = &self.answer else { return None };
-        let is = |minimum: &&f64| (objective - **minimum).abs() <= 1e-4 * minimum.abs().max(1.0);
-        minima.iter().find(is).or(minima.first()).copied()
+        self.answer.nearest_minimum(objective)
     }
 
     /// How far an objective lies above the minimum it belongs to, relative to the larger of 1 and its size; negative below.

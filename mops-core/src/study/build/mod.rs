@@ -110,5 +110,9 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     study.tasks = tasks::build(draft.tasks, &study)?;
+    if study.task == Task::Design && !study.tasks.uncertain.is_empty() && study.tasks.robust.is_none() {
+        let fact = "the design takes no notice of [uncertain]: a table [robust] makes it one against the worst cases";
+        study.notes.push(fact.to_owned());
+    }
     Ok(study)
 }

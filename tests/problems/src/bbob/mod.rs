@@ -18,6 +18,7 @@ pub(crate) const SUITE: Suite = Suite {
     about: "the 24 noiseless functions of BBOB in 5 dimensions, five instances each, as heights above the least value",
     source: "N. Hansen, S. Finck, R. Ros, A. Auger, INRIA RR-6829 (2009)",
     accuracy: 1e-8,
+    budget: |n| 5000 * n,
     problems: || (1..=24).flat_map(|function| (1..=5).map(move |i| bbob(function, i, 5))).collect(),
 };
 

@@ -11,6 +11,7 @@ pub(crate) const SUITE: Suite = Suite {
     about: "BNH, SRN, TNK and OSY: two objectives with inequalities",
     source: "K. Deb, Multi-Objective Optimization Using Evolutionary Algorithms (2001), section 8.3",
     accuracy: 0.02,
+    budget: |_| 30_000,
     problems: || {
         let osy_box = vec![[0.0, 10.0], [0.0, 10.0], [1.0, 5.0], [0.0, 6.0], [1.0, 5.0], [0.0, 10.0]];
         let with = |problem: Problem, inequalities: usize| Problem { inequalities, ..problem };

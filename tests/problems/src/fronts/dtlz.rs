@@ -13,6 +13,7 @@ pub(crate) const SUITE: Suite = Suite {
     source: "K. Deb, L. Thiele, M. Laumanns, E. Zitzler, Scalable test problems for evolutionary multiobjective \
              optimization (2005), sections 6.7.1 to 6.7.7",
     accuracy: 0.05,
+    budget: |_| 40_000,
     problems: || {
         let unit = |n: usize| vec![[0.0, 1.0]; n];
         // The box less what lies below the plane, or inside the sphere.

@@ -12,6 +12,7 @@ pub(crate) const SUITE: Suite = Suite {
     about: "the five problems of Zitzler, Deb and Thiele in real variables, with two objectives",
     source: "E. Zitzler, K. Deb, L. Thiele, Evolutionary Computation 8 (2000) 173-195",
     accuracy: 0.01,
+    budget: |_| 30_000,
     problems: || {
         let unit = |n: usize| vec![[0.0, 1.0]; n];
         let mut wide = vec![[-5.0, 5.0]; 10];

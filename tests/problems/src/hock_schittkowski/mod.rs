@@ -24,6 +24,7 @@ pub(crate) const SUITE: Suite = Suite {
     source: "W. Hock, K. Schittkowski, Test examples for nonlinear programming codes, Lecture Notes in Economics and \
              Mathematical Systems 187, Springer (1981)",
     accuracy: 1e-6,
+    budget: |n| 1000 * (n + 1),
     problems,
 };
 

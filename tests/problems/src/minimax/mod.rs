@@ -15,6 +15,7 @@ pub(crate) const SUITE: Suite = Suite {
     source: "L. Luksan, J. Vlcek, Test problems for nonsmooth unconstrained and linearly constrained optimization, \
              report V-798, ICS AS CR, Prague (2000)",
     accuracy: 1e-7,
+    budget: |n| 1000 * (n + 1),
     problems,
 };
 

@@ -17,6 +17,7 @@ pub(crate) const SMOOTH: Suite = Suite {
     about: "53 problems without slopes: sums of squares, which the solver sees as one number",
     source: SOURCE,
     accuracy: 1e-5,
+    budget: |n| 100 * (n + 1),
     problems: || all(Kind::Smooth),
 };
 
@@ -25,6 +26,7 @@ pub(crate) const PIECEWISE: Suite = Suite {
     about: "the same 53 problems with sums of absolute values",
     source: SOURCE,
     accuracy: 1e-3,
+    budget: |n| 100 * (n + 1),
     problems: || all(Kind::Piecewise),
 };
 
@@ -33,6 +35,7 @@ pub(crate) const NOISY: Suite = Suite {
     about: "the same 53 problems with a deterministic noise of a thousandth",
     source: SOURCE,
     accuracy: 1e-3,
+    budget: |n| 100 * (n + 1),
     problems: || all(Kind::Noisy),
 };
 
