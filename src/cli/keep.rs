@@ -7,6 +7,7 @@ use mops_core::file::StudyFile;
 use mops_core::{Diagnostic, Stop, Study, Task, Watch};
 
 use super::Trouble;
+use super::run::solves;
 use super::study::{Home, StudyArguments};
 use crate::solve::{Keeping, Options, Solved, Unsuitable, solve};
 use crate::store::{Identity, Keeper, Opened, Refusal, RunRow, RunState, Start, row};
@@ -48,12 +49,10 @@ impl From<Refusal> for Trouble {
     }
 }
 
-/// Whether the points of a task can be kept.
-fn keeps(task: Task) -> bool {
-    match task {
-        Task::Design | Task::Calibration | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => true,
-        Task::Excitation | Task::Diagnosis => false,
-    }
+/// Whether a study asks for points that can be kept: those of a search, or of a sweep. A design against worst cases solves
+/// other studies from round to round.
+fn keeps(study: &Study) -> bool {
+    study.task == Task::Sweep || (solves(study) && study.tasks.robust.is_none())
 }
 
 /// The database of a run that is about to begin; none for a task that evaluates no points.
@@ -63,7 +62,7 @@ pub(super) fn open(
     home: &Home,
     options: &Options,
 ) -> Result<Option<Keeper>, Trouble> {
-    if !keeps(file.study.task) {
+    if !keeps(&file.study) {
         return match start {
             Start::Fresh => Ok(None),
             _ => Err(Diagnostic::new("this task keeps no evaluations that a later run could use")

@@ -239,7 +239,7 @@ fn introduction(study: &Study, options: &Options) -> String {
 }
 
 /// Whether the task of a study needs a solver.
-fn solves(study: &Study) -> bool {
+pub(super) fn solves(study: &Study) -> bool {
     match study.task {
         Task::Design | Task::Calibration => true,
         Task::Excitation | Task::Diagnosis => false,

@@ -137,6 +137,7 @@ fn header(report: &Report<'_>) -> Markup {
                 } @else {
                     (fact("Solver", &outcome.solver))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
+                    @if let Some(reused) = outcome.reused { (fact("Known before", &reused.to_string())) }
                 }
                 (fact("Simulations", &outcome.simulations.to_string()))
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))

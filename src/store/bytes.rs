@@ -2,7 +2,7 @@
 
 use mops_core::{RowSlopes, Value};
 
-/// The bytes of numbers; minus zero is zero, as in the memory of a run.
+/// The bytes of numbers.
 pub(super) fn of_numbers(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }

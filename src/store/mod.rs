@@ -7,6 +7,8 @@ mod identity;
 mod keeper;
 mod lock;
 mod memory;
+#[cfg(test)]
+mod tests;
 mod writer;
 
 use std::path::{Path, PathBuf};

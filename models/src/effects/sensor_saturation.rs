@@ -17,7 +17,7 @@ struct AtStrengths<S> {
 impl Definition for SensorSaturation {
     const NAME: &'static str = "sensor-saturation";
     const ABOUT: &'static str = "The sensor shows nothing beyond a limit: above, below, or either way.";
-    const FORMULA: &'static str = "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit)";
+    const FORMULA: &'static str = "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit); limit infinite: y";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
@@ -38,6 +38,9 @@ impl Definition for SensorSaturation {
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
         let (y, limit) = (at.value, self.limit);
+        if limit.value().is_infinite() {
+            return y;
+        }
         if self.side == 0.0 {
             let limit = if limit.value() < 0.0 { -limit } else { limit };
             return clamp(y, -limit, limit);
