@@ -192,9 +192,10 @@ fn fronts(results: &Results, before: Option<&Results>) -> String {
     header.extend(before.map(|_| "before"));
     let earlier = before.map(spreads).unwrap_or_default();
     let row = |spread: solvers::Spread| {
-        let published = published(&spread.problem).map_or(["-".to_owned(), "-".to_owned()], |[volume, distance]| {
-            [format!("{volume:.5}"), format!("{distance:.4}")]
-        });
+        let (volume, distance) = published(&spread.problem).unzip();
+        let figure =
+            |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+        let published = [figure(volume, 5), figure(distance.flatten(), 4)];
         let mut cells = vec![
             spread.problem.clone(),
             spread.solver.clone(),
