@@ -165,4 +165,10 @@ pub trait Solver: Send {
     /// # Errors
     /// The run is over.
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt>;
+
+    /// Points of the front, each of which solves a problem of its own; empty where the solver knows no more of them than
+    /// that they were evaluated.
+    fn front(&self) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
 }
