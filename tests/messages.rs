@@ -756,3 +756,23 @@ fn a_diagnosis_that_cannot_be_made() {
         ],
     );
 }
+
+/// A front with a mistake, given more of the study.
+fn front(what: &'static str, study: &str, criteria: &str, tables: &str) -> Case {
+    let text = broken(DESIGN, "name = \"loop\"", &format!("name = \"loop\"\ntask = \"pareto\"{study}"));
+    Case::new(what, &(broken(&text, "demand = \"15 s\" }", &format!("demand = \"15 s\"{criteria} }}")) + tables))
+}
+
+#[test]
+fn a_front_that_cannot_be_found() {
+    check(
+        "front",
+        &[
+            front("one criterion alone", "", ", usage = \"inequality\"", ""),
+            front("one number for all criteria", "\nobjective = \"max\"", "", ""),
+            front("too few points", "", "", "[pareto]\npoints = 2\n"),
+            front("too many points", "", "", "[pareto]\npoints = 1000\n"),
+            front("an unknown key", "", "", "[pareto]\npoint = 30\n"),
+        ],
+    );
+}

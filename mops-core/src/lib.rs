@@ -31,6 +31,7 @@ mod solver;
 mod study;
 mod tolerance;
 mod trace;
+mod trade_offs;
 mod tuner;
 mod unit;
 
@@ -73,5 +74,6 @@ pub use study::{
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
+pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, TradeOffs};
 pub use tuner::{Grid, Scale, Tuner};
 pub use unit::{Quantity, Unit};

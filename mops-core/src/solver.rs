@@ -19,6 +19,8 @@ pub struct Shape {
     pub rows: Vec<(Usage, f64)>,
     /// How the rows to be minimised become one number.
     pub objective: Objective,
+    /// Number of points that a front is to have, about; 0 where nothing is said.
+    pub points: usize,
     /// Length of the residual vector whose sum of squares is the objective; 0 if it is no sum of squares.
     pub residuals: usize,
 }

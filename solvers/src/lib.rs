@@ -28,7 +28,7 @@ pub mod weighted_chebyshev;
 
 use mops_core::SolverKind;
 
-pub use pareto::certify;
+pub use pareto::{Certificate, certificate, certify};
 
 /// Every kind of solver, the default first. A new one is a file, and a line here.
 pub fn kinds() -> Vec<SolverKind> {

@@ -27,6 +27,27 @@ const MOST_PIECES: usize = 12;
 /// where the problem does not keep what the slopes promise, they are taken a step ahead too, and both pieces count from then
 /// on (C. Lemarechal's cutting planes; K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization (1985)).
 pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
+    certificate(oracle, point).pareto
+}
+
+/// What was shown of a point.
+#[derive(Debug, Clone)]
+pub struct Certificate {
+    /// Whether one criterion can be improved at no cost.
+    pub pareto: Pareto,
+    /// What a unit of each weighted scaled value to be minimised is worth, of a certified point: along the front, to first
+    /// order, the changes times these sum to 0. From the multipliers of the rows, all of them positive.
+    pub weights: Option<Vec<f64>>,
+}
+
+/// As [`certify`], with what the criteria are worth.
+pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
+    let mut weights = None;
+    let pareto = shown(oracle, point, &mut weights);
+    Certificate { pareto, weights: weights.filter(|_| pareto == Pareto::CertifiedLocal) }
+}
+
+fn shown(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>) -> Pareto {
     let Ok(Some(at)) = oracle.linearise(point, 0.1 * AHEAD) else { return Pareto::NotShown };
     let shape = oracle.shape().clone();
     if point.is_empty() || !shape.rows.iter().any(|(usage, _)| *usage == Usage::Minimise) {
@@ -35,8 +56,9 @@ pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
     let here = at.at.scaled.clone().expect("a point that was linearised has values");
     let Some(mut cone) = Cone::new(&shape, &at) else { return Pareto::NotShown };
     for _ in 0..MOST_PIECES {
-        let Some((step, promised)) = cone.direction(point) else { return Pareto::NotShown };
+        let Some((step, promised, worth)) = cone.direction(point) else { return Pareto::NotShown };
         if promised <= IMPROVEMENT {
+            *weights = Some(worth);
             return Pareto::CertifiedLocal;
         }
         // The pieces known see an improvement: does the problem?
@@ -106,8 +128,8 @@ impl Cone {
     }
 
     /// The step of at most [`AHEAD`] that lowers the rows most, none of them rising; with what it promises: the sum of what the
-    /// rows fall by, per unit of step.
-    fn direction(&self, point: &[f64]) -> Option<(Vec<f64>, f64)> {
+    /// rows fall by, per unit of step, and with what a unit of each row is worth.
+    fn direction(&self, point: &[f64]) -> Option<(Vec<f64>, f64, Vec<f64>)> {
         // All lengths in units of the step, so that values and slopes are of one size.
         let n = point.len();
         let near = |row: &Linear| Linear { value: row.value / AHEAD, slope: row.slope.clone() };
@@ -122,7 +144,15 @@ impl Cone {
         // A penalty above every multiplier keeps the direction inside the cone.
         let direction = Subproblem::default().solve(&cone, &(DMatrix::identity(n, n) * 1e-6), &low, &high, 1e4)?;
         let promised = (0..self.objectives.len()).map(|k| self.fall(k, &direction.step)).sum();
-        Some((direction.step.iter().map(|d| AHEAD * d).collect(), promised))
+        // The sum of the rows, and what keeps each of them from rising.
+        let held = &direction.multipliers.inequalities;
+        let m = self.objectives.len();
+        let mut weights: Vec<f64> = held[..m].iter().map(|multiplier| 1.0 + multiplier).collect();
+        for ((k, _), multiplier) in self.pieces.iter().zip(&held[m..]) {
+            weights[*k] += multiplier;
+        }
+        weights.iter_mut().zip(&self.scales).for_each(|(weight, (_, slope))| *weight /= slope);
+        Some((direction.step.iter().map(|d| AHEAD * d).collect(), promised, weights))
     }
 
     /// What a row falls by along a step, as all of its pieces see it.

@@ -13,6 +13,7 @@ mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod pareto;
 mod places;
 mod progress;
 mod remains;
@@ -56,6 +57,8 @@ struct Arguments {
 enum Command {
     /// Solve a study and write result.json, report.html, plots and evaluations.
     Run(run::Arguments),
+    /// Find the front of a design study: the designs that no other is better than in every criterion.
+    Pareto(pareto::Arguments),
     /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
     Diagnose(diagnose::Arguments),
     /// Check a study and its data without running anything.
@@ -111,6 +114,7 @@ fn print(text: &str) {
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
+        Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
         Command::List(arguments) => list::list(catalogue, &arguments),

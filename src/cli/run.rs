@@ -10,7 +10,7 @@ use mops_core::{Catalogue, Diagnostic, Mistake, Place, Study, Task, suggestion};
 
 use super::progress::Progress;
 use super::remains::leave;
-use super::study::{StudyArguments, home, open, open_as};
+use super::study::{StudyArguments, home, open_as};
 use super::{Trouble, cannot_write, diagnosis, findings, print, tables};
 use crate::diagnosis::Original;
 use crate::report::Report;
@@ -18,6 +18,9 @@ use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solve};
 
 /// What `mops diagnose` sets.
 const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
+
+/// What `mops pareto` sets.
+const PARETO: &str = "study.task=\"pareto\"";
 
 /// What can be said to every run.
 #[derive(Args)]
@@ -56,6 +59,13 @@ enum Language {
 pub(super) struct Arguments {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    effort: Effort,
+}
+
+/// By which solver, and how long.
+#[derive(Args)]
+pub(super) struct Effort {
     /// Kind of solver, with its default options, instead of the study's.
     #[arg(long)]
     solver: Option<String>,
@@ -67,22 +77,41 @@ pub(super) struct Arguments {
 /// What is done with the study.
 pub(super) enum Search<'a> {
     /// What it is for, with this solver and budget where they are given.
-    Task { solver: Option<&'a str>, max_evaluations: Option<u64> },
+    Task(&'a Effort),
     /// What its model lacks.
     Diagnosis,
+    /// Its front, of so many points where that is said.
+    Pareto { effort: &'a Effort, points: Option<u16> },
+}
+
+impl Search<'_> {
+    /// What it sets in the study.
+    fn settings(&self) -> Vec<String> {
+        match self {
+            Self::Task(_) => Vec::new(),
+            Self::Diagnosis => vec![DIAGNOSIS.to_owned()],
+            Self::Pareto { points, .. } => {
+                let points = points.map(|points| format!("pareto.points={points}"));
+                std::iter::once(PARETO.to_owned()).chain(points).collect()
+            }
+        }
+    }
+
+    fn effort(&self) -> Option<&Effort> {
+        match self {
+            Self::Task(effort) | Self::Pareto { effort, .. } => Some(effort),
+            Self::Diagnosis => None,
+        }
+    }
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let Arguments { common, solver, max_evaluations } = arguments;
-    go(catalogue, common, &Search::Task { solver: solver.as_deref(), max_evaluations: *max_evaluations })
+    go(catalogue, &arguments.common, &Search::Task(&arguments.effort))
 }
 
 /// Runs the study and leaves the result behind.
 pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, Trouble> {
-    let mut file = match search {
-        Search::Task { .. } => open(catalogue, &arguments.study)?,
-        Search::Diagnosis => open_as(catalogue, &arguments.study, Some(DIAGNOSIS))?,
-    };
+    let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
     if arguments.export.is_some() && file.study.task != Task::Diagnosis {
         return Err(Diagnostic::new(
             "`--export` writes the repaired model of a diagnosis, and this study is for something else",
@@ -93,10 +122,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(seed) = arguments.seed {
         file.study.seed = seed;
     }
-    let (chosen, limit) = match search {
-        Search::Task { solver, max_evaluations } => (*solver, *max_evaluations),
-        Search::Diagnosis => (None, None),
-    };
+    let (chosen, limit) = search.effort().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
     let solver = match chosen {
         None => file.solver.clone(),
         Some(name) => {
@@ -169,9 +195,7 @@ fn refused(why: &Mistake, file: &StudyFile) -> Diagnostic {
 
 /// The text of a study file as it was before the settings of the command line were put at its end.
 fn without_settings<'t>(text: &'t str, settings: &[String], search: &Search<'_>) -> &'t str {
-    let extra = matches!(search, Search::Diagnosis).then_some(DIAGNOSIS);
-    let all: String =
-        settings.iter().map(String::as_str).chain(extra).map(|setting| format!("# --set {setting}\n")).collect();
+    let all: String = settings.iter().chain(&search.settings()).map(|setting| format!("# --set {setting}\n")).collect();
     text.strip_suffix(all.as_str()).unwrap_or(text)
 }
 
@@ -198,7 +222,7 @@ fn introduction(study: &Study, options: &Options) -> String {
 /// Whether the task of a study needs a solver.
 fn solves(study: &Study) -> bool {
     match study.task {
-        Task::Design | Task::Calibration => true,
+        Task::Design | Task::Calibration | Task::Pareto => true,
         Task::Excitation | Task::Diagnosis => false,
         Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
         Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
@@ -212,8 +236,8 @@ fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), T
     std::fs::write(&result, json).map_err(cannot_write(&result))?;
     let evaluations = folder.join("evaluations.csv");
     write_evaluations(&evaluations, solved).map_err(|e| cannot_write(&evaluations)(std::io::Error::other(e)))?;
-    let Solved { outcome, problem, best, archive, diagnosis } = solved;
-    Report { outcome, problem, best, archive, diagnosis: diagnosis.as_ref(), text }
+    let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
+    Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text }
         .write(folder)
         .map_err(cannot_write(folder))
 }

@@ -11,6 +11,7 @@ mod criteria;
 mod diagnosis;
 mod excitation;
 mod figures;
+mod front;
 mod legend;
 mod numbers;
 mod page;
@@ -54,6 +55,8 @@ pub struct Report<'a> {
     pub best: &'a Evaluation,
     /// All points, in the order of their evaluation; the first is the start.
     pub archive: &'a [Record],
+    /// Points of the front, in the order of the result; empty where none was looked for.
+    pub front: &'a [Evaluation],
     /// What the model lacks, where that was searched.
     pub diagnosis: Option<&'a Diagnosis>,
     /// The study file with its settings.
@@ -70,6 +73,7 @@ impl Report<'_> {
         fs::create_dir_all(&plots)?;
         let (responses, left_out) = figures::responses(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
+        let front = front::group(self);
         let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
         let inputs = match &self.outcome.found.excitation {
             Some(found) => Some(&found.inputs),
@@ -77,8 +81,8 @@ impl Report<'_> {
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
         let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
-        let pictures = page::Pictures { responses, left_out, convergence, sweep, excitation, diagnosis };
-        let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation];
+        let pictures = page::Pictures { responses, left_out, convergence, front, sweep, excitation, diagnosis };
+        let findings = [&pictures.convergence, &pictures.front, &pictures.sweep, &pictures.excitation];
         let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
         let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
         let mut names = FileNames::default();
@@ -93,7 +97,7 @@ impl Report<'_> {
     /// Whether a search stands behind the result, and nothing but it.
     fn searched(&self) -> bool {
         match self.outcome.task {
-            Task::Design | Task::Calibration => true,
+            Task::Design | Task::Calibration | Task::Pareto => true,
             Task::Sensitivity => self.archive.len() > 1,
             Task::Excitation | Task::Sweep | Task::Diagnosis => false,
         }

@@ -2,6 +2,7 @@
 
 pub(crate) mod diagnosis;
 mod excitation;
+mod pareto;
 mod sensitivity;
 mod sweep;
 
@@ -19,6 +20,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::Excitation => Ok(excitation::perform(study, options, watch)),
         Task::Sensitivity => sensitivity::perform(study, options, watch),
         Task::Sweep => sweep::perform(study, options, watch),
+        Task::Pareto => pareto::perform(study, options, watch),
         Task::Diagnosis => diagnosis::perform(study, options, watch),
     }
 }

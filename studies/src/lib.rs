@@ -22,6 +22,7 @@ pub fn shipped() -> Vec<Shipped> {
         study!("pid-design"),
         study!("pid-design-constrained"),
         study!("pid-design-multi-case"),
+        study!("pid-pareto"),
         study!("tank-level"),
         study!("multi-model"),
         study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),

@@ -19,7 +19,7 @@ use crate::unit::{Quantity, Unit};
 pub(super) struct StudySection {
     /// Name, as it stands in reports.
     pub name: String,
-    /// What it is for: `design` (the default), `calibration`, `diagnosis`, `excitation`, `sensitivity` or `sweep`.
+    /// What it is for: `design` (the default), `pareto`, `calibration`, `diagnosis`, `excitation`, `sensitivity` or `sweep`.
     #[serde(default)]
     pub task: Task,
     /// How scaled values are combined: `max` (of a design) or `sum` (of a calibration).

@@ -1,4 +1,4 @@
-//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`, `[diagnosis]`.
+//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`, `[diagnosis]`, `[pareto]`.
 
 use schemars::JsonSchema;
 
@@ -8,7 +8,8 @@ use super::{Diagnostic, read_seconds};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::study::{
-    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft,
+    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, ParetoTask, Place, RegressionDraft, SensitivityTask,
+    SweepDraft, TasksDraft,
 };
 use crate::unit::Quantity;
 
@@ -110,8 +111,16 @@ pub(super) struct DiagnosisSection {
     pub without: Vec<String>,
 }
 
+/// What `task = "pareto"`, and `mops pareto`, look for.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ParetoSection {
+    /// Number of points of the front, about; 30 where absent.
+    pub points: Option<usize>,
+}
+
 /// Names of the tables, as they stand at the top of a study file.
-pub(super) const TABLES: [&str; 4] = ["excitation", "sensitivity", "sweep", "diagnosis"];
+pub(super) const TABLES: [&str; 5] = ["excitation", "sensitivity", "sweep", "diagnosis", "pareto"];
 
 /// Reads the tables of all tasks; what is absent has its defaults.
 pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {
@@ -154,6 +163,10 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
         let usual = DiagnosisTask::default();
         let (max_effects, level) = (max_effects.unwrap_or(usual.max_effects), level.unwrap_or(usual.level));
         tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without };
+    }
+    if let Some(node) = root.child("pareto") {
+        let ParetoSection { points } = node.read()?;
+        tasks.pareto = ParetoTask { points: points.unwrap_or(ParetoTask::default().points) };
     }
     Ok(tasks)
 }

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 pub use diagnosis::DiagnosisTask;
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
 pub use tasks::{
-    Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
-    SweepDraft, SweepTask, Tasks, TasksDraft,
+    Axis, AxisDraft, ExcitationDraft, ExcitationTask, ParetoTask, Place, RegressionDraft, RegressionTask,
+    SensitivityTask, SweepDraft, SweepTask, Tasks, TasksDraft,
 };
 
 use crate::case::Case;
@@ -41,6 +41,8 @@ pub enum Task {
     Sweep,
     /// Find the physical effect that the model lacks.
     Diagnosis,
+    /// Find the designs that no other is better than in every criterion, and what one criterion costs in terms of another.
+    Pareto,
 }
 
 /// How the scaled values become one number to minimise.

@@ -29,6 +29,8 @@ use subproblem::Subproblems;
 /// front has a gap, and the rectangle is closed. More criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w`
 /// spread evenly over the simplex, each from the nearest point known.
 ///
+/// One more point meets the demands best: its largest scaled value is least, as in a design.
+///
 /// A point where some criterion has slack is pushed on until none can be lowered alone. Everything that was evaluated on the
 /// way is compared with the points found, and it is looked a step beyond each of them; what is better than one of them is a
 /// new start. Subproblems that fail are left out.
@@ -43,7 +45,8 @@ use subproblem::Subproblems;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct WeightedChebyshevOptions {
-    /// Number of points; three criteria and more take the largest number of evenly spread weights that is not above it.
+    /// Number of points; 0 for as many as the study asks for, else 30. Three criteria and more take the largest number of
+    /// evenly spread weights that is not above it.
     pub points: usize,
     /// Starts of the search for the least of each criterion, the study's own included.
     pub starts: usize,
@@ -51,7 +54,7 @@ pub struct WeightedChebyshevOptions {
 
 impl Default for WeightedChebyshevOptions {
     fn default() -> Self {
-        Self { points: 30, starts: 6 }
+        Self { points: 0, starts: 6 }
     }
 }
 
@@ -86,6 +89,8 @@ enum Stage {
     Gaps(Gaps),
     /// Along the rays of more criteria.
     Rays(Rays),
+    /// The point that meets the demands best.
+    Demands,
     /// What is known to be better than a point of the front.
     Better(usize),
 }
@@ -124,6 +129,11 @@ impl Solver for WeightedChebyshev {
         if state.start.is_empty() {
             return Ok(Progress::Converged);
         }
+        let points = match (self.options.points, oracle.shape().points) {
+            (0, 0) => 30,
+            (0, asked) => asked,
+            (points, _) => points,
+        };
         let criteria = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
         match &mut state.stage {
             Stage::Least(k) => {
@@ -145,21 +155,27 @@ impl Solver for WeightedChebyshev {
                 state.stage = match criteria {
                     1 => Stage::Better(0),
                     2 => Stage::Gaps(Gaps::default()),
-                    _ => Stage::Rays(Rays::new(criteria, self.options.points)),
+                    _ => Stage::Rays(Rays::new(criteria, points)),
                 };
                 Ok(Progress::Continue)
             }
             Stage::Gaps(gaps) => {
-                let more = gaps.bisect(oracle, &mut state.subproblems, &mut state.front, self.options.points)?;
+                let more = gaps.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
                 if !more {
-                    state.stage = Stage::Better(0);
+                    state.stage = Stage::Demands;
                 }
                 Ok(Progress::Continue)
             }
             Stage::Rays(rays) => {
                 if !rays.follow(oracle, &mut state.subproblems, &mut state.front)? {
-                    state.stage = Stage::Better(0);
+                    state.stage = Stage::Demands;
                 }
+                Ok(Progress::Continue)
+            }
+            Stage::Demands => {
+                let place = state.subproblems.demands(oracle, criteria)?;
+                insert(&mut state.front, place);
+                state.stage = Stage::Better(0);
                 Ok(Progress::Continue)
             }
             Stage::Better(round) => {

@@ -115,6 +115,14 @@ impl Subproblems {
         Ok(self.best_known(aim).unwrap_or_else(|| starts[0].clone()))
     }
 
+    /// The point whose largest weighted scaled value is least.
+    pub fn demands(&mut self, oracle: &mut dyn Oracle, criteria: usize) -> Result<Place, Halt> {
+        let aim = Aim::chebyshev(&vec![0.0; criteria], &vec![1.0; criteria]);
+        let starts = self.known.best_for(&aim, 2, 0.02);
+        let found = self.solve(oracle, &aim, &starts, 0.05)?;
+        self.without_slack(oracle, &aim, found)
+    }
+
     /// Lowers the criteria that have slack in a min-max problem, while the others stay.
     pub fn without_slack(&mut self, oracle: &mut dyn Oracle, aim: &Aim, place: Place) -> Result<Place, Halt> {
         let worst = aim.merit(&place.criteria).objective;
