@@ -43,6 +43,7 @@ mod diagnosis;
 mod report;
 mod solve;
 mod tasks;
+mod toml_text;
 
 use std::process::ExitCode;
 

@@ -111,3 +111,32 @@ fn the_read_outs_of_a_front_agree_with_its_points() {
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(page.contains("<h2 id=\"front\">Front</h2>"), "the page has a section of its own");
 }
+
+/// A pair of the published front as demands makes 1 the least worst scaled value there is.
+#[test]
+fn a_picked_point_serves_the_demands_as_well_as_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    pareto(folder.path(), &["pid-pareto", "--points", "12"]);
+    let run = |arguments: &[&str]| cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+    for known in FRONT.into_iter().filter(|[settling, _]| [7.0, 9.0, 12.0, 15.0, 20.0].contains(settling)) {
+        let demands = [format!("settling={} s", known[0]), format!("overshoot={}", known[1])];
+        let picked = run(&["pick", out, "--demand", &demands[0], "--demand", &demands[1]]);
+        assert!(picked.status.success(), "{}", String::from_utf8_lossy(&picked.stderr));
+        let study = folder.path().join("picked.toml");
+        let again = folder.path().join("again");
+        let looked = run(&[
+            "run",
+            study.to_str().unwrap(),
+            "--json",
+            "--max-evaluations",
+            "1",
+            "--out",
+            again.to_str().unwrap(),
+        ]);
+        let result: Value = serde_json::from_slice(&looked.stdout).unwrap();
+        assert_eq!((&result["task"], &result["study"]), (&"design".into(), &"pid-pareto-picked".into()));
+        let worst = result["start"]["worst_scaled"].as_f64().unwrap();
+        assert!((worst - 1.0).abs() < 1e-3 + PRINTED / known[1], "{known:?}: {worst}");
+    }
+}

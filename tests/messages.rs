@@ -776,3 +776,25 @@ fn a_front_that_cannot_be_found() {
         ],
     );
 }
+
+/// The design beside a result of it, for `mops pick` with this demand.
+fn picked(what: &'static str, result: &str, demand: &'static str) -> Case {
+    Case::new(what, DESIGN).with("result.json", result).called(&["pick", ".", "--demand", demand])
+}
+
+#[test]
+fn a_point_that_cannot_be_picked() {
+    let front = r#"{ "study": "loop", "front": [{ "tuners": { "k": 4.0 } }], "trade_offs": {} }"#;
+    check(
+        "pick",
+        &[
+            called("no result", &["pick", "nowhere", "--demand", "settling=12"]),
+            picked("no front", r#"{ "study": "loop", "front": [{}] }"#, "settling=12"),
+            picked("a result that is none", "{", "settling=12"),
+            picked("an unknown criterion", front, "setling=12"),
+            picked("a demand without a value", front, "settling"),
+            picked("a unit that does not fit", front, "settling=12 m"),
+            picked("the front of another study", front, "settling=12"),
+        ],
+    );
+}

@@ -14,6 +14,7 @@ mod linearise;
 mod list;
 mod new;
 mod pareto;
+mod pick;
 mod places;
 mod progress;
 mod remains;
@@ -59,6 +60,8 @@ enum Command {
     Run(run::Arguments),
     /// Find the front of a design study: the designs that no other is better than in every criterion.
     Pareto(pareto::Arguments),
+    /// Pick the point of a finished front for other demands, and write a study that starts there.
+    Pick(pick::Arguments),
     /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
     Diagnose(diagnose::Arguments),
     /// Check a study and its data without running anything.
@@ -115,6 +118,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
+        Command::Pick(arguments) => pick::pick(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
         Command::List(arguments) => list::list(catalogue, &arguments),

@@ -20,7 +20,9 @@ report.html shows them; hover over a point, or move from point to point with the
 
 Examples:
   mops pareto pid-design                      the front of overshoot and settling time
-  mops pareto pid-design --points 60          more points")]
+  mops pareto pid-design --points 60          more points
+  mops pick results/pid-design --demand settling=12
+                                              then: the point for other demands")]
 pub(super) struct Arguments {
     #[command(flatten)]
     common: Common,

@@ -9,7 +9,7 @@ use mops_core::file::StudyFile;
 use mops_core::{Catalogue, Diagnostic, Mistake, Place, Study, Task, suggestion};
 
 use super::progress::Progress;
-use super::remains::leave;
+use super::remains::{leave, leave_study};
 use super::study::{StudyArguments, home, open_as};
 use super::{Trouble, cannot_write, diagnosis, findings, print, tables};
 use crate::diagnosis::Original;
@@ -161,6 +161,11 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         let (settings, study) = (&arguments.study.settings, solved.problem.study());
         let original = Original { text, settings, study, effects: &catalogue.effects };
         leave(&folder, diagnosis, &original, &home(catalogue, &arguments.study), arguments.export.is_some())?;
+    }
+    if solved.outcome.task == Task::Pareto {
+        let text = without_settings(&file.source.text, &arguments.study.settings, search);
+        let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
+        leave_study(&folder, text, &settings, &home(catalogue, &arguments.study))?;
     }
     if arguments.json {
         print(&json);
