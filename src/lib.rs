@@ -44,6 +44,7 @@ mod report;
 mod solve;
 mod store;
 mod tasks;
+mod toml_text;
 mod watch;
 
 use std::process::ExitCode;

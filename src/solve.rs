@@ -79,6 +79,8 @@ pub struct Solved {
     pub best: Evaluation,
     /// Every point, in the order of evaluation.
     pub archive: Vec<Record>,
+    /// Points of the front, in the order of the result; empty where none was looked for.
+    pub front: Vec<Evaluation>,
     /// What the model lacks, where that was searched.
     pub diagnosis: Option<Diagnosis>,
 }
@@ -133,7 +135,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
     drop(run);
-    Ok(Solved { outcome, problem, best, archive, diagnosis: None })
+    Ok(Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None })
 }
 
 /// Looks at the start values alone, and concludes.
@@ -154,7 +156,7 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
     outcome.seconds = begun.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
-    Solved { outcome, problem, best, archive, diagnosis: None }
+    Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None }
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.

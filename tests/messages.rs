@@ -818,3 +818,45 @@ fn uncertain_parameters_that_mean_nothing() {
         ],
     );
 }
+
+/// A front with a mistake, given more of the study.
+fn front(what: &'static str, study: &str, criteria: &str, tables: &str) -> Case {
+    let text = broken(DESIGN, "name = \"loop\"", &format!("name = \"loop\"\ntask = \"pareto\"{study}"));
+    Case::new(what, &(broken(&text, "demand = \"15 s\" }", &format!("demand = \"15 s\"{criteria} }}")) + tables))
+}
+
+#[test]
+fn a_front_that_cannot_be_found() {
+    check(
+        "front",
+        &[
+            front("one criterion alone", "", ", usage = \"inequality\"", ""),
+            front("one number for all criteria", "\nobjective = \"max\"", "", ""),
+            front("too few points", "", "", "[pareto]\npoints = 2\n"),
+            front("too many points", "", "", "[pareto]\npoints = 1000\n"),
+            front("an unknown key", "", "", "[pareto]\npoint = 30\n"),
+        ],
+    );
+}
+
+/// The design beside a result of it, for `mops pick` with this demand.
+fn picked(what: &'static str, result: &str, demand: &'static str) -> Case {
+    Case::new(what, DESIGN).with("result.json", result).called(&["pick", ".", "--demand", demand])
+}
+
+#[test]
+fn a_point_that_cannot_be_picked() {
+    let front = r#"{ "study": "loop", "front": [{ "tuners": { "k": 4.0 } }], "trade_offs": {} }"#;
+    check(
+        "pick",
+        &[
+            called("no result", &["pick", "nowhere", "--demand", "settling=12"]),
+            picked("no front", r#"{ "study": "loop", "front": [{}] }"#, "settling=12"),
+            picked("a result that is none", "{", "settling=12"),
+            picked("an unknown criterion", front, "setling=12"),
+            picked("a demand without a value", front, "settling"),
+            picked("a unit that does not fit", front, "settling=12 m"),
+            picked("the front of another study", front, "settling=12"),
+        ],
+    );
+}

@@ -121,16 +121,23 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
 /// Points of a front in a result, at most.
 const LONGEST_FRONT: usize = 200;
 
-/// The points of the front, spread evenly where there are many; of a single design, the design itself.
+/// The points of the front by their first criterion, spread evenly where there are many; of a single design, the design
+/// itself.
 fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<serde_json::Value> {
     let study = run.problem().study();
     let front = run.front();
     let Some(m) = front.first().map(|&i| run.archive()[i].objectives.len()) else {
         return vec![outcome::front_point(study, best)];
     };
-    let objectives: Vec<f64> = front.iter().flat_map(|&i| run.archive()[i].objectives.iter().copied()).collect();
-    let kept = front::thinned(&objectives, m, LONGEST_FRONT);
-    kept.into_iter().map(|i| outcome::front_point(study, run.evaluation(front[i]))).collect()
+    let row = |i: usize| run.archive()[i].objectives.as_slice();
+    let objectives: Vec<f64> = front.iter().flat_map(|&i| row(i).iter().copied()).collect();
+    let most = if run.shape().points > 0 { run.shape().points + m + 1 } else { LONGEST_FRONT };
+    let mut kept: Vec<usize> = front::thinned(&objectives, m, most).into_iter().map(|i| front[i]).collect();
+    // The point that is reported is one of them.
+    let reported = run.archive().iter().position(|record| record.tuners == best.tuners);
+    kept.extend(reported.filter(|i| front.contains(i) && !kept.contains(i)));
+    kept.sort_by(|&a, &b| front::compare(row(a), row(b)));
+    kept.into_iter().map(|i| outcome::front_point(study, run.evaluation(i))).collect()
 }
 
 /// A number to six significant digits, so that no rounding error shows.

@@ -35,6 +35,7 @@ pub mod statistics;
 mod study;
 mod tolerance;
 mod trace;
+mod trade_offs;
 mod tuner;
 mod uncertainty;
 mod unit;
@@ -87,6 +88,7 @@ pub use study::{
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
+pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, TradeOffs};
 pub use tuner::{Grid, Scale, Tuner};
 pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};
 pub use unit::{Quantity, Unit};

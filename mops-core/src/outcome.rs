@@ -10,6 +10,7 @@ use crate::problem::{Evaluation, FEASIBLE};
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
 use crate::solver::Stop;
 use crate::study::{Study, Task};
+use crate::trade_offs::TradeOffs;
 use crate::uncertainty::UncertaintyReport;
 
 /// Whether the result can be improved in one criterion without loss in another.
@@ -92,6 +93,9 @@ pub struct Findings {
     /// The objective over one tuner or two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,
+    /// What the points of the front tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trade_offs: Option<TradeOffs>,
     /// What the model lacks, as the search for it writes it down.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Value>,

@@ -12,7 +12,7 @@ use crate::model::{Analysis, Failure, Job};
 use crate::random::stream;
 use crate::scalar::Dual;
 use crate::solver::Shape;
-use crate::study::{Objective, Row, Study};
+use crate::study::{Objective, Row, Study, Task};
 use crate::tuner::Tuner;
 
 /// Constraints count as satisfied up to this much of their scaled value.
@@ -135,7 +135,8 @@ impl Problem {
         let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, &study), row.weight)).collect();
         let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
         let jobs: Vec<usize> = (0..study.jobs.len()).collect();
-        let shape = Shape { spacing, rows, objective: study.objective, residuals: 0 };
+        let points = if study.task == Task::Pareto { study.tasks.pareto.points } else { 0 };
+        let shape = Shape { spacing, rows, objective: study.objective, points, residuals: 0 };
         let counts = |job: &usize| {
             (study.rows.iter().zip(&shape.rows)).any(|(row, (usage, _))| row.job == *job && *usage != Usage::Monitor)
         };

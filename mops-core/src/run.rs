@@ -87,6 +87,8 @@ pub struct Run<'a, E: Evaluator = Problem> {
     /// Whether slopes come from tangents where there are some.
     exact: bool,
     linearisations: usize,
+    /// Points of the front that the solver has solved for, as values of all tuners.
+    solved: Vec<Vec<f64>>,
 }
 
 /// Failures of one kind in one job.
@@ -117,6 +119,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
             failures: Vec::new(),
             exact: true,
             linearisations: 0,
+            solved: Vec::new(),
         }
     }
 
@@ -158,10 +161,12 @@ impl<'a, E: Evaluator> Run<'a, E> {
                 }
             }
         };
-        iterate().unwrap_or_else(|halt| match halt {
+        let stop = iterate().unwrap_or_else(|halt| match halt {
             Halt::Budget => Stop::Budget,
             Halt::Interrupted => Stop::Interrupted,
-        })
+        });
+        self.solved = solver.front().iter().map(|point| self.problem.tuners_at(point)).collect();
+        stop
     }
 
     /// All points, in the order of their evaluation.
@@ -179,9 +184,31 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.problem
     }
 
-    /// The front: the feasible points that no other feasible point is better than in every objective, by their place in the
-    /// archive. Empty where the objectives become one number.
+    /// The front, by place in the archive: the points that the solver has solved for ([`Solver::front`]), or what is better
+    /// than them; all that nothing is better than where it names none. Empty where the objectives become one number.
     pub fn front(&self) -> Vec<usize> {
+        let all = self.non_dominated();
+        if self.solved.is_empty() {
+            return all;
+        }
+        let solved = self.solved.iter().filter_map(|tuners| self.archive.iter().position(|r| r.tuners == *tuners));
+        let least_worst = |i: usize| {
+            let reached = |j: usize| {
+                let pairs = self.archive[j].objectives.iter().zip(&self.archive[i].objectives);
+                pairs.map(|(a, b)| a - b).fold(f64::NEG_INFINITY, f64::max)
+            };
+            all.iter().copied().min_by(|&a, &b| reached(a).total_cmp(&reached(b)))
+        };
+        let mut front: Vec<usize> =
+            solved.filter_map(|i| if all.contains(&i) { Some(i) } else { least_worst(i) }).collect();
+        front.sort_unstable();
+        front.dedup();
+        front
+    }
+
+    /// The feasible points that no other feasible point is better than in every objective, by their place in the archive.
+    /// Empty where the objectives become one number.
+    pub fn non_dominated(&self) -> Vec<usize> {
         let feasible = |i: &usize| self.archive[*i].merit.is_feasible() && !self.archive[*i].objectives.is_empty();
         let candidates: Vec<usize> = (0..self.archive.len()).filter(feasible).collect();
         let Some(m) = candidates.first().map(|&i| self.archive[i].objectives.len()) else { return Vec::new() };

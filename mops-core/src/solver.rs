@@ -19,6 +19,8 @@ pub struct Shape {
     pub rows: Vec<(Usage, f64)>,
     /// How the rows to be minimised become one number.
     pub objective: Objective,
+    /// Number of points that a front is to have, about; 0 where nothing is said.
+    pub points: usize,
     /// Length of the residual vector whose sum of squares is the objective; 0 if it is no sum of squares.
     pub residuals: usize,
 }
@@ -169,5 +171,11 @@ pub trait Solver: Send {
     /// The points it holds at present, where it is one that has members; else none.
     fn members(&self) -> &[Vec<f64>] {
         &[]
+    }
+
+    /// Points of the front, each of which solves a problem of its own; empty where the solver knows no more of them than
+    /// that they were evaluated.
+    fn front(&self) -> Vec<Vec<f64>> {
+        Vec::new()
     }
 }

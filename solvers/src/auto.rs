@@ -10,13 +10,14 @@ use crate::nsga2::Nsga2Options;
 use crate::nsga3::Nsga3Options;
 use crate::pattern_search::PatternSearchOptions;
 use crate::sqp::SqpOptions;
+use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
 /// numbers or lists, else `sqp`; from several starts: the study's own, and the best points of a sample of the box. Where
 /// the objective is no sum of squares a pattern search follows from the best point found, because an optimum may lie on a
 /// jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the best point
-/// until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is `nsga2` for two criteria and
-/// `nsga3` for more.
+/// until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is `weighted-chebyshev` for up to
+/// three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria and `nsga3` for more.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -128,6 +129,13 @@ impl Solver for Auto {
             _ => &[],
         }
     }
+
+    fn front(&self) -> Vec<Vec<f64>> {
+        match &self.stage {
+            Some(Stage::Front(front)) => front.front(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 impl Standing {
@@ -167,9 +175,13 @@ fn gains(oracle: &dyn Oracle, before: f64) -> bool {
     oracle.best().is_some_and(|best| before.is_infinite() || before - best.merit.objective > SAME * before.abs())
 }
 
-/// Crowding spreads two objectives evenly, reference directions more of them.
+/// Few criteria are followed along their front; crowding spreads two objectives evenly, reference directions more of them.
 fn front(shape: &Shape) -> Box<dyn Solver> {
     let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+    let along = WeightedChebyshevOptions::default().build();
+    if objectives <= 3 && shape.dimension() <= 50 && along.accepts(shape).is_ok() {
+        return along;
+    }
     if objectives <= 2 { Nsga2Options::default().build() } else { Nsga3Options::default().build() }
 }
 

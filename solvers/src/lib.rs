@@ -5,6 +5,7 @@ mod argmin_adapter;
 pub mod auto;
 pub mod cma_es;
 pub mod differential_evolution;
+mod directions;
 pub mod epigraph;
 pub mod evolution;
 pub mod genetic;
@@ -23,10 +24,11 @@ mod rows;
 pub mod sqp;
 mod start;
 mod variation;
+pub mod weighted_chebyshev;
 
 use mops_core::SolverKind;
 
-pub use pareto::certify;
+pub use pareto::{Certificate, certificate, certify};
 
 /// Every kind of solver, the default first. A new one is a file, and a line here.
 pub fn kinds() -> Vec<SolverKind> {
@@ -37,6 +39,7 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<cma_es::CmaEsOptions>(),
         SolverKind::of::<differential_evolution::DifferentialEvolutionOptions>(),
         SolverKind::of::<genetic::GeneticOptions>(),
+        SolverKind::of::<weighted_chebyshev::WeightedChebyshevOptions>(),
         SolverKind::of::<nsga2::Nsga2Options>(),
         SolverKind::of::<nsga3::Nsga3Options>(),
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),

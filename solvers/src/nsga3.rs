@@ -1,6 +1,5 @@
 //! NSGA-III: a front spread along reference directions.
 
-mod directions;
 mod scale;
 
 use std::cmp::Ordering;
@@ -11,6 +10,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::directions;
 use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
 use crate::variation::Variation;
 use scale::Scale;
@@ -81,7 +81,7 @@ struct Candidate {
 
 impl Survival for Niching {
     fn begin(&mut self, m: usize) -> usize {
-        let divisions = if self.divisions > 0 { self.divisions } else { directions::usual_divisions(m) };
+        let divisions = if self.divisions > 0 { self.divisions } else { directions::divisions_for(m, 100) };
         self.directions = directions::spread(m, divisions);
         self.scale = Scale::new(m);
         // A multiple of four.

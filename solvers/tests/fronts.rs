@@ -1,7 +1,7 @@
-//! Fronts found by `nsga2` and `nsga3`, against fronts that are known.
+//! Fronts found by `weighted-chebyshev`, `nsga2` and `nsga3`, against fronts that are known.
 
-use mops_core::front::hypervolume;
-use mops_core::{Budget, Run};
+use mops_core::front::{hypervolume, inverted_generational_distance, thinned};
+use mops_core::{Budget, Run, Stop};
 use mops_problems::{Answer, Posed, Slope};
 use mops_solvers::evolution::{Evolution, Survival};
 use mops_solvers::nsga2::Nsga2Options;
@@ -46,4 +46,65 @@ fn nsga3_comes_near_the_fronts_of_three_objectives_and_finds_nothing_beyond() {
         };
         assert!((least..=1.0 + SAMPLING).contains(&share), "{name}: {share}");
     }
+}
+
+/// The points of a known front, so many of them that are spread evenly, and the whole.
+fn known_front(problem: &mops_problems::Problem, count: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let Answer::Front { points, .. } = &problem.answer else { panic!("{}", problem.name) };
+    let all = points(4000);
+    let m = all[0].len();
+    let even = thinned(&all.concat(), m, count).into_iter().map(|i| all[i].clone()).collect();
+    (even, all)
+}
+
+#[test]
+fn weighted_chebyshev_spreads_thirty_exact_points_over_fronts_of_two_objectives() {
+    for (suite, names) in
+        [("zdt", &["ZDT1", "ZDT2", "ZDT3"][..]), ("constrained-fronts", &["BNH", "SRN", "TNK", "OSY"])]
+    {
+        let suite = mops_problems::suites().into_iter().find(|s| s.name == suite).unwrap();
+        for problem in (suite.problems)().into_iter().filter(|problem| names.contains(&problem.name.as_str())) {
+            let Answer::Front { reference, .. } = &problem.answer else { panic!("{}", problem.name) };
+            let posed = Posed::new(&problem, Slope::Exact);
+            let mut run = Run::new(&posed, Budget { evaluations: 8000 }, &());
+            let stop = run.solve(&mut *weighted_chebyshev(), &posed.start());
+            assert_eq!(stop, Stop::Converged, "{}", problem.name);
+            let rows: Vec<Vec<f64>> = run.front().into_iter().map(|i| run.archive()[i].objectives.clone()).collect();
+            assert!((28..=32).contains(&rows.len()), "{}: {}", problem.name, rows.len());
+            let (even, all) = known_front(&problem, rows.len());
+            let share = hypervolume(&rows.concat(), reference) / hypervolume(&even.concat(), reference);
+            assert!((0.99..1.01).contains(&share), "{}: {share}", problem.name);
+            // As far from the front as its own points are from each other.
+            let off = inverted_generational_distance(&all.concat(), 2, &rows);
+            let size = all[0].iter().zip(&all[all.len() - 1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 5e-3 * size, "{}: {off}", problem.name);
+        }
+    }
+}
+
+#[test]
+fn weighted_chebyshev_spreads_points_over_a_sphere() {
+    let suite = mops_problems::suites().into_iter().find(|s| s.name == "dtlz").unwrap();
+    let problem = (suite.problems)().into_iter().find(|problem| problem.name == "DTLZ2").unwrap();
+    let posed = Posed::new(&problem, Slope::Exact);
+    let mut run = Run::new(&posed, Budget { evaluations: 8000 }, &());
+    run.solve(&mut *weighted_chebyshev(), &posed.start());
+    let rows: Vec<Vec<f64>> = run.front().into_iter().map(|i| run.archive()[i].objectives.clone()).collect();
+    assert!(rows.len() >= 28, "{}", rows.len());
+    for row in &rows {
+        assert!((row.iter().map(|f| f * f).sum::<f64>() - 1.0).abs() < 1e-4, "{row:?}");
+    }
+    // No direction of the octant is without a point near it: the mesh of 28 weights has triangles with sides of up to 0.4.
+    let (_, all) = known_front(&problem, 1);
+    let far = |at: &Vec<f64>| {
+        let square = |row: &Vec<f64>| row.iter().zip(at).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        rows.iter().map(square).fold(f64::INFINITY, f64::min).sqrt()
+    };
+    let farthest = all.iter().max_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+    assert!(far(farthest) < 0.35, "{farthest:?}: {}", far(farthest));
+}
+
+fn weighted_chebyshev() -> Box<dyn mops_core::Solver> {
+    let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "weighted-chebyshev").unwrap();
+    kind.default_choice().make()
 }

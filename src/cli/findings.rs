@@ -1,7 +1,7 @@
 //! What tasks found, and what the data of a calibration tell, as tables and sentences on the terminal.
 
 use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
-use mops_core::{Outcome, SweepReport};
+use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
 
 use super::robustness;
 use super::tables::{number, table};
@@ -29,7 +29,39 @@ pub(super) fn text(outcome: &Outcome) -> String {
         text += &sweep(found);
     }
     text += &robustness::text(&outcome.found);
+    if let Some(found) = &outcome.found.trade_offs {
+        text += &front(outcome, found);
+    }
     text
+}
+
+/// The points of a front, one line each.
+fn front(outcome: &Outcome, found: &TradeOffs) -> String {
+    let active: Vec<&str> = outcome.tuners.iter().filter(|t| t.active).map(|t| t.name.as_str()).collect();
+    let units = |name: &str| outcome.tuners.iter().find(|t| t.name == name).map_or("", |t| t.unit.as_str());
+    let with_unit = |name: &str, unit: &str| if unit == "1" { name.to_owned() } else { format!("{name}, {unit}") };
+    let mut header = vec![String::new()];
+    header.extend(found.criteria.iter().map(|c| with_unit(&c.key, &c.unit)));
+    header.extend(active.iter().map(|name| with_unit(name, units(name))));
+    header.extend(["worst scaled", "pareto", ""].map(str::to_owned));
+    let rows = outcome.front.iter().zip(&found.points).enumerate().map(|(i, (point, known))| {
+        let value = |group: &str, name: &str| point[group][name].as_f64().map_or_else(String::new, number);
+        let mut row = vec![(i + 1).to_string()];
+        row.extend(found.criteria.iter().map(|c| value("criteria", &c.key)));
+        row.extend(active.iter().map(|name| value("tuners", name)));
+        row.push(number(known.worst_scaled));
+        row.push(match known.pareto {
+            Pareto::CertifiedLocal => "yes, to first order".to_owned(),
+            Pareto::NotShown => "not shown".to_owned(),
+            Pareto::No => "no".to_owned(),
+        });
+        let marks = [(found.nearest == i, "nearest to the demands"), (found.knee == Some(i), "knee")];
+        row.push(marks.iter().filter(|(is, _)| *is).map(|(_, mark)| *mark).collect::<Vec<_>>().join(", "));
+        row
+    });
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let numeric: Vec<usize> = (0..header.len() - 2).collect();
+    format!("\nfront\n{}\n{}", table(&header, &numeric, rows.collect()), sentences(&found.words))
 }
 
 pub(super) fn sentences(words: &[String]) -> String {

@@ -30,7 +30,7 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
         values.iter().map(|z| if inside(z) { (z.re, sign * z.im) } else { (f64::NAN, f64::NAN) }).collect()
     };
     let circle = (0..=200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin_cos());
-    let curve = |name: &str, points, style, ink| Curve { name: name.into(), points, style, ink, may_leave: false };
+    let curve = |name: &str, points, style, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
     Plot {
         title: format!("Nyquist curve of {name}"),
         x_label: "real part".into(),
@@ -90,7 +90,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         points: of.iter().map(point).collect(),
         style,
         ink,
-        may_leave: false,
+        ..Curve::default()
     };
     let lines = branches.iter().enumerate().map(|(i, branch)| Curve {
         name: if i == 0 { "closed loop".into() } else { String::new() },

@@ -16,7 +16,9 @@ mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod pareto;
 mod past;
+mod pick;
 mod places;
 mod progress;
 mod remains;
@@ -62,6 +64,10 @@ struct Arguments {
 enum Command {
     /// Solve a study and write result.json, report.html, plots and evaluations.
     Run(run::Arguments),
+    /// Find the front of a design study: the designs that no other is better than in every criterion.
+    Pareto(pareto::Arguments),
+    /// Pick the point of a finished front for other demands, and write a study that starts there.
+    Pick(pick::Arguments),
     /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
     Diagnose(diagnose::Arguments),
     /// List the runs below a folder: study, date, worst scaled value, evaluations.
@@ -123,6 +129,8 @@ fn print(text: &str) {
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
+        Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
+        Command::Pick(arguments) => pick::pick(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::History(arguments) => history::history(catalogue, &arguments),
         Command::Compare(arguments) => compare::compare(catalogue, &arguments),

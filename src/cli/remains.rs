@@ -1,4 +1,5 @@
-//! What a diagnosis leaves in the folder beside result and report: predictions, the repaired study, its source.
+//! What is left in the folder beside result and report: predictions, the repaired study and its source by a diagnosis, the
+//! study by a front.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -9,6 +10,7 @@ use mops_discrepancy::Diagnosis;
 use super::study::Home;
 use super::{Trouble, cannot_write};
 use crate::diagnosis::{Original, predictions, repaired, source};
+use crate::toml_text::settled;
 
 /// Writes `predictions/<experiment>.csv`, and where something was found `repaired.toml` and, where asked for, `repaired.rs`.
 pub(super) fn leave(
@@ -38,6 +40,18 @@ pub(super) fn leave(
         write(&folder.join("repaired.rs"), source(&text, diagnosis, &folder.display().to_string()).as_bytes())?;
     }
     Ok(())
+}
+
+/// Writes `study.toml`: the study of a front, with its settings, so that a point can be picked from it later.
+pub(super) fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), Trouble> {
+    let text = match home {
+        Home::File(study) => settled(text, settings, &|path| seen_from(folder, study, path)),
+        Home::Shipped(shipped) => {
+            copy_data(folder, shipped)?;
+            settled(text, settings, &str::to_owned)
+        }
+    };
+    write(&folder.join("study.toml"), text.into_text().as_bytes())
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Trouble> {

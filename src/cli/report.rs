@@ -28,8 +28,8 @@ pub(super) struct Again {
 pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let folder = &arguments.folder;
     let Again { solved, text } = again(catalogue, folder)?;
-    let Solved { outcome, problem, best, archive, .. } = &solved;
-    let report = Report { outcome, problem, best, archive, diagnosis: None, text: &text };
+    let Solved { outcome, problem, best, archive, front, .. } = &solved;
+    let report = Report { outcome, problem, best, archive, front, diagnosis: None, text: &text };
     report.write(folder).map_err(cannot_write(folder))?;
     let count = outcome.evaluations;
     print(&format!("report.html and the plots of {count} evaluations are in {}\n", folder.display()));

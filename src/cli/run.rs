@@ -9,8 +9,8 @@ use mops_core::file::StudyFile;
 use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Place, Study, Task, Watch, suggestion};
 
 use super::progress::Progress;
-use super::remains::leave;
-use super::study::{StudyArguments, home, open, open_as, without_settings};
+use super::remains::{leave, leave_study};
+use super::study::{StudyArguments, home, open_as, without_settings};
 use super::{Trouble, cannot_write, diagnosis, findings, keep, print, tables};
 use crate::diagnosis::Original;
 use crate::report::Report;
@@ -20,6 +20,9 @@ use crate::watch::{Both, Page};
 
 /// What `mops diagnose` sets.
 const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
+
+/// What `mops pareto` sets.
+const PARETO: &str = "study.task=\"pareto\"";
 
 /// What can be said to every run.
 #[derive(Args)]
@@ -67,6 +70,13 @@ pub(super) struct Arguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
+    effort: Effort,
+}
+
+/// By which solver, and how long.
+#[derive(Args)]
+pub(super) struct Effort {
+    #[command(flatten)]
     keep: keep::Beginning,
     /// Kind of solver, with its default options, instead of the study's.
     #[arg(long)]
@@ -79,23 +89,41 @@ pub(super) struct Arguments {
 /// What is done with the study.
 pub(super) enum Search<'a> {
     /// What it is for, with this solver and budget where they are given.
-    Task { solver: Option<&'a str>, max_evaluations: Option<u64>, start: Start },
+    Task(&'a Effort),
     /// What its model lacks.
     Diagnosis,
+    /// Its front, of so many points where that is said.
+    Pareto { effort: &'a Effort, points: Option<u16> },
+}
+
+impl Search<'_> {
+    /// What it sets in the study.
+    fn settings(&self) -> Vec<String> {
+        match self {
+            Self::Task(_) => Vec::new(),
+            Self::Diagnosis => vec![DIAGNOSIS.to_owned()],
+            Self::Pareto { points, .. } => {
+                let points = points.map(|points| format!("pareto.points={points}"));
+                std::iter::once(PARETO.to_owned()).chain(points).collect()
+            }
+        }
+    }
+
+    fn effort(&self) -> Option<&Effort> {
+        match self {
+            Self::Task(effort) | Self::Pareto { effort, .. } => Some(effort),
+            Self::Diagnosis => None,
+        }
+    }
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let Arguments { common, keep, solver, max_evaluations } = arguments;
-    let (solver, max_evaluations, start) = (solver.as_deref(), *max_evaluations, keep.start());
-    go(catalogue, common, &Search::Task { solver, max_evaluations, start })
+    go(catalogue, &arguments.common, &Search::Task(&arguments.effort))
 }
 
 /// Runs the study and leaves the result behind.
 pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, Trouble> {
-    let mut file = match search {
-        Search::Task { .. } => open(catalogue, &arguments.study)?,
-        Search::Diagnosis => open_as(catalogue, &arguments.study, Some(DIAGNOSIS))?,
-    };
+    let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
     if arguments.export.is_some() && file.study.task != Task::Diagnosis {
         return Err(Diagnostic::new(
             "`--export` writes the repaired model of a diagnosis, and this study is for something else",
@@ -106,10 +134,8 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(seed) = arguments.seed {
         file.study.seed = seed;
     }
-    let (chosen, limit, start) = match search {
-        Search::Task { solver, max_evaluations, start } => (*solver, *max_evaluations, start),
-        Search::Diagnosis => (None, None, &Start::Fresh),
-    };
+    let (chosen, limit) = search.effort().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
+    let start = search.effort().map_or(Start::Fresh, |effort| effort.keep.start());
     let solver = match chosen {
         None => file.solver.clone(),
         Some(name) => {
@@ -143,7 +169,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         print(&introduction(&file.study, &options));
     }
     let home = home(catalogue, &arguments.study);
-    let keeper = keep::open((&folder, start), (&file, &arguments.study), &home, &options)?;
+    let keeper = keep::open((&folder, &start), (&file, &arguments.study), &home, &options)?;
     if let Some(note) = keeper.as_ref().and_then(|keeper| keeper.note.as_ref()).filter(|_| talks) {
         let _ = writeln!(std::io::stderr(), "note: {note}");
     }
@@ -160,7 +186,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
             return Err(refused(&why.0, &file).into());
         }
     };
-    let told = opened.as_ref().map(|opened| keep::told(start, known, opened)).unwrap_or_default();
+    let told = opened.as_ref().map(|opened| keep::told(&start, known, opened)).unwrap_or_default();
 
     let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
     write(&folder, &json, &solved, &file.source.text)?;
@@ -170,13 +196,15 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(trouble) = opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop))) {
         let _ = writeln!(std::io::stderr(), "warning: not every evaluation could be kept: {trouble}");
     }
+    let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
+    let plain = without_settings(&file.source.text, &settings);
     if let Some(diagnosis) = &solved.diagnosis {
         let (settings, study) = (&arguments.study.settings, solved.problem.study());
-        let extra = matches!(search, Search::Diagnosis).then(|| DIAGNOSIS.to_owned());
-        let all: Vec<String> = settings.iter().cloned().chain(extra).collect();
-        let text = without_settings(&file.source.text, &all);
-        let original = Original { text, settings, study, effects: &catalogue.effects };
+        let original = Original { text: plain, settings, study, effects: &catalogue.effects };
         leave(&folder, diagnosis, &original, &home, arguments.export.is_some())?;
+    }
+    if solved.outcome.task == Task::Pareto {
+        leave_study(&folder, plain, &settings, &home)?;
     }
     if arguments.json {
         print(&json);
@@ -241,7 +269,7 @@ fn introduction(study: &Study, options: &Options) -> String {
 /// Whether the task of a study needs a solver.
 pub(super) fn solves(study: &Study) -> bool {
     match study.task {
-        Task::Design | Task::Calibration => true,
+        Task::Design | Task::Calibration | Task::Pareto => true,
         Task::Excitation | Task::Diagnosis => false,
         Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
         Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
@@ -261,8 +289,8 @@ fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), T
         let samples = folder.join("samples.csv");
         write_samples(&samples, found).map_err(|e| cannot_write(&samples)(std::io::Error::other(e)))?;
     }
-    let Solved { outcome, problem, best, archive, diagnosis } = solved;
-    Report { outcome, problem, best, archive, diagnosis: diagnosis.as_ref(), text }
+    let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
+    Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text }
         .write(folder)
         .map_err(cannot_write(folder))
 }

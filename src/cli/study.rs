@@ -64,17 +64,17 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
 
 /// Reads and checks a study.
 pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<StudyFile, Diagnostic> {
-    open_as(catalogue, arguments, None)
+    open_as(catalogue, arguments, &[])
 }
 
-/// The same with one more setting.
+/// The same with more settings.
 pub(super) fn open_as(
     catalogue: &Catalogue,
     arguments: &StudyArguments,
-    setting: Option<&str>,
+    more: &[String],
 ) -> Result<StudyFile, Diagnostic> {
     let StudyArguments { study, settings } = arguments;
-    let settings: Vec<String> = settings.iter().cloned().chain(setting.map(str::to_owned)).collect();
+    let settings: Vec<String> = settings.iter().chain(more).cloned().collect();
     let settings = settings.as_slice();
     let path = match home(catalogue, arguments) {
         Home::File(path) => path,

@@ -7,7 +7,6 @@ pub(crate) mod made_up;
 mod predictions;
 mod repaired;
 mod source;
-mod toml_text;
 pub(crate) mod words;
 
 pub(crate) use block::block;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use mops_core::{AnalysisKind, Effect, Scope, Strength, Study};
 use mops_discrepancy::{Diagnosis, Found, StrengthValue};
 
-use super::toml_text::{TomlText, key, number, quoted};
 use super::words;
+use crate::toml_text::{TomlText, key, number, quoted, settled};
 
 /// The study that was diagnosed.
 pub(crate) struct Original<'a> {
@@ -26,20 +26,9 @@ const REACH: f64 = 10.0;
 /// The text of the repaired study: a calibration that starts at the values found. `locate` leads from the path of a data file
 /// to the path as it counts from where the repaired study will stand.
 pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &dyn Fn(&str) -> String) -> String {
-    let mut text = TomlText::new(original.text);
-    for setting in original.settings {
-        for (path, value) in TomlText::new(setting).values() {
-            text.set(&borrowed(&path), &value);
-        }
-    }
+    let mut text = settled(original.text, original.settings, locate);
     text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name)));
     text.set(&["study", "task"], "\"calibration\"");
-    for experiment in text.keys(&["experiments"]) {
-        let place = ["experiments", &experiment, "file"];
-        if let Some(file) = text.words(&place) {
-            text.set(&place, &quoted(&locate(&file)));
-        }
-    }
     noise_and_criteria(&mut text, diagnosis);
     parameters(&mut text, original.study, diagnosis);
     start_values(&mut text, original, diagnosis);
@@ -48,10 +37,6 @@ pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &
     }
     text.head(&words::verdict(diagnosis).replace('`', ""));
     text.into_text()
-}
-
-fn borrowed(path: &[String]) -> Vec<&str> {
-    path.iter().map(String::as_str).collect()
 }
 
 /// Every channel needs its noise, and a calibration something to minimise; what the user gave stays.

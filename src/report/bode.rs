@@ -56,6 +56,7 @@ pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2
                 style: sweep.style,
                 ink: sweep.ink,
                 may_leave: sweep.ink == Ink::Start,
+                ..Curve::default()
             })
             .collect(),
         log_x: true,

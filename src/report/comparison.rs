@@ -28,7 +28,7 @@ impl Both {
     fn curves(&self, signal: &str) -> Vec<Curve> {
         let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, ink| {
             let points = sampling::points(trace(analysis, signal)?);
-            Some(Curve { name: name.to_owned(), points, style, ink, may_leave: ink == Ink::Start })
+            Some(Curve { name: name.to_owned(), points, style, ink, may_leave: ink == Ink::Start, ..Curve::default() })
         };
         let start = curve("start", &self.start, CurveStyle::Dashed, Ink::Start);
         start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Ink::Result)).collect()
@@ -60,7 +60,7 @@ impl Both {
             points,
             style: CurveStyle::Dots,
             ink: Ink::Measured,
-            may_leave: false,
+            ..Curve::default()
         }];
         curves.extend(self.curves(&signal.name));
         Plot { title: format!("{} in experiment {case}", signal.name), curves, ..over_time(signal) }

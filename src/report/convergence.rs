@@ -59,7 +59,14 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
     let after = steps(&best[split..], archive.len(), |m| m.objective);
     let all = archive.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.merit.objective)).collect();
     let curves = vec![
-        Curve { name: "every point".into(), points: all, style: CurveStyle::Dots, ink: Ink::Start, may_leave: true },
+        Curve {
+            name: "every point".into(),
+            points: all,
+            style: CurveStyle::Dots,
+            ink: Ink::Start,
+            may_leave: true,
+            ..Curve::default()
+        },
         Curve {
             name: "best so far, a constraint violated".into(),
             points: before,

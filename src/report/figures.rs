@@ -5,6 +5,7 @@ use mops_core::{AnalysisKind, Role, Row, Variable};
 use super::Report;
 use super::bode;
 use super::comparison::Both;
+use super::front;
 use super::numbers::{counted, with_unit};
 use super::plot::Plot;
 use super::uncertainty::{self, Around};
@@ -82,6 +83,7 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     if both.start.is_err() && both.best.is_err() && case.experiment.is_none() {
         return group;
     }
+    let of_front = front::analyses(report, job);
     let signals = &model.interface().signals;
     let captions = |signal: &str| -> Vec<String> {
         let of_job = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
@@ -115,7 +117,8 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
             continue;
         }
         let rows: Vec<&Row> = study.rows.iter().filter(|row| row.job == job).collect();
-        let plot = both.response(signal, &case.name, &rows);
+        let mut plot = both.response(signal, &case.name, &rows);
+        plot.curves.splice(0..0, front::responses(&of_front, &signal.name));
         let plots = vec![(format!("response-{place}-{}", signal.name), plot)];
         group.figures.push(Figure { plots, caption: captions(&signal.name) });
     }

@@ -11,6 +11,7 @@ mod criteria;
 mod diagnosis;
 mod excitation;
 mod figures;
+mod front;
 mod legend;
 mod numbers;
 mod page;
@@ -58,6 +59,8 @@ pub struct Report<'a> {
     pub best: &'a Evaluation,
     /// All points, in the order of their evaluation; the first is the start.
     pub archive: &'a [Record],
+    /// Points of the front, in the order of the result; empty where none was looked for.
+    pub front: &'a [Evaluation],
     /// What the model lacks, where that was searched.
     pub diagnosis: Option<&'a Diagnosis>,
     /// The study file with its settings.
@@ -74,6 +77,7 @@ impl Report<'_> {
         fs::create_dir_all(&plots)?;
         let (responses, left_out) = figures::responses(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
+        let front = front::group(self);
         let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
         let inputs = match &self.outcome.found.excitation {
             Some(found) => Some(&found.inputs),
@@ -83,9 +87,19 @@ impl Report<'_> {
         let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
         let robustness = robustness::sections(self);
         let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
-        let pictures =
-            page::Pictures { responses, left_out, convergence, sweep, excitation, diagnosis, robustness, uncertainty };
-        let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation, &pictures.uncertainty];
+        let pictures = page::Pictures {
+            responses,
+            left_out,
+            convergence,
+            front,
+            sweep,
+            excitation,
+            diagnosis,
+            robustness,
+            uncertainty,
+        };
+        let findings =
+            [&pictures.convergence, &pictures.front, &pictures.sweep, &pictures.excitation, &pictures.uncertainty];
         let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
         let groups = groups.chain(pictures.robustness.iter().map(|section| &section.group));
         let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
@@ -102,7 +116,7 @@ impl Report<'_> {
     fn searched(&self) -> bool {
         match self.outcome.task {
             // The rounds of a design against worst cases have objectives of their own.
-            Task::Design | Task::Calibration => self.outcome.found.robust.is_none(),
+            Task::Design | Task::Calibration | Task::Pareto => self.outcome.found.robust.is_none(),
             Task::Sensitivity => self.archive.len() > 1,
             Task::Excitation | Task::Sweep | Task::Diagnosis => false,
             Task::WorstCase | Task::MonteCarlo => self.archive.len() > 1,

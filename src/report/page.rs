@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs no network and no script.
+//! The page: one HTML file that needs no network; a front has a script to move about in it, all else none.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_core::{CalibrationReport, Task};
@@ -7,7 +7,7 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::numbers::significant;
 use super::verdict::{self, Tone};
-use super::{calibration, criteria, diagnosis, excitation, robustness, sensitivity, tuners, uncertainty};
+use super::{calibration, criteria, diagnosis, excitation, front, robustness, sensitivity, tuners, uncertainty};
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {
@@ -15,6 +15,7 @@ pub(super) struct Pictures {
     /// A sentence where responses are left out.
     pub(super) left_out: Option<String>,
     pub(super) convergence: Option<Group>,
+    pub(super) front: Option<Group>,
     pub(super) sweep: Option<Group>,
     pub(super) excitation: Option<Group>,
     pub(super) diagnosis: Option<diagnosis::Pictures>,
@@ -48,6 +49,9 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     }
                     @for one in &pictures.robustness {
                         (section(one.title, html! { (one.content) (figures(&one.group)) }))
+                    }
+                    @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &pictures.front) {
+                        (section("Front", html! { (figures(group)) (front::table(report, found)) }))
                     }
                     @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
                     @if let Some(found) = &outcome.found.sensitivity {
@@ -89,6 +93,7 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     }))
                 }
                 footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
+                @if pictures.front.is_some() { script { (PreEscaped(front::SCRIPT)) } }
             }
         }
     }
@@ -158,6 +163,7 @@ fn fact(name: &str, value: &str) -> Markup {
 fn task(task: Task) -> &'static str {
     match task {
         Task::Design => "Design",
+        Task::Pareto => "Front",
         Task::Calibration => "Calibration",
         Task::Excitation => "Excitation",
         Task::Sensitivity => "Sensitivity",

@@ -55,6 +55,8 @@ pub struct Curve {
     pub style: CurveStyle,
     /// What they stand for.
     pub ink: Ink,
+    /// The point of a front that it belongs to, by index: a page marks it where that point is chosen.
+    pub of: Option<usize>,
     /// Whether the curve may leave the picture: it widens the shown range to three times that of the others at most.
     pub may_leave: bool,
 }

@@ -26,11 +26,17 @@ pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
     thinned(points)
 }
 
-/// Of points with increasing x, those that can be seen. Source (M4): U. Jugel et al., PVLDB 7 (2014) 797-808.
+/// Of points with increasing x, those that can be seen.
 pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    within_columns(points, COLUMNS)
+}
+
+/// Of points with increasing x, at most four in each of so many columns. Source (M4): U. Jugel et al., PVLDB 7 (2014)
+/// 797-808.
+pub(super) fn within_columns(points: Vec<(f64, f64)>, columns: f64) -> Vec<(f64, f64)> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
-    let (start, width) = (first.0, (last.0 - first.0) / COLUMNS);
-    if points.len() as f64 <= 4.0 * COLUMNS || width <= 0.0 {
+    let (start, width) = (first.0, (last.0 - first.0) / columns);
+    if points.len() as f64 <= 4.0 * columns || width <= 0.0 {
         return points;
     }
     let column = |p: &(f64, f64)| ((p.0 - start) / width) as i64;

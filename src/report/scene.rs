@@ -44,6 +44,11 @@ pub(super) enum Mark {
         ink: Ink,
         upwards: bool,
     },
+    /// What belongs to a point of a front: a line, or a dot.
+    Of {
+        point: usize,
+        marks: Vec<Self>,
+    },
 }
 
 /// Which end of a text stands at its place.
@@ -115,23 +120,27 @@ impl Scene {
             scene.surface(surface, &x, &y, frame);
         }
         for curve in &plot.curves {
+            let before = scene.marks.len();
             let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
             let inside = points.iter().copied().flatten().filter(|p| frame.contains(*p));
             match curve.style {
-                CurveStyle::Dots => {
-                    scene.dots(inside, curve.ink);
-                    continue;
+                CurveStyle::Dots => scene.dots(inside, curve.ink),
+                CurveStyle::Crosses => inside.for_each(|p| scene.cross(p, curve.ink)),
+                CurveStyle::Line | CurveStyle::Dashed => {
+                    let dashed = curve.style == CurveStyle::Dashed;
+                    let width = match (curve.of, curve.ink) {
+                        (Some(_), _) => 0.8,
+                        (None, Ink::Start) => 1.3,
+                        _ => 1.8,
+                    };
+                    for points in visible(&points, frame, 0.1) {
+                        scene.marks.push(Mark::Line { points, ink: curve.ink, width, dashed });
+                    }
                 }
-                CurveStyle::Crosses => {
-                    inside.for_each(|p| scene.cross(p, curve.ink));
-                    continue;
-                }
-                CurveStyle::Line | CurveStyle::Dashed => {}
             }
-            let dashed = curve.style == CurveStyle::Dashed;
-            let width = if curve.ink == Ink::Start { 1.3 } else { 1.8 };
-            for points in visible(&points, frame, 0.1) {
-                scene.marks.push(Mark::Line { points, ink: curve.ink, width, dashed });
+            if let Some(point) = curve.of {
+                let marks = scene.marks.split_off(before);
+                scene.marks.push(Mark::Of { point, marks });
             }
         }
         let mut lowest = f64::INFINITY;

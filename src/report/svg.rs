@@ -30,6 +30,10 @@ fn element(mark: &Mark) -> Markup {
             path class=(class(*ink)) d=(line(points)) fill="none" stroke=(colour(*ink)) stroke-width=(width)
                 stroke-dasharray=[dashed.then_some("6 4")] {}
         },
+        Mark::Of { point, marks } => {
+            let kind = if matches!(marks.as_slice(), [Mark::Dots { .. }]) { "dot" } else { "line" };
+            html! { g class=(kind) data-point=(point) { @for mark in marks { (element(mark)) } } }
+        }
         // A line of no length with round ends is a dot, and the shortest way to write one.
         Mark::Dots { centres, ink, radius } => html! {
             path class=(class(*ink)) d=(dots(centres)) fill="none" stroke=(colour(*ink)) stroke-width=(2.0 * radius) {}

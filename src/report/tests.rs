@@ -171,8 +171,15 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
 fn written(name: &str, start: f64, usage: Usage) -> (tempfile::TempDir, String) {
     let (problem, best, outcome, archive) = study(name, start, usage);
     let folder = tempfile::tempdir().unwrap();
-    let report =
-        Report { outcome: &outcome, problem: &problem, best: &best, archive: &archive, diagnosis: None, text: "a < b" };
+    let report = Report {
+        outcome: &outcome,
+        problem: &problem,
+        best: &best,
+        archive: &archive,
+        front: &[],
+        diagnosis: None,
+        text: "a < b",
+    };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     (folder, page)
@@ -214,8 +221,15 @@ fn a_run_without_a_single_value_still_has_a_page() {
     (outcome.objective, outcome.violation, outcome.feasible) = (f64::INFINITY, f64::INFINITY, false);
     outcome.criteria = criteria(&problem, &best);
     let folder = tempfile::tempdir().unwrap();
-    let report =
-        Report { outcome: &outcome, problem: &problem, best: &best, archive: &archive, diagnosis: None, text: "" };
+    let report = Report {
+        outcome: &outcome,
+        problem: &problem,
+        best: &best,
+        archive: &archive,
+        front: &[],
+        diagnosis: None,
+        text: "",
+    };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(page.contains("Failed. No point could be evaluated") && page.contains("nothing to show"));

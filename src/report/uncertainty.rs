@@ -200,6 +200,7 @@ pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, 
         ink,
         style: CurveStyle::Dashed,
         may_leave: true,
+        of: None,
     };
     let (response, measurement) = (Ink::Series(2), Ink::Series(3));
     vec![

@@ -45,6 +45,10 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     }
     match outcome.task {
         Task::Design => design(report),
+        Task::Pareto => match outcome.found.trade_offs.iter().flat_map(|found| &found.words).next() {
+            Some(words) => (Tone::Good, words.clone()),
+            None => (Tone::Bad, "No front was found.".to_owned()),
+        },
         Task::Calibration => calibration(outcome, report.archive),
         Task::Excitation => excitation(outcome),
         Task::Sensitivity => sensitivity(outcome),

@@ -5,6 +5,7 @@ pub(crate) mod diagnosis;
 mod excitation;
 mod global_sensitivity;
 mod monte_carlo;
+mod pareto;
 mod robust;
 mod sensitivity;
 mod sweep;
@@ -35,6 +36,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::Sensitivity => sensitivity::perform(study, options, watch)?,
         Task::Sweep => sweep::perform(study, options, watch)?,
         Task::Diagnosis => diagnosis::perform(study, options, watch)?,
+        Task::Pareto => pareto::perform(study, options, watch)?,
         Task::WorstCase => worst_case::perform(study, options, watch)?,
         Task::MonteCarlo => monte_carlo::perform(study, options, watch)?,
     };

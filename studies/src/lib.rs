@@ -28,6 +28,7 @@ pub fn shipped() -> Vec<Shipped> {
         study!("pid-design-multi-case"),
         study!("pid-worst-case"),
         study!("pid-robust"),
+        study!("pid-pareto"),
         study!("tank-level"),
         study!("multi-model"),
         study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),

@@ -17,7 +17,8 @@ struct AtStrengths<S> {
 impl Definition for SensorSaturation {
     const NAME: &'static str = "sensor-saturation";
     const ABOUT: &'static str = "The sensor shows nothing beyond a limit: above, below, or either way.";
-    const FORMULA: &'static str = "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit); limit infinite: y";
+    const FORMULA: &'static str =
+        "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit); limit infinite: y";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];

@@ -14,7 +14,7 @@ use super::sections::{
     CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection,
     TunerSection,
 };
-use super::tasks::{DiagnosisSection, ExcitationSection, SensitivitySection, SweepSection};
+use super::tasks::{DiagnosisSection, ExcitationSection, ParetoSection, SensitivitySection, SweepSection};
 use crate::catalogue::Catalogue;
 use crate::effect::Effect;
 use crate::unit::Quantity;
@@ -55,6 +55,7 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "excitation": value(schema_of::<ExcitationSection>()),
             "sensitivity": value(schema_of::<SensitivitySection>()),
             "sweep": value(schema_of::<SweepSection>()),
+            "pareto": value(schema_of::<ParetoSection>()),
             "diagnosis": value(schema_of::<DiagnosisSection>()),
             "uncertain": value(schema_of::<UncertainTable>()),
             "worst-case": value(schema_of::<WorstCaseSection>()),
@@ -161,6 +162,7 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("excitation", schema_of::<ExcitationSection>()),
         ("sensitivity", schema_of::<SensitivitySection>()),
         ("sweep", schema_of::<SweepSection>()),
+        ("pareto", schema_of::<ParetoSection>()),
         ("diagnosis", schema_of::<DiagnosisSection>()),
         ("uncertain", schema_of::<UncertainSection>()),
         ("worst-case", schema_of::<WorstCaseSection>()),

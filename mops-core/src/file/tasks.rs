@@ -1,4 +1,4 @@
-//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`, `[diagnosis]`.
+//! The tables of tasks in a study file: `[excitation]`, `[sensitivity]`, `[sweep]`, `[diagnosis]`, `[pareto]`.
 
 use schemars::JsonSchema;
 
@@ -9,8 +9,8 @@ use super::{Diagnostic, read_seconds};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::study::{
-    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, Place, RegressionDraft, SensitivityMethod, SensitivityTask,
-    SweepDraft, TasksDraft,
+    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, ParetoTask, Place, RegressionDraft, SensitivityMethod,
+    SensitivityTask, SweepDraft, TasksDraft,
 };
 use crate::unit::Quantity;
 
@@ -119,12 +119,21 @@ pub(super) struct DiagnosisSection {
     pub without: Vec<String>,
 }
 
+/// What `task = "pareto"`, and `mops pareto`, look for.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct ParetoSection {
+    /// Number of points of the front, about; 30 where absent.
+    pub points: Option<usize>,
+}
+
 /// Names of the tables, as they stand at the top of a study file.
-pub(super) const TABLES: [&str; 9] = [
+pub(super) const TABLES: [&str; 10] = [
     "excitation",
     "sensitivity",
     "sweep",
     "diagnosis",
+    "pareto",
     "uncertain",
     "worst-case",
     "robust",
@@ -174,6 +183,10 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
         let usual = DiagnosisTask::default();
         let (max_effects, level) = (max_effects.unwrap_or(usual.max_effects), level.unwrap_or(usual.level));
         tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without };
+    }
+    if let Some(node) = root.child("pareto") {
+        let ParetoSection { points } = node.read()?;
+        tasks.pareto = ParetoTask { points: points.unwrap_or(ParetoTask::default().points) };
     }
     robustness::read(root, &mut tasks)?;
     Ok(tasks)

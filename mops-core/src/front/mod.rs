@@ -4,9 +4,11 @@
 //! and better in one.
 
 mod hypervolume;
+mod read_outs;
 mod sort;
 
 pub use hypervolume::hypervolume;
+pub use read_outs::{knee, normalised, ranges};
 pub use sort::FrontSorter;
 
 /// Indices of the points that no other dominates, in increasing order; of equal points the first.
@@ -63,7 +65,7 @@ pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &
 }
 
 /// The order by the first objective, then the second, and so on.
-fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+pub(crate) fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
     a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
 }
 

@@ -20,8 +20,8 @@ pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, 
 pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 pub use scenarios::Scenario;
 pub use tasks::{
-    Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
-    SweepDraft, SweepTask, Tasks, TasksDraft,
+    Axis, AxisDraft, ExcitationDraft, ExcitationTask, ParetoTask, Place, RegressionDraft, RegressionTask,
+    SensitivityTask, SweepDraft, SweepTask, Tasks, TasksDraft,
 };
 pub use uncertain::{DistributionDraft, UncertainDraft};
 
@@ -53,6 +53,8 @@ pub enum Task {
     WorstCase,
     /// Tell how the criteria are distributed where parameters are uncertain.
     MonteCarlo,
+    /// Find the designs that no other is better than in every criterion, and what one criterion costs in terms of another.
+    Pareto,
 }
 
 /// How the scaled values become one number to minimise.

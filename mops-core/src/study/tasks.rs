@@ -5,7 +5,8 @@ use super::distribution::Uncertain;
 use super::draft::Mistake;
 use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 use super::uncertain::{self, UncertainDraft};
-use super::{Study, Task};
+use super::{Objective, Row, Study, Task};
+use crate::criterion::Usage;
 use crate::diagnostic::suggestion;
 use crate::experiment::Role;
 use crate::identification::ExcitationQuestion;
@@ -34,6 +35,8 @@ pub struct TasksDraft {
     pub sweep: Option<SweepDraft>,
     /// Of `diagnosis`.
     pub diagnosis: DiagnosisTask,
+    /// Of `pareto`.
+    pub pareto: ParetoTask,
     /// Parameters that are not known exactly, by name.
     pub uncertain: Vec<(String, UncertainDraft)>,
     /// Of `worst-case`.
@@ -57,6 +60,8 @@ pub struct Tasks {
     pub sweep: Option<SweepTask>,
     /// Of `diagnosis`.
     pub diagnosis: DiagnosisTask,
+    /// Of `pareto`.
+    pub pareto: ParetoTask,
     /// Parameters that are not known exactly.
     pub uncertain: Vec<Uncertain>,
     /// Of `worst-case`.
@@ -192,6 +197,22 @@ pub struct Axis {
     pub points: usize,
 }
 
+/// How many points a front has.
+#[derive(Debug, Clone, Copy)]
+pub struct ParetoTask {
+    /// Number of points, about.
+    pub points: usize,
+}
+
+impl Default for ParetoTask {
+    fn default() -> Self {
+        Self { points: 30 }
+    }
+}
+
+/// More points of a front than this are refused.
+const MOST_OF_FRONT: usize = 200;
+
 /// More values than this along an axis are refused.
 const MOST_POINTS: usize = 1000;
 
@@ -219,6 +240,7 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
             .within("study"));
     }
     let diagnosis = diagnosis::check(draft.diagnosis, study)?;
+    let pareto = pareto(draft.pareto, study)?;
     let tasks = Tasks {
         excitation,
         sensitivity: draft.sensitivity,
@@ -229,9 +251,34 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
         robust: draft.robust,
         monte_carlo: draft.monte_carlo,
         uncertainty: draft.uncertainty,
+        pareto,
     };
     robustness::check(&tasks, study)?;
     Ok(tasks)
+}
+
+fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, Mistake> {
+    if !(3..=MOST_OF_FRONT).contains(&task.points) {
+        let fact = format!("a front takes 3 to {MOST_OF_FRONT} points, not {}", task.points);
+        return Err(Mistake::new("points", fact).with_help("30, the default, draw a smooth curve").within("pareto"));
+    }
+    if study.task != Task::Pareto {
+        return Ok(task);
+    }
+    if study.objective != Objective::Each {
+        return Err(Mistake::new("objective", "on a front every criterion counts for itself")
+            .with_help("remove `objective`, or say objective = \"each\"")
+            .within("study"));
+    }
+    let counts = |row: &&Row| row.usage == Usage::Minimise && study.case_of(row).role() == Role::Calibration;
+    let minimised: Vec<&Row> = study.rows.iter().filter(counts).collect();
+    if minimised.len() < 2 {
+        let known = minimised.first().map_or_else(|| "none is".to_owned(), |row| format!("only `{}` is", row.name));
+        return Err(Mistake::new("task", format!("a front needs two criteria to be minimised, and {known}"))
+            .with_help("leave `usage` out of another criterion, or say usage = \"minimise\"")
+            .within("study"));
+    }
+    Ok(task)
 }
 
 fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, Mistake> {

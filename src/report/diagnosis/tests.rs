@@ -29,6 +29,7 @@ fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
         problem: &solved.problem,
         best: &solved.best,
         archive: &solved.archive,
+        front: &[],
         diagnosis: solved.diagnosis.as_ref(),
         text: "",
     };

@@ -161,6 +161,7 @@ fn uprights(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
         ink,
         style,
         may_leave: true,
+        of: None,
     };
     let demand = criterion.of.demand.map(|x| line("demand", x, Ink::Demand, CurveStyle::Line));
     let nominal = Some(criterion.of.nominal)

@@ -63,6 +63,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     let objective = draft.objective.unwrap_or(match draft.task {
         Task::Design => Objective::Max,
         Task::Calibration | Task::Diagnosis => Objective::Sum,
+        Task::Pareto => Objective::Each,
         // As the study of which they tell would be solved.
         Task::Excitation | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => {
             if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }

@@ -10,10 +10,10 @@ use toml::de::DeTable;
 use entries::{Entry, Form, entries};
 
 /// A TOML text that can be edited. It must be right: what is edited was read before.
-pub(super) struct TomlText(String);
+pub(crate) struct TomlText(String);
 
 impl TomlText {
-    pub(super) fn new(text: &str) -> Self {
+    pub(crate) fn new(text: &str) -> Self {
         let mut text = text.to_owned();
         if !text.is_empty() && !text.ends_with('\n') {
             text.push('\n');
@@ -21,12 +21,12 @@ impl TomlText {
         Self(text)
     }
 
-    pub(super) fn into_text(self) -> String {
+    pub(crate) fn into_text(self) -> String {
         self.0
     }
 
     /// Every value with the keys that lead to it; tables in braces count by what is in them.
-    pub(super) fn values(&self) -> Vec<(Vec<String>, String)> {
+    pub(crate) fn values(&self) -> Vec<(Vec<String>, String)> {
         let value = |entry: Entry| match entry.form {
             Form::Value(span) => Some((entry.path, self.0[span].to_owned())),
             Form::Inline(span) if entry.empty => Some((entry.path, self.0[span].to_owned())),
@@ -36,18 +36,18 @@ impl TomlText {
     }
 
     /// Puts a comment above all else.
-    pub(super) fn head(&mut self, comment: &str) {
+    pub(crate) fn head(&mut self, comment: &str) {
         let lines: String = comment.lines().map(|line| format!("# {line}\n")).collect();
         self.0.insert_str(0, &format!("{lines}\n"));
     }
 
     /// Whether something stands there.
-    pub(super) fn has(&self, path: &[&str]) -> bool {
+    pub(crate) fn has(&self, path: &[&str]) -> bool {
         entries(&self.0).iter().any(|entry| entry.path == path)
     }
 
     /// The keys of a table, in the order of the text.
-    pub(super) fn keys(&self, path: &[&str]) -> Vec<String> {
+    pub(crate) fn keys(&self, path: &[&str]) -> Vec<String> {
         let path = owned(path);
         let below = |entry: Entry| match entry.path.strip_prefix(path.as_slice()) {
             Some([key]) => Some(key.clone()),
@@ -57,7 +57,7 @@ impl TomlText {
     }
 
     /// The text of a value, or of a table in braces.
-    pub(super) fn get(&self, path: &[&str]) -> Option<&str> {
+    pub(crate) fn get(&self, path: &[&str]) -> Option<&str> {
         match entries(&self.0).into_iter().find(|entry| entry.path == path)?.form {
             Form::Value(span) | Form::Inline(span) => Some(&self.0[span]),
             Form::Header(_) | Form::Implied => None,
@@ -65,11 +65,29 @@ impl TomlText {
     }
 
     /// What a value that is a text says.
-    pub(super) fn words(&self, path: &[&str]) -> Option<String> {
+    pub(crate) fn words(&self, path: &[&str]) -> Option<String> {
         let value = format!("v = {}", self.get(path)?);
         let table = DeTable::parse(&value).ok()?;
         table.get_ref().get("v")?.get_ref().as_str().map(str::to_owned)
     }
+}
+
+/// A study with `key=value` settings in their places, for another folder: `locate` leads from the path of a data file to the
+/// path as it counts from there.
+pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> String) -> TomlText {
+    let mut text = TomlText::new(text);
+    for setting in settings {
+        for (path, value) in TomlText::new(setting).values() {
+            text.set(&path.iter().map(String::as_str).collect::<Vec<_>>(), &value);
+        }
+    }
+    for experiment in text.keys(&["experiments"]) {
+        let place = ["experiments", &experiment, "file"];
+        if let Some(file) = text.words(&place) {
+            text.set(&place, &quoted(&locate(&file)));
+        }
+    }
+    text
 }
 
 fn owned(path: &[&str]) -> Vec<String> {
@@ -82,17 +100,17 @@ fn keys(path: &[&str]) -> String {
 }
 
 /// A key, in quotes if it needs some.
-pub(super) fn key(key: &str) -> String {
+pub(crate) fn key(key: &str) -> String {
     let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     if bare { key.to_owned() } else { quoted(key) }
 }
 
 /// A text as TOML writes it.
-pub(super) fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
 /// A number as TOML writes it.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     format!("{value:?}")
 }

@@ -5,7 +5,7 @@ use super::{TomlText, keys, owned};
 
 impl TomlText {
     /// Puts `value`, written as TOML, under these keys: instead of the value that is there, or where it belongs.
-    pub(in crate::diagnosis) fn set(&mut self, path: &[&str], value: &str) {
+    pub(crate) fn set(&mut self, path: &[&str], value: &str) {
         let entries = entries(&self.0);
         let at = |path: &[&str]| entries.iter().find(|entry| entry.path == path);
         if let Some(Form::Value(span) | Form::Inline(span)) = at(path).map(|entry| &entry.form) {
@@ -58,7 +58,7 @@ impl TomlText {
     }
 
     /// Takes an entry away: within braces it is cut out, elsewhere its lines become comments.
-    pub(in crate::diagnosis) fn remove(&mut self, path: &[&str], why: &str) {
+    pub(crate) fn remove(&mut self, path: &[&str], why: &str) {
         let entries = entries(&self.0);
         let path = owned(path);
         let Some(entry) = entries.iter().find(|entry| entry.path == path) else { return };

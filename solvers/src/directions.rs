@@ -16,12 +16,12 @@ pub fn spread(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     points
 }
 
-/// The largest number of divisions that gives at most 100 directions.
-pub fn usual_divisions(m: usize) -> usize {
+/// The largest number of divisions that gives at most `most` directions.
+pub fn divisions_for(m: usize, most: usize) -> usize {
     if m <= 1 {
         return 1;
     }
-    (1..100).rev().find(|&divisions| count(m, divisions) <= 100).unwrap_or(1)
+    (1..most).rev().find(|&divisions| count(m, divisions) <= most).unwrap_or(1)
 }
 
 /// `(divisions + m - 1)` over `(m - 1)`.
@@ -29,8 +29,9 @@ fn count(m: usize, divisions: usize) -> usize {
     (1..m).fold(1_usize, |count, k| count.saturating_mul(divisions + k) / k)
 }
 
+/// All points of the simplex whose coordinates are multiples of `1 / divisions`.
 #[allow(clippy::cast_precision_loss)]
-fn simplex(m: usize, divisions: usize) -> Vec<Vec<f64>> {
+pub fn simplex(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     let mut points = Vec::new();
     let mut point = vec![0; m];
     place(&mut points, &mut point, 0, divisions);
@@ -56,8 +57,8 @@ mod tests {
 
     #[test]
     fn three_objectives_with_twelve_divisions_have_91_directions() {
-        assert_eq!((usual_divisions(3), spread(3, 12).len()), (12, 91));
-        assert_eq!((usual_divisions(2), spread(2, 99).len()), (99, 100));
+        assert_eq!((divisions_for(3, 100), spread(3, 12).len()), (12, 91));
+        assert_eq!((divisions_for(2, 100), spread(2, 99).len()), (99, 100));
         for direction in spread(3, 12) {
             assert!((direction.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-12);
         }

@@ -1,0 +1,153 @@
+//! What a subproblem makes of the criteria, and the oracle that a local solver sees it through.
+
+use mops_core::{Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Shape, Stream, Usage};
+
+use super::known::Known;
+
+/// What a subproblem does with a criterion `f`, the weighted scaled value of a row to be minimised.
+#[derive(Debug, Clone, Copy)]
+pub enum Role {
+    /// `(f - from) / per` is minimised.
+    Minimised { from: f64, per: f64 },
+    /// `(f - limit) / per` is at most 0.
+    AtMost { limit: f64, per: f64 },
+    /// It has no say.
+    Free,
+}
+
+impl Role {
+    /// The scaled value that stands for it: factor and offset.
+    fn line(self) -> (f64, f64) {
+        match self {
+            Self::Minimised { from, per } => (1.0 / per, -from / per),
+            Self::AtMost { limit, per } => (1.0 / per, 1.0 - limit / per),
+            Self::Free => (0.0, 0.0),
+        }
+    }
+
+    fn usage(self) -> Usage {
+        match self {
+            Self::Minimised { .. } => Usage::Minimise,
+            Self::AtMost { .. } => Usage::Inequality,
+            Self::Free => Usage::Monitor,
+        }
+    }
+}
+
+/// A subproblem: a role for every criterion, in the order of the rows; the constraints stay what they are.
+#[derive(Debug, Clone)]
+pub struct Aim {
+    /// The roles.
+    pub roles: Vec<Role>,
+    /// How what is minimised becomes one number.
+    pub objective: Objective,
+}
+
+impl Aim {
+    /// The largest of the criteria, measured from `low` in units of `range`: the weighted Chebyshev distance.
+    pub fn chebyshev(low: &[f64], range: &[f64]) -> Self {
+        let role = |(&from, &per): (&f64, &f64)| Role::Minimised { from, per };
+        Self { roles: low.iter().zip(range).map(role).collect(), objective: Objective::Max }
+    }
+
+    /// What the criteria are worth; the violation is that of the criteria alone.
+    pub fn merit(&self, criteria: &[f64]) -> Merit {
+        let (mut violation, mut worst, mut sum) = (0.0_f64, f64::NEG_INFINITY, 0.0);
+        for (role, f) in self.roles.iter().zip(criteria) {
+            let (factor, offset) = role.line();
+            let value = factor * f + offset;
+            match role {
+                Role::Minimised { .. } => (worst, sum) = (worst.max(value), sum + value),
+                Role::AtMost { .. } => violation = violation.max(value - 1.0),
+                Role::Free => {}
+            }
+        }
+        Merit { violation, objective: if self.objective == Objective::Sum { sum } else { worst } }
+    }
+
+    fn shape(&self, of: &Shape) -> Shape {
+        let mut roles = self.roles.iter();
+        let mut row = |(usage, weight): &(Usage, f64)| match usage {
+            Usage::Minimise => (roles.next().expect("a role for every criterion").usage(), 1.0),
+            other => (*other, *weight),
+        };
+        Shape { rows: of.rows.iter().map(&mut row).collect(), objective: self.objective, residuals: 0, ..of.clone() }
+    }
+
+    /// Factor and offset of every row.
+    fn lines(&self, of: &Shape) -> Vec<(f64, f64)> {
+        let mut roles = self.roles.iter();
+        let mut line = |(usage, weight): &(Usage, f64)| match usage {
+            Usage::Minimise => {
+                let (factor, offset) = roles.next().expect("a role for every criterion").line();
+                (factor * weight, offset)
+            }
+            _ => (1.0, 0.0),
+        };
+        of.rows.iter().map(&mut line).collect()
+    }
+}
+
+/// The problem as a subproblem has it; what is evaluated is remembered.
+pub struct View<'a> {
+    oracle: &'a mut dyn Oracle,
+    known: &'a mut Known,
+    shape: Shape,
+    lines: Vec<(f64, f64)>,
+    best: Option<Evaluation>,
+}
+
+impl<'a> View<'a> {
+    pub fn new(oracle: &'a mut dyn Oracle, known: &'a mut Known, aim: &Aim) -> Self {
+        let (shape, lines) = (aim.shape(oracle.shape()), aim.lines(oracle.shape()));
+        Self { oracle, known, shape, lines, best: None }
+    }
+
+    fn seen(&self, mut evaluation: Evaluation) -> Evaluation {
+        if let Some(scaled) = &mut evaluation.scaled {
+            scaled.iter_mut().zip(&self.lines).for_each(|(s, (factor, offset))| *s = factor * *s + offset);
+            evaluation.merit = self.shape.merit(scaled);
+        }
+        evaluation.residuals.clear();
+        evaluation
+    }
+
+    fn keep(&mut self, evaluation: &Evaluation) {
+        if self.best.as_ref().is_none_or(|best| evaluation.merit.is_better_than(&best.merit)) {
+            self.best = Some(evaluation.clone());
+        }
+    }
+}
+
+impl Oracle for View<'_> {
+    fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        let answers = self.oracle.evaluate(points)?;
+        self.known.take(self.oracle.shape(), &answers);
+        let answers: Vec<Evaluation> = answers.into_iter().map(|answer| self.seen(answer)).collect();
+        answers.iter().for_each(|answer| self.keep(answer));
+        Ok(answers)
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        let Some(Linearisation { at, mut rows, .. }) = self.oracle.linearise(point, reach)? else { return Ok(None) };
+        self.known.take(self.oracle.shape(), std::slice::from_ref(&at));
+        for (row, (factor, _)) in rows.iter_mut().zip(&self.lines) {
+            row.iter_mut().for_each(|slope| *slope *= factor);
+        }
+        let at = self.seen(at);
+        self.keep(&at);
+        Ok(Some(Linearisation { at, rows, residuals: vec![Vec::new(); point.len()] }))
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref()
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        self.oracle.stream(label)
+    }
+}

@@ -1,0 +1,220 @@
+//! Weighted Chebyshev: a front, point by point, each the solution of a min-max problem of its own.
+
+mod aim;
+mod gaps;
+mod known;
+mod rays;
+mod subproblem;
+
+use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use gaps::Gaps;
+use known::Place;
+use rays::Rays;
+use subproblem::Subproblems;
+
+/// Points of the front of designs that no other is better than in every criterion, spread evenly, each the solution of a
+/// weighted min-max problem; needs `objective = "each"`. First every criterion is minimised alone (from several starts; then
+/// the others as far as they go without loss), which gives the ends of the front and the range of every criterion.
+///
+/// Two criteria: between the two neighbours `p`, `q` that are farthest apart, the point is found that lies deepest in the
+/// rectangle of the two,
+///
+/// ```text
+/// min over x of max((f1(x) - p1) / (q1 - p1), (f2(x) - q2) / (p2 - q2))
+/// ```
+/// by `sqp` from between the two, from both of them, and from what is known in the rectangle. Where nothing lies in it, the
+/// front has a gap, and the rectangle is closed. More criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w`
+/// spread evenly over the simplex, each from the nearest point known.
+///
+/// One more point meets the demands best: its largest scaled value is least, as in a design.
+///
+/// A point where some criterion has slack is pushed on until none can be lowered alone. Everything that was evaluated on the
+/// way is compared with the points found, and it is looked a step beyond each of them; what is better than one of them is a
+/// new start. Subproblems that fail are left out.
+///
+/// For criteria with slopes almost everywhere and few tuners: far fewer points than `nsga2` needs, and those of the front are
+/// exact. Fronts of many basins that lie apart from each other are `nsga2`'s.
+///
+/// Source: V. J. Bowman, in Multiple Criteria Decision Making, Lecture Notes in Economics and Mathematical Systems 130 (1976)
+/// 76-86 (weighted Chebyshev); H. W. Hamacher, C. R. Pedersen, S. Ruzika, Operations Research Letters 35 (2007) 336-344
+/// (rectangles); I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657 (weights); H. P. Benson, Journal of Optimization
+/// Theory and Applications 26 (1978) 569-580 (slack).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct WeightedChebyshevOptions {
+    /// Number of points; 0 for as many as the study asks for, else 30. Three criteria and more take the largest number of
+    /// evenly spread weights that is not above it.
+    pub points: usize,
+    /// Starts of the search for the least of each criterion, the study's own included.
+    pub starts: usize,
+}
+
+impl Default for WeightedChebyshevOptions {
+    fn default() -> Self {
+        Self { points: 0, starts: 6 }
+    }
+}
+
+impl SolverOptions for WeightedChebyshevOptions {
+    const KIND: &'static str = "weighted-chebyshev";
+
+    fn build(&self) -> Box<dyn Solver> {
+        Box::new(WeightedChebyshev { options: self.clone(), state: None })
+    }
+}
+
+/// The solver of the kind `weighted-chebyshev`.
+struct WeightedChebyshev {
+    options: WeightedChebyshevOptions,
+    state: Option<State>,
+}
+
+struct State {
+    start: Vec<f64>,
+    subproblems: Subproblems,
+    /// Points of the front.
+    front: Vec<Place>,
+    stage: Stage,
+    /// Whether it was looked beyond every point.
+    looked: bool,
+}
+
+enum Stage {
+    /// The least of this criterion alone.
+    Least(usize),
+    /// Between neighbours of two criteria.
+    Gaps(Gaps),
+    /// Along the rays of more criteria.
+    Rays(Rays),
+    /// The point that meets the demands best.
+    Demands,
+    /// What is known to be better than a point of the front.
+    Better(usize),
+}
+
+impl Solver for WeightedChebyshev {
+    fn accepts(&self, shape: &Shape) -> Result<(), String> {
+        if shape.objective != Objective::Each {
+            return Err(
+                "`weighted-chebyshev` looks for a front; set objective = \"each\" in [study], or take `sqp`".into()
+            );
+        }
+        if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
+            return Err(
+                "`weighted-chebyshev` follows slopes and cannot treat tuners with whole numbers or lists; take `nsga2`"
+                    .into(),
+            );
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.state = None;
+        oracle.evaluate(&[start.to_vec()])?;
+        self.state = Some(State {
+            start: start.to_vec(),
+            subproblems: Subproblems::new(self.options.starts),
+            front: Vec::new(),
+            stage: Stage::Least(0),
+            looked: false,
+        });
+        Ok(())
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        if state.start.is_empty() {
+            return Ok(Progress::Converged);
+        }
+        let points = match (self.options.points, oracle.shape().points) {
+            (0, 0) => 30,
+            (0, asked) => asked,
+            (points, _) => points,
+        };
+        let criteria = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+        match &mut state.stage {
+            Stage::Least(k) => {
+                let k = *k;
+                if k < criteria {
+                    if let Some(place) = state.subproblems.least(oracle, &state.start, k, criteria)? {
+                        state.front.push(place);
+                    }
+                    state.stage = Stage::Least(k + 1);
+                    return Ok(Progress::Continue);
+                }
+                if criteria == 0 {
+                    return state.subproblems.feasible(oracle, &state.start);
+                }
+                if state.front.is_empty() {
+                    return Ok(Progress::Stalled);
+                }
+                state.subproblems.measure(&state.front);
+                state.stage = match criteria {
+                    1 => Stage::Better(0),
+                    2 => Stage::Gaps(Gaps::default()),
+                    _ => Stage::Rays(Rays::new(criteria, points)),
+                };
+                Ok(Progress::Continue)
+            }
+            Stage::Gaps(gaps) => {
+                let more = gaps.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
+                if !more {
+                    state.stage = Stage::Demands;
+                }
+                Ok(Progress::Continue)
+            }
+            Stage::Rays(rays) => {
+                if !rays.follow(oracle, &mut state.subproblems, &mut state.front)? {
+                    state.stage = Stage::Demands;
+                }
+                Ok(Progress::Continue)
+            }
+            Stage::Demands => {
+                let place = state.subproblems.demands(oracle, criteria)?;
+                insert(&mut state.front, place);
+                state.stage = Stage::Better(0);
+                Ok(Progress::Continue)
+            }
+            Stage::Better(round) => {
+                *round += 1;
+                if *round <= MOST_ROUNDS && state.subproblems.better(oracle, &mut state.front)? {
+                    return Ok(Progress::Continue);
+                }
+                if state.looked {
+                    return Ok(Progress::Converged);
+                }
+                state.looked = true;
+                state.stage = Stage::Better(0);
+                state.subproblems.look_beyond(oracle, &state.front);
+                Ok(Progress::Continue)
+            }
+        }
+    }
+
+    fn front(&self) -> Vec<Vec<f64>> {
+        let Some(state) = &self.state else { return Vec::new() };
+        // Cut short before the ends were known: all that was evaluated is worth more.
+        if matches!(state.stage, Stage::Least(_)) {
+            return Vec::new();
+        }
+        state.front.iter().map(|place| place.point.clone()).collect()
+    }
+}
+
+/// Rounds in which points known to be better replace those of the front.
+const MOST_ROUNDS: usize = 5;
+
+/// Keeps a point of the front, and no point that it is better than; whether it is one.
+fn insert(front: &mut Vec<Place>, place: Place) -> bool {
+    let range = vec![1.0; place.criteria.len()];
+    let beaten = |other: &Place| other.criteria == place.criteria || other.dominates(&place, &range, 0.0);
+    if front.iter().any(beaten) {
+        return false;
+    }
+    front.retain(|other| !place.dominates(other, &range, 0.0));
+    front.push(place);
+    true
+}

@@ -1,0 +1,218 @@
+//! `mops pick`: the point of a finished front for other demands.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use mops_core::file::StudyFile;
+use mops_core::{
+    Budget, Catalogue, Diagnostic, Evaluation, Oracle, Problem, Run, Study, Usage, criterion_reports, suggestion,
+};
+use serde_json::Value;
+
+use super::study::{StudyArguments, open_as};
+use super::tables::{number, table};
+use super::{Trouble, cannot_write, print};
+use crate::toml_text::{self, TomlText, key, quoted};
+
+/// What can be said to the choice of a point.
+#[derive(Args)]
+#[command(after_help = "\
+The demands that are not named stay as they are in the study. Nearest is the point whose worst scaled value under these
+demands is least. From there the min-max problem of these demands is solved, in a few hundred simulations, and a study that
+starts at its solution is written: picked.toml, a design to run, change or build on.
+
+Examples:
+  mops pareto pid-design
+  mops pick results/pid-design --demand settling=12
+  mops pick results/pid-design --demand settling='8 s' --demand overshoot=0.2 --no-refine")]
+pub(super) struct Arguments {
+    /// Folder of the result of `mops pareto`.
+    folder: PathBuf,
+    /// Another demand on a criterion, in its unit or with one: settling=12, settling='12 s'.
+    #[arg(long = "demand", value_name = "CRITERION=VALUE", required = true, value_parser = demand)]
+    demands: Vec<(String, String)>,
+    /// Stay at the point of the front instead of solving from there.
+    #[arg(long)]
+    no_refine: bool,
+    /// The study, where it is not study.toml in the folder.
+    #[arg(long, value_name = "FILE")]
+    study: Option<PathBuf>,
+    /// The study file that is written; picked.toml in the folder where absent.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Points evaluated on the way from the front to the demands, at most.
+const EFFORT: usize = 1000;
+
+fn demand(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("a demand is a criterion and a value, such as settling=12".to_owned()),
+    }
+}
+
+pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let front = front(&arguments.folder)?;
+    let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
+    let open = |settings: Vec<String>| {
+        let study = StudyArguments { study: path.display().to_string(), settings };
+        open_as(catalogue, &study, &["study.task=\"design\"".to_owned(), "study.objective=\"max\"".to_owned()])
+    };
+    let before = open(Vec::new())?.study;
+    for (name, _) in &arguments.demands {
+        known(&before, name)?;
+    }
+    let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
+    let file = open(arguments.demands.iter().map(setting).collect())?;
+    let problem = Problem::new(Arc::new(file.study.clone()));
+    let (index, at) = nearest(&problem, &front, &path)?;
+    let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
+    print(&told(&file.study, (index, front.len()), &at, refined.as_ref()));
+    let chosen = refined.as_ref().unwrap_or(&at);
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.folder.join("picked.toml"));
+    let text = fs::read_to_string(&path).map_err(|error| Trouble::Failure(format!("{}: {error}", path.display())))?;
+    fs::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(cannot_write(&out))?;
+    print(&format!("\na study that starts there is in {}\n", out.display()));
+    Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The points of a finished front.
+fn front(folder: &Path) -> Result<Vec<Value>, Diagnostic> {
+    let path = folder.join("result.json");
+    let help = "give the folder that `mops pareto` has written, such as results/pid-pareto";
+    let text = fs::read_to_string(&path)
+        .map_err(|_| Diagnostic::new(format!("there is no result in `{}`", folder.display())).with_help(help))?;
+    let result: Value = serde_json::from_str(&text)
+        .map_err(|error| Diagnostic::new(format!("`{}` is no result: {error}", path.display())).with_help(help))?;
+    match result["front"].as_array() {
+        Some(points) if !points.is_empty() && result.get("trade_offs").is_some() => Ok(points.clone()),
+        _ => {
+            let study = result["study"].as_str().unwrap_or("STUDY");
+            Err(Diagnostic::new(format!(
+                "the result in `{}` is that of a single design, and no front",
+                folder.display()
+            ))
+            .with_help(format!("find the front first: mops pareto {study}")))
+        }
+    }
+}
+
+/// Refuses the name of a criterion that is not on the front.
+fn known(study: &Study, name: &str) -> Result<(), Diagnostic> {
+    let minimised = || study.rows.iter().filter(|row| row.usage == Usage::Minimise).map(|row| row.name.as_str());
+    if minimised().any(|known| known == name) {
+        return Ok(());
+    }
+    if study.rows.iter().any(|row| row.name == name) {
+        return Err(Diagnostic::new(format!("`{name}` is not minimised, and so has no say on the front"))
+            .with_help("change its demand in the study, and find the front again"));
+    }
+    let mut names: Vec<&str> = minimised().collect();
+    names.dedup();
+    Err(Diagnostic::new(format!("the front has no criterion `{name}`")).with_help(suggestion(name, names)))
+}
+
+/// A number as it is, a quantity with a unit in quotes.
+fn written(value: &str) -> String {
+    if value.parse::<f64>().is_ok() { value.to_owned() } else { quoted(value) }
+}
+
+/// The point of the front with the least worst scaled value under the demands of the problem, and its place.
+fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, Evaluation), Diagnostic> {
+    let tuners = &problem.study().tuners;
+    let mut best: Option<(usize, Evaluation)> = None;
+    for (i, point) in front.iter().enumerate() {
+        let values: Option<Vec<f64>> = tuners.iter().map(|tuner| point["tuners"][&tuner.name].as_f64()).collect();
+        let values = values.ok_or_else(|| {
+            Diagnostic::new(format!("the front is not that of the study `{}`: their tuners differ", study.display()))
+                .with_help("name the study of the front with --study")
+        })?;
+        let at = problem.evaluate_at(&values);
+        if best.as_ref().is_none_or(|(_, best)| at.merit.is_better_than(&best.merit)) {
+            best = Some((i, at));
+        }
+    }
+    Ok(best.expect("a front has points"))
+}
+
+/// The solution of the min-max problem from a point; `None` where nothing better is found.
+fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> Option<Evaluation> {
+    let sqp = catalogue.solvers.iter().find(|kind| kind.name == "sqp")?.default_choice();
+    let mut solver = sqp.make();
+    solver.accepts(problem.shape()).ok()?;
+    let mut run = Run::new(problem, Budget { evaluations: EFFORT }, &());
+    run.solve(solver.as_mut(), &from.point);
+    let best = run.best()?;
+    best.merit.is_better_than(&from.merit).then(|| problem.evaluate_at(&best.tuners))
+}
+
+/// The point beside what it was refined to.
+fn told(study: &Study, (index, of): (usize, usize), at: &Evaluation, refined: Option<&Evaluation>) -> String {
+    let with = |header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>| table(header, numeric, rows);
+    let now = refined.map(|refined| criterion_reports(study, refined));
+    let rows = criterion_reports(study, at).into_iter().enumerate().map(|(k, report)| {
+        let last = now.as_ref().map_or(&report, |now| &now[k]);
+        let demand = report.demand.or(report.bad).map_or_else(String::new, number);
+        let refined = now.as_ref().map_or_else(String::new, |_| number(last.value));
+        let met = if last.met { "yes" } else { "no" };
+        vec![
+            report.case.clone(),
+            report.name.clone(),
+            demand,
+            number(report.value),
+            refined,
+            report.unit.clone(),
+            number(last.scaled),
+            met.to_owned(),
+        ]
+    });
+    let second = if refined.is_some() { "refined" } else { "" };
+    let criteria =
+        with(&["case", "criterion", "demand", "point", second, "unit", "scaled", "met"], &[2, 3, 4, 6], rows.collect());
+    let active = study.tuners.iter().enumerate().filter(|(_, tuner)| tuner.active);
+    let rows = active.map(|(i, tuner)| {
+        let refined = refined.map_or_else(String::new, |refined| number(refined.tuners[i]));
+        vec![tuner.name.clone(), number(at.tuners[i]), refined, tuner.unit.to_string()]
+    });
+    let tuners = with(&["tuner", "point", second, "unit"], &[1, 2], rows.collect());
+    let worst = number(at.merit.objective);
+    let then = match refined {
+        Some(refined) => format!(
+            ", and {} where the min-max problem of these demands is solved from there",
+            number(refined.merit.objective)
+        ),
+        None => String::new(),
+    };
+    format!(
+        "point {} of {of} is nearest to these demands: its worst scaled value is {worst}{then}\n\n{criteria}\n{tuners}",
+        index + 1
+    )
+}
+
+/// The text of a study that starts at the point, with the demands.
+fn picked(text: &str, file: &StudyFile, at: &Evaluation, demands: &[(String, String)]) -> String {
+    let mut text = TomlText::new(text);
+    for (name, value) in demands {
+        text.set(&["criteria", name, "demand"], &written(value));
+    }
+    for (tuner, value) in file.study.tuners.iter().zip(&at.tuners) {
+        let place = ["tuners", tuner.name.as_str(), "start"];
+        if tuner.active && tuner.tie.is_none() && text.has(&place[..2]) {
+            text.set(&place, &toml_text::number(*value));
+        }
+    }
+    text.set(&["study", "name"], &quoted(&format!("{}-picked", file.study.name)));
+    text.set(&["study", "task"], "\"design\"");
+    if text.has(&["study", "objective"]) {
+        text.set(&["study", "objective"], "\"max\"");
+    }
+    let asked: Vec<String> = demands.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    text.head(&format!("A point of the front of {}, for {}.", file.study.name, asked.join(", ")));
+    text.into_text()
+}

@@ -1,0 +1,138 @@
+//! `task = "pareto"`: the designs that no other is better than in every criterion.
+
+use std::time::Instant;
+
+use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Run, Stop, Study, TradeOffs, Watch};
+use mops_solvers::certificate;
+
+use crate::report::significant;
+use crate::solve::{Options, Solved, Unsuitable, search};
+
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let begun = Instant::now();
+    let mut solved = search(study, options, watch)?;
+    let problem = &solved.problem;
+    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, watch);
+    let interrupted = solved.outcome.stop == Stop::Interrupted;
+    let certified = |point: &serde_json::Value| {
+        let at = problem.evaluate_at(&tuners(problem, point));
+        let (pareto, weights) = match interrupted {
+            true => (Pareto::NotShown, None),
+            false => {
+                let shown = certificate(&mut run, &at.point);
+                (shown.pareto, shown.weights)
+            }
+        };
+        Certified { at, pareto, weights }
+    };
+    let front: Vec<Certified> =
+        if solved.outcome.feasible { solved.outcome.front.iter().map(certified).collect() } else { Vec::new() };
+    solved.outcome.evaluations += run.archive().len();
+    solved.outcome.simulations += (run.archive().len() + run.linearisations()) * problem.simulations();
+    drop(run);
+    if let Some(mut found) = TradeOffs::of(problem, &front) {
+        found.words = words(problem, &front, &found);
+        solved.outcome.pareto = found.points[found.nearest].pareto;
+        solved.outcome.found.trade_offs = Some(found);
+    }
+    solved.front = front.into_iter().map(|point| point.at).collect();
+    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    Ok(solved)
+}
+
+/// Values of all tuners of a point as the result has it.
+fn tuners(problem: &Problem, point: &serde_json::Value) -> Vec<f64> {
+    let value = |tuner: &mops_core::Tuner| point["tuners"][&tuner.name].as_f64().expect("every tuner has a value");
+    problem.study().tuners.iter().map(value).collect()
+}
+
+/// The front in sentences.
+fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<String> {
+    let ends = found.criteria.iter().enumerate().map(|(k, criterion)| {
+        let [best, worst] = [criterion.best, criterion.worst].map(|value| amount(value, &criterion.unit));
+        format!("{} from {best} to {worst}", name(found, k))
+    });
+    let mut words = vec![format!(
+        "The front has {} points: {}. None of them is better than another in every criterion.",
+        front.len(),
+        ends.collect::<Vec<_>>().join(", ")
+    )];
+    let place = |i: usize| {
+        let at = &front[i].at;
+        let of_study = problem.study();
+        let tuner = |(tuner, value): (&mops_core::Tuner, &f64)| {
+            format!("`{}` = {}", tuner.name, amount(*value, &tuner.unit.to_string()))
+        };
+        let active = of_study.tuners.iter().zip(&at.tuners).filter(|(tuner, _)| tuner.active);
+        active.map(tuner).collect::<Vec<_>>().join(", ")
+    };
+    let values = |i: usize| {
+        let criteria = found.criteria.iter().enumerate();
+        let values = criteria
+            .map(|(k, c)| format!("{} {}", name(found, k), amount(value(found, front, problem, i, k), &c.unit)));
+        values.collect::<Vec<_>>().join(", ")
+    };
+    let nearest = found.nearest;
+    words.push(format!(
+        "Point {} is nearest to the demands: {}, at {}; its worst scaled value is {}.{}",
+        nearest + 1,
+        values(nearest),
+        place(nearest),
+        significant(found.points[nearest].worst_scaled, 4),
+        price(found, nearest)
+    ));
+    match found.knee {
+        Some(knee) if knee == nearest => words.push("It is the knee of the front as well.".to_owned()),
+        Some(knee) => words.push(format!(
+            "Point {} is the knee, where one criterion begins to cost most of the other: {}, at {}.{}",
+            knee + 1,
+            values(knee),
+            place(knee),
+            price(found, knee)
+        )),
+        None => words.push("The front has no knee: it bulges away from the ideal point.".to_owned()),
+    }
+    let of = |pareto: Pareto| found.points.iter().filter(|point: &&FrontPoint| point.pareto == pareto).count();
+    words.push(format!(
+        "{} of the {} points are Pareto-optimal to first order; of {} nothing was shown, and {} can be improved at no cost.",
+        of(Pareto::CertifiedLocal),
+        found.points.len(),
+        of(Pareto::NotShown),
+        of(Pareto::No)
+    ));
+    words
+}
+
+/// What a unit of the first criterion costs of the second at a point.
+fn price(found: &TradeOffs, i: usize) -> String {
+    let (Some(weights), [first, second]) = (&found.points[i].weights, found.criteria.as_slice()) else {
+        return String::new();
+    };
+    let rate = (weights[0] / weights[1]).abs();
+    format!(
+        " There, {} better by {} costs {} of {}.",
+        name(found, 0),
+        amount(1.0, &first.unit),
+        amount(rate, &second.unit),
+        name(found, 1)
+    )
+}
+
+/// A criterion between backticks; with its case where there is more than one.
+fn name(found: &TradeOffs, k: usize) -> String {
+    let short = |key: &str| key.split_once('/').map_or(key.to_owned(), |(_, name)| name.to_owned());
+    let own = short(&found.criteria[k].key);
+    let unique = found.criteria.iter().filter(|c| short(&c.key) == own).count() == 1;
+    if unique { format!("`{own}`") } else { format!("`{}`", found.criteria[k].key) }
+}
+
+fn value(found: &TradeOffs, front: &[Certified], problem: &Problem, i: usize, k: usize) -> f64 {
+    let study = problem.study();
+    let row = study.rows.iter().position(|row| study.key(row) == found.criteria[k].key);
+    row.and_then(|row| front[i].at.readings[row]).map_or(f64::NAN, |reading| reading.value)
+}
+
+fn amount(value: f64, unit: &str) -> String {
+    let number = significant(value, 4);
+    if unit == "1" { number } else { format!("{number} {unit}") }
+}

@@ -1,0 +1,142 @@
+//! The front of a study, against one computed without mops.
+
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use mops::front::hypervolume;
+use serde_json::Value;
+
+/// Settling time, s, and overshoot of points of the front of the PID design: an independent computation with SciPy, the
+/// overshoot minimised for each settling time; printed to four digits.
+const FRONT: [[f64; 2]; 14] = [
+    [2.40, 0.4576],
+    [3.0, 0.4032],
+    [5.0, 0.3164],
+    [7.0, 0.2078],
+    [9.0, 0.1299],
+    [11.0, 0.1033],
+    [12.0, 0.0939],
+    [13.0, 0.0859],
+    [14.0, 0.0792],
+    [15.0, 0.07359],
+    [17.0, 0.0643],
+    [20.0, 0.0532],
+    [25.0, 0.0387],
+    [29.2, 0.0292],
+];
+
+/// Half of the last digit printed.
+const PRINTED: f64 = 5e-5;
+
+fn pareto(folder: &Path, arguments: &[&str]) -> Value {
+    let output = cargo_bin_cmd!("mops")
+        .args(["pareto", "--json", "--out", folder.to_str().unwrap()])
+        .args(arguments)
+        .output()
+        .unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Settling time and overshoot of the points.
+fn points(result: &Value) -> Vec<[f64; 2]> {
+    let of =
+        |point: &Value| ["nominal/settling", "nominal/overshoot"].map(|key| point["criteria"][key].as_f64().unwrap());
+    result["front"].as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = pareto(folder.path(), &["pid-pareto"]);
+    assert_eq!((&result["stop"], &result["task"]), (&"converged".into(), &"pareto".into()));
+    let front = points(&result);
+    assert!((30..=34).contains(&front.len()), "{}", front.len());
+    assert!(front.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] > pair[1][1]), "{front:?}");
+    for [settling, overshoot] in &front {
+        // No point known is better in both by more than a thousandth.
+        let better = |known: &&[f64; 2]| known[0] < settling * 0.999 && known[1] + PRINTED < overshoot * 0.999;
+        assert_eq!(FRONT.iter().find(better), None, "{settling} {overshoot}");
+    }
+    for known in FRONT {
+        let better =
+            |[settling, overshoot]: &&[f64; 2]| *settling < known[0] * 0.999 && *overshoot < known[1] * 0.999 - PRINTED;
+        assert_eq!(front.iter().find(better), None, "{known:?}");
+        // A point of the front lies near it, as near as thirty points can.
+        let near = |p: &[f64; 2]| ((p[0] - known[0]) / 27.0).hypot((p[1] - known[1]) / 0.43);
+        assert!(front.iter().map(near).fold(1.0, f64::min) < 0.05, "{known:?}");
+    }
+    let reference = [30.0, 0.5];
+    let [found, known] = [front.concat(), FRONT.concat()].map(|points| hypervolume(&points, &reference));
+    assert!(found > known, "{found} {known}");
+    let simulations = result["simulations"].as_u64().unwrap();
+    assert!(simulations < 9000, "{simulations}");
+}
+
+#[test]
+fn the_read_outs_of_a_front_agree_with_its_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = pareto(folder.path(), &["pid-pareto", "--points", "12"]);
+    let (front, found) = (points(&result), &result["trade_offs"]);
+    assert_eq!(found["points"].as_array().unwrap().len(), front.len());
+    let worst = |[settling, overshoot]: [f64; 2]| (settling / 15.0).max(overshoot / 0.1);
+    let nearest = (0..front.len()).min_by(|&a, &b| worst(front[a]).total_cmp(&worst(front[b]))).unwrap();
+    assert_eq!(found["nearest"], nearest);
+    assert_eq!(
+        result["tuners"][0]["value"], result["front"][nearest]["tuners"]["k"],
+        "the point reported is that point"
+    );
+    // The design of the same demands: an independent computation with SciPy gives 0.8630704.
+    assert!((worst(front[nearest]) - 0.863_070_4).abs() < 2e-4, "{}", worst(front[nearest]));
+    // Between two secants of a front that bends one way lies the price that the multipliers tell.
+    let rates: Vec<f64> = found["neighbours"].as_array().unwrap().iter().map(|n| n["rate"].as_f64().unwrap()).collect();
+    for (pair, i) in front.windows(2).zip(0..) {
+        let rate: f64 = (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0]);
+        assert!((rates[i] - rate).abs() < 1e-12);
+    }
+    let weights = |i: usize| {
+        found["points"][i]["weights"].as_array().map(|w| w.iter().map(|w| w.as_f64().unwrap()).collect::<Vec<_>>())
+    };
+    let told: Vec<(f64, [f64; 2])> = (1..front.len() - 1)
+        .filter_map(|i| Some((weights(i)?, [rates[i - 1], rates[i]])))
+        .map(|(w, rates)| (-w[0] / w[1], rates))
+        .collect();
+    assert!(told.len() >= 3, "some points are certified: {told:?}");
+    for (price, [before, after]) in told {
+        assert!(
+            price < 0.0 && price > 2.0 * before.min(after) && price < 0.5 * before.max(after),
+            "{price} {before} {after}"
+        );
+    }
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("<h2 id=\"front\">Front</h2>"), "the page has a section of its own");
+}
+
+/// A pair of the published front as demands makes 1 the least worst scaled value there is.
+#[test]
+fn a_picked_point_serves_the_demands_as_well_as_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    pareto(folder.path(), &["pid-pareto", "--points", "12"]);
+    let run = |arguments: &[&str]| cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+    for known in FRONT.into_iter().filter(|[settling, _]| [7.0, 9.0, 12.0, 15.0, 20.0].contains(settling)) {
+        let demands = [format!("settling={} s", known[0]), format!("overshoot={}", known[1])];
+        let picked = run(&["pick", out, "--demand", &demands[0], "--demand", &demands[1]]);
+        assert!(picked.status.success(), "{}", String::from_utf8_lossy(&picked.stderr));
+        let study = folder.path().join("picked.toml");
+        let again = folder.path().join("again");
+        let looked = run(&[
+            "run",
+            study.to_str().unwrap(),
+            "--json",
+            "--max-evaluations",
+            "1",
+            "--out",
+            again.to_str().unwrap(),
+        ]);
+        let result: Value = serde_json::from_slice(&looked.stdout).unwrap();
+        assert_eq!((&result["task"], &result["study"]), (&"design".into(), &"pid-pareto-picked".into()));
+        let worst = result["start"]["worst_scaled"].as_f64().unwrap();
+        assert!((worst - 1.0).abs() < 1e-3 + PRINTED / known[1], "{known:?}: {worst}");
+    }
+}
