@@ -42,7 +42,9 @@ mod cli;
 mod diagnosis;
 mod report;
 mod solve;
+mod store;
 mod tasks;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -52,7 +54,7 @@ pub use mops_discrepancy as discrepancy;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface};
-pub use solve::{Options, Solved, Unsuitable, solve};
+pub use solve::{Keeping, Options, Solved, Unsuitable, solve};
 
 /// Everything that comes with mops: models, criteria, solvers and studies.
 pub fn catalogue() -> Catalogue {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use mops_core::{
     Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Problem, Record, Run,
-    SolverChoice, Stop, Study, Watch, conclude,
+    SolverChoice, Stop, Store, Study, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -23,6 +23,34 @@ pub struct Options {
     pub jobs: Option<usize>,
     /// Effects that a diagnosis may find.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// Where points are kept, and what is known of them from before; it changes no bit of the result.
+    pub keeping: Option<Keeping>,
+}
+
+/// A store, and the study whose points it knows.
+#[derive(Clone)]
+pub struct Keeping {
+    /// The study.
+    pub study: Study,
+    /// Its points.
+    pub store: Arc<dyn Store>,
+    /// The point of the unit box at which a search begins, instead of the start values; with one, the outcome tells how many
+    /// points were known.
+    pub begin: Option<Vec<f64>>,
+}
+
+impl Options {
+    /// The store, for a problem in which points have the values that it knows; else none.
+    pub(crate) fn store(&self, problem: &Problem) -> Option<&dyn Store> {
+        let keeping = self.keeping.as_ref()?;
+        keeping.study.measures_as(problem.study()).then_some(&*keeping.store)
+    }
+
+    /// Where a search begins, if not at the start values.
+    fn begin(&self, problem: &Problem) -> Option<&[f64]> {
+        let begin = self.keeping.as_ref()?.begin.as_deref()?;
+        (self.store(problem).is_some() && begin.len() == problem.active().len()).then_some(begin)
+    }
 }
 
 /// Points a run may evaluate where nothing else is said.
@@ -31,7 +59,13 @@ pub const DEFAULT_EVALUATIONS: usize = 20_000;
 impl Default for Options {
     fn default() -> Self {
         let solver = mops_solvers::kinds().first().expect("there are solvers").default_choice();
-        Self { solver, max_evaluations: DEFAULT_EVALUATIONS, jobs: None, effects: mops_models::effects::effects() }
+        Self {
+            solver,
+            max_evaluations: DEFAULT_EVALUATIONS,
+            jobs: None,
+            effects: mops_models::effects::effects(),
+            keeping: None,
+        }
     }
 }
 
@@ -89,12 +123,14 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();
     solver.accepts(problem.shape()).map_err(Unsuitable::from)?;
-    let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch);
-    let stop = run.solve(solver.as_mut(), &problem.start());
-    let pareto = pareto(&run, stop);
+    let (store, begin) = (options.store(&problem), options.begin(&problem));
+    let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch).keeping(store);
+    let stop = run.solve(solver.as_mut(), begin.unwrap_or(&problem.start()));
+    let pareto = pareto(&run, stop, store);
     let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.seconds = begun.elapsed().as_secs_f64();
+    outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
     drop(run);
     Ok(Solved { outcome, problem, best, archive, diagnosis: None })
@@ -122,7 +158,7 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.
-fn pareto(run: &Run<'_>, stop: Stop) -> Pareto {
+fn pareto(run: &Run<'_>, stop: Stop, store: Option<&dyn Store>) -> Pareto {
     let problem = run.problem();
     match run.best().filter(|best| best.merit.is_feasible()) {
         None => Pareto::NotShown,
@@ -130,7 +166,7 @@ fn pareto(run: &Run<'_>, stop: Stop) -> Pareto {
         // A minimum of a sum with positive weights is Pareto-optimal.
         Some(_) if problem.shape().objective == Objective::Sum && stop == Stop::Converged => Pareto::CertifiedLocal,
         Some(best) => {
-            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
+            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &()).keeping(store);
             mops_solvers::certify(&mut probe, &best.point)
         }
     }

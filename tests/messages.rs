@@ -756,3 +756,65 @@ fn a_diagnosis_that_cannot_be_made() {
         ],
     );
 }
+
+/// The design over an uncertain pole, with these tables.
+fn uncertain(what: &'static str, tables: &str) -> Case {
+    Case::new(what, &format!("{DESIGN}\n{tables}\n"))
+}
+
+#[test]
+fn uncertain_parameters_that_mean_nothing() {
+    let worst: &[&str] = &["run", "study.toml", "--out", "out", "--set", "study.task='worst-case'"];
+    let monte_carlo: &[&str] = &["run", "study.toml", "--out", "out", "--set", "study.task='monte-carlo'"];
+    check(
+        "uncertain",
+        &[
+            Case::new("nothing is uncertain", DESIGN).called(worst),
+            uncertain("a robust design of nothing", "[robust]"),
+            uncertain("an unknown parameter", "[uncertain]\nq = { min = -0.1, max = 0.1 }"),
+            uncertain("an empty range", "[uncertain]\np = { min = 0.1, max = -0.1 }"),
+            uncertain("no range", "[uncertain]\np = { min = 0.1 }"),
+            uncertain("a wrong unit", "[uncertain]\nTi = { min = \"1 V\", max = 3 }"),
+            uncertain(
+                "two distributions",
+                "[uncertain]\np = { normal = { mean = 0, deviation = 1 }, triangular = { mode = 0 } }",
+            ),
+            uncertain("half a distribution", "[uncertain]\np = { normal = { mean = 0 } }"),
+            uncertain("a negative deviation", "[uncertain]\np = { normal = { mean = 0, deviation = -1 } }"),
+            uncertain("a mode outside", "[uncertain]\np = { triangular = { mode = 3 }, min = -1, max = 1 }"),
+            uncertain(
+                "a distribution far from its bounds",
+                "[uncertain]\np = { normal = { mean = 0, deviation = 0.1 }, min = 5 }",
+            ),
+            uncertain("a tolerance of no tuner", "[uncertain]\np = { tolerance = 0.1 }"),
+            uncertain("a box without an end", "[uncertain]\np = { normal = { mean = 0, deviation = 0.1 } }")
+                .called(worst),
+            uncertain("a tuner to choose and to guard against", "[uncertain]\nk = { tolerance = 0.1 }\n[robust]"),
+            uncertain(
+                "an unknown criterion",
+                "[uncertain]\np = { min = -0.1, max = 0.1 }\n[worst-case]\ncriteria = [\"setling\"]",
+            )
+            .called(worst),
+            uncertain(
+                "a share that is none",
+                "[uncertain]\np = { min = -0.1, max = 0.1 }\n[monte-carlo]\nquantiles = [5, 95]",
+            )
+            .called(monte_carlo),
+            uncertain("one sample", "[uncertain]\np = { min = -0.1, max = 0.1 }\n[monte-carlo]\nsamples = 1")
+                .called(monte_carlo),
+            uncertain("a tolerance of nothing", "[uncertain]\np = { min = -0.1, max = 0.1 }\n[robust]\ntolerance = 0"),
+            uncertain("uncertain estimates of a design", "[uncertainty]\nbands = true"),
+            calibration(
+                "a profile of what is not estimated",
+                "[criteria]",
+                "[uncertainty]\nprofile = [\"e\"]\n[criteria]",
+            ),
+            calibration("an empty block", "[criteria]", "[uncertainty]\nbootstrap = 200\nblock = 0\n[criteria]"),
+            calibration(
+                "a robust calibration",
+                "[criteria]",
+                "[uncertain]\na = { min = 1e-4, max = 1e-3 }\n[robust]\n[criteria]",
+            ),
+        ],
+    );
+}

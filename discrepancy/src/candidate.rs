@@ -32,6 +32,13 @@ impl Candidate {
             && self.only == other.only
     }
 
+    /// Whether it is of the same class at the same place, and has fewer strengths.
+    pub fn is_simpler_than(&self, other: &Self) -> bool {
+        self.port == other.port
+            && self.effect.class() == other.effect.class()
+            && self.effect.strengths().len() < other.effect.strengths().len()
+    }
+
     /// The unit of a strength as results spell it: empty where the model does not tell that of its forces.
     pub fn unit(&self, strength: &Strength, unit: &Unit) -> String {
         let untold = matches!(self.port, Port::Joint { unit: None, .. } | Port::Process { unit: None, .. });

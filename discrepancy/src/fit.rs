@@ -464,9 +464,16 @@ impl Fit<'_> {
         let Some(normal) = self.normal_at(fitted) else { return covariance };
         let held = self.held(&fitted.point, &normal.gradient);
         let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
-        let inverse = pseudo_inverse(&matrix);
+        let mut matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
         let stretch = |k: usize| self.stretch(k, fitted.point.globals[k]);
+        // What the data do not tell is still known to lie between the bounds: uniform there.
+        for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
+            let [low, high] = self.globals[k].bounds;
+            if (high - low).is_finite() {
+                matrix[(i, i)] += 12.0 * (stretch(k) / (high - low)).powi(2);
+            }
+        }
+        let inverse = pseudo_inverse(&matrix);
         for (i, &a) in free.iter().enumerate().filter(|(_, a)| **a < g) {
             for (j, &b) in free.iter().enumerate().filter(|(_, b)| **b < g) {
                 covariance[(a, b)] = inverse[(i, j)] * stretch(a) * stretch(b);

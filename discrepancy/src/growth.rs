@@ -5,11 +5,15 @@ use mops_core::{Mistake, Watch};
 
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::search::{Round, Search, Trial};
+use crate::variant::Added;
 use crate::weigh::{Dispersion, by_chance, criterion};
 
 /// How much better a criterion must be for a rival to take the place of an effect. Source: R. E. Kass, A. E. Raftery, Bayes
 /// Factors, JASA 90 (1995), section 3.2: strong evidence.
 const CLEARLY: f64 = 6.0;
+
+/// Effects exchanged at most before the next is added.
+const EXCHANGES: usize = 3;
 
 /// A model that grew, and how.
 pub struct Growth<'a> {
@@ -28,7 +32,68 @@ impl<'a> Search<'a> {
     /// The user ended it.
     #[allow(clippy::cast_precision_loss)]
     pub fn grow(&self, declared: &Trial<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
-        let mut growth = Growth { last: declared.clone(), rounds: Vec::new(), p_value: 1.0 };
+        let begun = Growth { last: declared.clone(), rounds: Vec::new(), p_value: 1.0 };
+        let mut growth = self.onward(begun, options, watch)?;
+        if growth.last.added.is_empty() || options.max_effects < 2 || self.explains(&growth.last) {
+            return Ok(growth);
+        }
+        // Where the best first step led nowhere, another may lead on.
+        let mut ways = self.other_ways(declared, &growth);
+        let count = ways.len();
+        while let Some(way) = ways.pop() {
+            watch.stage("other ways, as something is left", 0.8 - 0.05 * ways.len() as f64 / count as f64);
+            let begun = Growth { last: self.over_or_in_windows(&way), rounds: Vec::new(), p_value: 1.0 };
+            let other = self.onward(begun, options, watch)?.last;
+            if self.is_better(&other, &growth.last) {
+                growth.last = other;
+                if self.explains(&growth.last) {
+                    break;
+                }
+            }
+        }
+        Ok(growth)
+    }
+
+    /// Whether a model leaves no more than the noise of whole records.
+    fn explains(&self, trial: &Trial<'a>) -> bool {
+        self.whole(trial).is_some_and(|whole| whole.fitted.normalised() <= UNEXPLAINED)
+    }
+
+    /// Whether a model is clearly better than another, over whole records.
+    fn is_better(&self, other: &Trial<'a>, last: &Trial<'a>) -> bool {
+        match (self.whole(other), self.whole(last)) {
+            (Some(other), Some(last)) => {
+                let of = Dispersion::of(&other);
+                criterion(&other, &of) < criterion(&last, &of) - CLEARLY
+            }
+            (other, last) => other.is_some() && last.is_none(),
+        }
+    }
+
+    /// Single effects to begin with again, the best last: runners-up of the first round, and what a fit that begins where the
+    /// study does finds.
+    fn other_ways(&self, declared: &Trial<'a>, growth: &Growth<'a>) -> Vec<Trial<'a>> {
+        const WAYS: usize = 4;
+        let Some(first) = growth.rounds.first() else { return Vec::new() };
+        let mut ways = self.afresh(declared, first);
+        ways.extend(first.trials.iter().cloned());
+        ways.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        let mut chosen: Vec<Trial<'a>> = Vec::new();
+        for way in ways {
+            let is = |a: &Added| way.added[0].candidate.is(&a.candidate);
+            let taken = growth.last.added.iter().any(is) || chosen.iter().any(|c| is(&c.added[0]));
+            if !taken && chosen.len() < WAYS {
+                chosen.push(way);
+            }
+        }
+        chosen.reverse();
+        chosen
+    }
+
+    /// Adds effects to a model that may have some.
+    #[allow(clippy::cast_precision_loss)]
+    fn onward(&self, begun: Growth<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
+        let mut growth = begun;
         // The round after the present one, where it was looked at already.
         let mut ahead: Option<Round<'a>> = None;
         let most = options.max_effects;
@@ -64,6 +129,16 @@ impl<'a> Search<'a> {
             };
             (growth.last, ahead) = next;
             growth.rounds.push(round);
+            // What one effect stood in for may have its place once the next is in.
+            for _ in 0..EXCHANGES {
+                let last = &growth.last;
+                if last.added.len() < 2 || last.windows > 1 || last.fitted.normalised() <= UNEXPLAINED {
+                    break;
+                }
+                watch.stage("each effect against its rivals", 0.5);
+                let Some(better) = self.exchanged(last).0 else { break };
+                (growth.last, ahead) = (better, None);
+            }
         }
         Ok(growth)
     }
@@ -88,31 +163,72 @@ impl<'a> Search<'a> {
         if last.added.len() > 1 {
             last = self.pruned(last, options.level);
         }
+        let mut rounds = rounds;
+        while last.added.len() > 1 && last.windows == 1 {
+            let Some((one, round)) = self.merged(&last) else { break };
+            last = one;
+            rounds.insert(0, round);
+        }
         if last.added.len() < 2 || last.windows > 1 {
             return Growth { last, rounds, p_value };
         }
         watch.stage("each effect against its rivals", 0.86);
-        let rounds: Vec<Round<'a>> = (0..last.added.len()).filter_map(|index| self.rivals(&last, index)).collect();
-        let of = Dispersion::of(&last);
+        let (exchanged, rounds) = self.exchanged(&last);
+        Growth { last: exchanged.unwrap_or(last), rounds, p_value }
+    }
+
+    /// The model with one effect in place of two at the same port that it does the work of, as an asymmetric friction does that
+    /// of a Coulomb friction and a constant force; and the round that it is from.
+    fn merged(&self, last: &Trial<'a>) -> Option<(Trial<'a>, Round<'a>)> {
+        let of = Dispersion::of(last);
+        let most = criterion(last, &of) + CLEARLY;
+        for i in 0..last.added.len() {
+            for j in i + 1..last.added.len() {
+                if last.added[i].candidate.port != last.added[j].candidate.port {
+                    continue;
+                }
+                let others = last.added.iter().enumerate().filter(|(k, _)| *k != i && *k != j).map(|(_, a)| a.clone());
+                let Some(without) = self.from(last, &others.collect::<Vec<_>>(), 40) else { continue };
+                let Some(round) = self.round(&self.over_or_in_windows(&without)) else { continue };
+                let one = round.trials.first().filter(|t| t.windows == 1 && criterion(t, &of) <= most).cloned();
+                if let Some(one) = one {
+                    return Some((one, round));
+                }
+            }
+        }
+        None
+    }
+
+    /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
+    /// held against its rivals.
+    fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Round<'a>>) {
+        let rounds: Vec<Round<'a>> = (0..last.added.len()).filter_map(|index| self.rivals(last, index)).collect();
+        let of = Dispersion::of(last);
         let better = rounds.iter().filter_map(|round| round.trials.first()).filter(|t| t.windows == 1);
         let better = better.min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
-        let exchanged = better.filter(|b| criterion(b, &of) < criterion(&last, &of) - CLEARLY).cloned();
-        Growth { last: exchanged.unwrap_or(last), rounds, p_value }
+        let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - CLEARLY).cloned();
+        (exchanged, rounds)
     }
 
     /// The round for one of the effects with the others in.
     fn rivals(&self, last: &Trial<'a>, index: usize) -> Option<Round<'a>> {
-        let without = self.without(last, index)?;
+        let without = self.over_or_in_windows(&self.without(last, index)?);
         let mut round = self.round(&without)?;
+        round.trials.retain(|t| t.windows == last.windows);
         let own = &last.added[index];
-        let same = |t: &Trial<'_>| t.added.last().is_some_and(|a| a.candidate.is(&own.candidate));
-        round.trials.retain(|t| !same(t));
-        // The effect itself stands where the whole model ended, not where a new fit from nothing may have stopped.
+        // The effect itself stands where the whole model ended, not where a new fit from nothing may have stopped; but with
+        // the others in, another shape of it may do better.
         let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a);
         let order: Vec<_> = others.chain([own]).cloned().collect();
         round.trials.extend(self.from(last, &order, 10));
         let of = Dispersion::of(last);
         round.trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
+        let mut seen = 0;
+        round.trials.retain(|t| {
+            let same = t.added.last().is_some_and(|a| a.candidate.is(&own.candidate));
+            seen += usize::from(same);
+            !same || seen == 1
+        });
         Some(round)
     }
 }

@@ -279,7 +279,7 @@ fn best_of(
             gain,
             absorbed: 1.0 - left.rest / left.size,
             pull: along / length,
-            one_sided: first.bounds[0] >= 0.0,
+            one_sided: !is_linear(first) || first.bounds[0] >= 0.0,
             noticed,
             direction: left.trace.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),

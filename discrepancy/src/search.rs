@@ -126,6 +126,11 @@ impl<'a> Search<'a> {
         self.trial(&trial.added, tuners, locals, 1, 40)
     }
 
+    /// The same where the trial is over whole records already.
+    pub fn whole(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        if trial.windows == 1 { Some(trial.clone()) } else { self.over_whole(trial) }
+    }
+
     /// Fits start values alone, from `locals` and with the globals held: the experiments that parameters do not come from.
     pub fn starts(
         &self,
@@ -194,6 +199,13 @@ impl<'a> Search<'a> {
                 chosen.push(i);
             }
         }
+        // And what is simpler of the same kind at the same place, as a shape may do no more than take up noise.
+        for (i, s) in screened.iter().enumerate().take(gaining) {
+            let simpler = |k: &usize| s.added.candidate.is_simpler_than(&screened[*k].added.candidate);
+            if !chosen.contains(&i) && chosen.iter().any(simpler) {
+                chosen.push(i);
+            }
+        }
         let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
@@ -214,6 +226,17 @@ impl<'a> Search<'a> {
         let directions = screened.iter().map(|s| s.directions).sum();
         let independent = independent.unwrap_or(directions);
         Some(Round { screened, trials, directions, independent, before: from.score(), known })
+    }
+
+    /// The best candidates of a round, fitted from where the study begins: the fit of the model without them may have ended
+    /// where no effect can help it.
+    pub fn afresh(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
+        const MOST: usize = 24;
+        let tuners = self.subject.start();
+        let locals = base::first_locals(&self.pieces(from.windows));
+        let chosen = &round.screened[..round.screened.len().min(MOST)];
+        let fit = |s: &Screened| self.trial(std::slice::from_ref(&s.added), &tuners, locals.clone(), from.windows, 8);
+        self.race(chosen.par_iter().filter_map(fit).collect())
     }
 
     /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when
@@ -323,8 +346,7 @@ impl<'a> Search<'a> {
     /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
     /// linear view, else in windows.
     pub fn over_or_in_windows(&self, trial: &Trial<'a>) -> Trial<'a> {
-        let whole = if trial.windows == 1 { Some(trial.clone()) } else { self.over_whole(trial) };
-        match whole {
+        match self.whole(trial) {
             Some(whole) if whole.fitted.normalised() < NEARLY_LINEAR => whole,
             Some(whole) => {
                 let windows = self.in_windows(whole);

@@ -52,7 +52,7 @@ impl Variant {
         for a in added {
             first.push(next);
             let effect = &a.candidate.effect;
-            next += effect.strengths().len() + if effect.free_start() { effect.states() } else { 0 };
+            next += effect.strengths().len() + effect.free_starts();
         }
         Self { model: Arc::new(model), first }
     }
@@ -113,15 +113,13 @@ pub fn problem<'a>(
             let neutral = effect.strengths()[0].neutral.unwrap_or(0.0);
             pieces.iter_mut().filter(|p| p.measurement != only).for_each(|p| p.fixed.push((first, neutral)));
         }
-        if effect.free_start() {
-            for (piece, locals) in pieces.iter_mut().zip(&mut locals) {
-                for state in 0..effect.states() {
-                    let parameter = first + effect.strengths().len() + state;
-                    let scale = if state == 0 { a.sizes.position } else { a.sizes.speed };
-                    let bounds = [-10.0 * scale, 10.0 * scale];
-                    piece.locals.push(Local { parameter, bounds, start: 0.0, scale: 0.1 * scale });
-                    locals.push(0.0);
-                }
+        for (piece, locals) in pieces.iter_mut().zip(&mut locals) {
+            for state in 0..effect.free_starts() {
+                let parameter = first + effect.strengths().len() + state;
+                let scale = if state == 0 { a.sizes.position } else { a.sizes.speed };
+                let bounds = [-10.0 * scale, 10.0 * scale];
+                piece.locals.push(Local { parameter, bounds, start: 0.0, scale: 0.1 * scale });
+                locals.push(0.0);
             }
         }
     }

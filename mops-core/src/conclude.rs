@@ -93,6 +93,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         solver: solver.kind.to_owned(),
         stop: ending.stop,
         evaluations: run.archive().len(),
+        reused: None,
         simulations,
         seconds: ending.seconds,
         feasible: best.merit.is_feasible(),

@@ -381,14 +381,24 @@ pub trait Effect: Send + Sync {
         0
     }
 
-    /// Whether the start values of its states matter so much that an experiment leaves them free.
+    /// Whether the start values of its states, or the first value that it remembers, matter so much that an experiment leaves
+    /// them free.
     fn free_start(&self) -> bool {
         false
     }
 
-    /// Number of values that it remembers from one moment to the next.
+    /// Number of values that it remembers from one moment to the next; the first of them is what it let through.
     fn memory(&self) -> usize {
         0
+    }
+
+    /// Number of start values that an experiment leaves free: those of its states, or that of what it lets through.
+    fn free_starts(&self) -> usize {
+        match (self.free_start(), self.memory()) {
+            (false, _) => 0,
+            (true, 0) => self.states(),
+            (true, _) => 1,
+        }
     }
 
     /// Whether it asks for the acceleration: its force is proportional to it.

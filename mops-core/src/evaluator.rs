@@ -1,11 +1,13 @@
 //! What a run evaluates: a study's problem, or a problem with a known answer.
 
+use crate::known::{Kept, KeptSlopes, Known, RowSlopes};
 use crate::problem::{Evaluation, Problem, Slopes};
 use crate::solver::Shape;
 
 /// Rows of scaled values over the unit box. A pure function: the same point gives the same bits on every thread.
 ///
-/// Mandatory: all but [`Evaluator::slopes`] and [`Evaluator::noise`].
+/// Mandatory: shape, evaluate, tuners_at and seed. Who can tell what holds under every demand offers the two methods that
+/// keep as well; their evaluations and slopes have the same bits as the others'.
 pub trait Evaluator: Sync {
     /// Sizes and kinds.
     fn shape(&self) -> &Shape;
@@ -20,6 +22,16 @@ pub trait Evaluator: Sync {
     /// describe the problem.
     fn slopes(&self, _at: &Evaluation, _reach: f64) -> Option<Slopes> {
         None
+    }
+
+    /// The evaluation of a point of which something is known already.
+    fn evaluate_keeping(&self, point: &[f64], _known: Option<Known>) -> Kept {
+        Kept { evaluation: self.evaluate(point), learned: None }
+    }
+
+    /// The slopes at a point of which they may be known already.
+    fn slopes_keeping(&self, at: &Evaluation, reach: f64, _known: Option<Option<RowSlopes>>) -> KeptSlopes<Slopes> {
+        KeptSlopes { slopes: self.slopes(at, reach), learned: None }
     }
 
     /// How far values of neighbouring points are off, relative to their size. Simulations at a relative tolerance of 1e-8
@@ -47,6 +59,14 @@ impl Evaluator for Problem {
 
     fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
         self.slopes(at, reach)
+    }
+
+    fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
+        self.evaluate_keeping(point, known)
+    }
+
+    fn slopes_keeping(&self, at: &Evaluation, reach: f64, known: Option<Option<RowSlopes>>) -> KeptSlopes<Slopes> {
+        self.slopes_keeping(at, reach, known)
     }
 
     fn seed(&self) -> u64 {

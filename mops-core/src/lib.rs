@@ -16,6 +16,7 @@ pub mod expression;
 pub mod file;
 pub mod front;
 pub mod identification;
+mod known;
 pub mod linear;
 mod linearised;
 mod model;
@@ -23,15 +24,19 @@ mod outcome;
 mod placement;
 mod plant;
 mod port;
+mod prediction;
 mod problem;
 mod random;
+mod robustness;
 mod run;
 mod scalar;
 mod solver;
+pub mod statistics;
 mod study;
 mod tolerance;
 mod trace;
 mod tuner;
+mod uncertainty;
 mod unit;
 
 pub use case::Case;
@@ -48,6 +53,7 @@ pub use effect::{
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
+pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting};
 pub use model::{
@@ -61,17 +67,26 @@ pub use outcome::{
 pub use placement::{Augment, EffectDraft};
 pub use plant::{Instant, Open, Opening, Plant};
 pub use port::Port;
+pub use prediction::SignalSlopes;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
 pub use random::{Stream, stream};
+pub use robustness::{
+    AddedReport, CoordinateReport, DistributionReport, EffectReport, EffectsReport, Estimated, FailedAt,
+    GlobalSensitivityReport, MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject,
+    UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
+};
 pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
-    Axis, AxisDraft, CaseDraft, ChannelDraft, CriterionDraft, DiagnosisTask, Draft, ExcitationDraft, ExcitationTask,
-    Free, JobPlan, Measured, Mistake, ModelDraft, Objective, ParameterSource, Place, RegressionDraft, RegressionTask,
-    Row, SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft,
+    Axis, AxisDraft, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DiagnosisTask, Distribution, DistributionDraft,
+    Draft, ExcitationDraft, ExcitationTask, Free, JobPlan, Measured, Mistake, ModelDraft, MonteCarloTask, Objective,
+    ParameterSource, Place, RegressionDraft, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod,
+    SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft, Uncertain, UncertainDraft,
+    UncertaintyTask, WorstCaseTask,
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
 pub use tuner::{Grid, Scale, Tuner};
+pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};
 pub use unit::{Quantity, Unit};

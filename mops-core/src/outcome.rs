@@ -7,8 +7,10 @@ use crate::criterion::{Demand, Usage};
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
 use crate::problem::{Evaluation, FEASIBLE};
+use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
 use crate::solver::Stop;
 use crate::study::{Study, Task};
+use crate::uncertainty::UncertaintyReport;
 
 /// Whether the result can be improved in one criterion without loss in another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,7 +43,10 @@ pub struct Outcome {
     pub stop: Stop,
     /// Points evaluated.
     pub evaluations: usize,
-    /// Models run.
+    /// Of a run that uses points of another again: how many of its own were known, and not simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reused: Option<usize>,
+    /// Models run; points that were known count as if they were simulated.
     pub simulations: usize,
     /// Wall-clock time, s.
     pub seconds: f64,
@@ -90,6 +95,21 @@ pub struct Findings {
     /// What the model lacks, as the search for it writes it down.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Value>,
+    /// The worst cases over a box of uncertain parameters.
+    #[serde(rename = "worst-case", skip_serializing_if = "Option::is_none")]
+    pub worst_case: Option<WorstCaseReport>,
+    /// How the criteria are distributed.
+    #[serde(rename = "monte-carlo", skip_serializing_if = "Option::is_none")]
+    pub monte_carlo: Option<MonteCarloReport>,
+    /// How a design against worst cases was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robust: Option<RobustReport>,
+    /// What more is told of the uncertainty of a calibration's estimates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintyReport>,
+    /// Effects of the uncertain parameters over their whole ranges.
+    #[serde(rename = "global-sensitivity", skip_serializing_if = "Option::is_none")]
+    pub global_sensitivity: Option<GlobalSensitivityReport>,
 }
 
 /// How rich inputs are, and what regressions make of them.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::criterion::{Demand, Tangent, Usage, Value};
 use crate::experiment::Role;
+use crate::known::{JobValues, Kept, KeptSlopes, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Failure, Job};
 use crate::random::stream;
 use crate::scalar::Dual;
@@ -100,9 +101,6 @@ pub struct Slopes {
 
 /// A row, by index, with its derivative along every coordinate.
 type RowSlopes = (usize, Vec<Value>);
-
-/// A row, by index, with its value or why it has none.
-type RowValue = (usize, Result<Value, String>);
 
 impl Problem {
     /// The problem of the study itself: tuners of the study and of its calibration cases; the other cases are watched.
@@ -227,13 +225,54 @@ impl Problem {
     }
 
     fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize]) -> Evaluation {
+        let values: Vec<JobValues> = jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
+        self.judge(point, tuners, jobs.iter().copied().zip(values))
+    }
+
+    /// The evaluation of a point of which something is known already: only the jobs that are not known are run.
+    pub fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
+        let tuners = self.tuners_at(point);
+        let known = known.unwrap_or_default();
+        let values: Vec<(usize, JobValues, bool)> = (self.counting.par_iter())
+            .map(|&job| match known.job(job).filter(|values| self.suffices(job, values)) {
+                Some(values) => (job, values.clone(), false),
+                None => (job, self.run_job(job, &tuners), true),
+            })
+            .collect();
+        let keeps_residuals = self.shape.residuals > 0;
+        let learned: Vec<(usize, JobValues)> = (values.iter().filter(|(.., new)| *new))
+            .map(|(job, values, _)| (*job, if keeps_residuals { values.clone() } else { without_residuals(values) }))
+            .collect();
+        let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
+        Kept { evaluation: self.judge(point.to_vec(), tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
+    }
+
+    /// The evaluation of a point, of which everything that counts is known; `None` where it is not.
+    pub fn known(&self, tuners: &[f64], known: &Known) -> Option<Evaluation> {
+        let of_job = |&job: &usize| Some((job, known.job(job).filter(|values| self.suffices(job, values))?.clone()));
+        let values: Vec<(usize, JobValues)> = self.counting.iter().map(of_job).collect::<Option<_>>()?;
+        Some(self.judge(self.point_of(tuners), tuners.to_vec(), values.into_iter()))
+    }
+
+    /// Whether what is known of a job is all that this problem asks of it.
+    fn suffices(&self, job: usize, values: &JobValues) -> bool {
+        let Ok(values) = values else { return true };
+        let rows = self.study.rows.iter().zip(&self.shape.rows).enumerate().filter(|(_, (row, _))| row.job == job);
+        let needs_residuals = |usage: Usage| self.shape.residuals > 0 && usage == Usage::Minimise;
+        rows.into_iter().all(|(index, (_, (usage, _)))| match values.iter().find(|(row, _)| *row == index) {
+            Some((_, Ok(value))) => !needs_residuals(*usage) || !value.residuals.is_empty(),
+            Some((_, Err(_))) => true,
+            None => false,
+        })
+    }
+
+    /// What the values of jobs are worth under the demands of the study.
+    fn judge(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: impl Iterator<Item = (usize, JobValues)>) -> Evaluation {
         let study = &self.study;
-        let values: Vec<Result<Vec<RowValue>, Failure>> =
-            jobs.par_iter().map(|&job| self.run_job(job, &tuners)).collect();
         let mut readings = vec![None; study.rows.len()];
         let mut residuals = vec![Vec::new(); study.rows.len()];
         let mut failures = Vec::new();
-        for (&job, result) in jobs.iter().zip(values) {
+        for (job, result) in jobs {
             match result {
                 Ok(values) => {
                     for (row, value) in values {
@@ -259,7 +298,7 @@ impl Problem {
     }
 
     /// The values of all rows that read one job. A criterion without a value takes none from the others.
-    fn run_job(&self, job: usize, tuners: &[f64]) -> Result<Vec<RowValue>, Failure> {
+    fn run_job(&self, job: usize, tuners: &[f64]) -> JobValues {
         let study = &self.study;
         let plan = &study.jobs[job];
         let case = &study.cases[plan.case];
@@ -277,22 +316,62 @@ impl Problem {
     /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
     /// has no exact ones. `reach` is the distance within which they are to describe the problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
+        self.scaled_slopes(self.row_slopes(at, reach)?)
+    }
+
+    /// The same where the derivatives of the rows may be known already.
+    pub fn slopes_keeping(
+        &self,
+        at: &Evaluation,
+        reach: f64,
+        known: Option<Option<KnownSlopes>>,
+    ) -> KeptSlopes<Slopes> {
+        let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
+        let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
+        let learned = new.then(|| rows.clone());
+        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(rows)), learned }
+    }
+
+    /// Whether known derivatives are all that this problem asks for.
+    fn suffice(&self, known: &KnownSlopes) -> bool {
+        let n = self.active.len();
+        self.shape.rows.iter().enumerate().all(|(index, (usage, _))| {
+            match known.iter().find(|(row, _)| *row == index) {
+                _ if *usage == Usage::Monitor => true,
+                None => false,
+                Some((_, along)) => {
+                    let needs_residuals = self.shape.residuals > 0 && *usage == Usage::Minimise;
+                    along.len() == n && !(needs_residuals && along.iter().any(|slope| slope.residuals.is_empty()))
+                }
+            }
+        })
+    }
+
+    /// The derivatives of the rows that count along every coordinate, in the units of their criteria.
+    fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<KnownSlopes> {
         if self.shape.spacing.iter().any(|&spacing| spacing > 0.0) || at.scaled.is_none() {
             return None;
         }
-        let study = &self.study;
         let moves = self.tuner_slopes(&at.tuners);
         let of_jobs: Vec<Option<Vec<RowSlopes>>> =
             self.counting.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
+        let mut rows: KnownSlopes = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+        if self.shape.residuals == 0 {
+            rows.iter_mut().flat_map(|(_, along)| along).for_each(|slope| slope.residuals.clear());
+        }
+        Some(rows)
+    }
+
+    /// Slopes of the scaled values and of the weighted residuals.
+    fn scaled_slopes(&self, of_rows: KnownSlopes) -> Option<Slopes> {
+        let study = &self.study;
         let n = self.active.len();
         let mut rows = vec![vec![0.0; n]; study.rows.len()];
         let mut residuals = vec![vec![Vec::new(); study.rows.len()]; n];
-        for of_job in of_jobs {
-            for (row, slopes) in of_job? {
-                for (j, slope) in slopes.into_iter().enumerate() {
-                    rows[row][j] = study.rows[row].demand.scale(slope.number) - study.rows[row].demand.scale(0.0);
-                    residuals[j][row] = slope.residuals;
-                }
+        for (row, slopes) in of_rows.into_iter().filter(|(row, _)| self.shape.rows[*row].0 != Usage::Monitor) {
+            for (j, slope) in slopes.into_iter().enumerate() {
+                rows[row][j] = study.rows[row].demand.scale(slope.number) - study.rows[row].demand.scale(0.0);
+                residuals[j][row] = slope.residuals;
             }
         }
         let residuals: Vec<Vec<f64>> = residuals.into_iter().map(|of_rows| self.residuals(of_rows)).collect();
@@ -301,7 +380,7 @@ impl Problem {
     }
 
     /// The derivative of all tuners along each coordinate of the unit box, ties included.
-    fn tuner_slopes(&self, tuners: &[f64]) -> Vec<Vec<f64>> {
+    pub(crate) fn tuner_slopes(&self, tuners: &[f64]) -> Vec<Vec<f64>> {
         let along = |&active: &usize| {
             let mut duals: Vec<Dual<1>> = tuners.iter().map(|&value| Dual::from(value)).collect();
             duals[active].tangent[0] = self.study.tuners[active].slope_at(tuners[active]);
@@ -371,6 +450,15 @@ impl Problem {
         }
         all
     }
+}
+
+/// Values of a job as they are kept where nobody needs the terms of sums of squares.
+fn without_residuals(values: &JobValues) -> JobValues {
+    let bare = |(row, value): &RowValue| {
+        let value = value.as_ref().map(|v| Value { number: v.number, residuals: Vec::new(), note: v.note });
+        (*row, value.map_err(Clone::clone))
+    };
+    values.as_ref().map(|values| values.iter().map(bare).collect()).map_err(Clone::clone)
 }
 
 #[cfg(test)]

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use crate::differences::Differences;
 use crate::evaluator::Evaluator;
 use crate::front;
+use crate::known::{Kept, KeptSlopes, Store};
 use crate::model::Failure;
-use crate::problem::{Evaluation, Merit, Problem};
+use crate::problem::{Evaluation, Merit, Problem, Slopes};
 use crate::random::{Stream, stream};
 use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 use crate::study::Objective;
@@ -30,6 +31,9 @@ pub trait Watch: Sync {
 
     /// New points were evaluated.
     fn evaluated(&self, _state: &State) {}
+
+    /// The best point changed; told at most once for the points that [`Watch::evaluated`] was told of just before.
+    fn improved(&self, _best: &Evaluation) {}
 
     /// Something that goes in stages, and counts no points, is in this one, such as `screening 412 candidates`; `done` is
     /// the share of the whole that lies behind it, from 0 to 1.
@@ -70,6 +74,11 @@ pub struct Run<'a, E: Evaluator = Problem> {
     problem: &'a E,
     budget: Budget,
     watch: &'a dyn Watch,
+    store: Option<&'a dyn Store>,
+    /// Points answered without a simulation, from what was known.
+    reused: usize,
+    /// Whether the best point is another than the one that was last told of.
+    improved: bool,
     cache: HashMap<Vec<u64>, Evaluation, BuildHasherDefault<Bits>>,
     failed: usize,
     archive: Vec<Record>,
@@ -98,6 +107,9 @@ impl<'a, E: Evaluator> Run<'a, E> {
             problem,
             budget,
             watch,
+            store: None,
+            reused: 0,
+            improved: false,
             cache: HashMap::default(),
             failed: 0,
             archive: Vec::new(),
@@ -114,6 +126,17 @@ impl<'a, E: Evaluator> Run<'a, E> {
         Self { exact: false, ..self }
     }
 
+    /// Keeps what it learns in a store, and simulates nothing that is known there.
+    #[must_use]
+    pub fn keeping(self, store: Option<&'a dyn Store>) -> Self {
+        Self { store, ..self }
+    }
+
+    /// Number of points that were answered from the store, without a simulation.
+    pub fn reused(&self) -> usize {
+        self.reused
+    }
+
     /// Number of times that slopes were taken from tangents: each is a simulation with tangents of every job that counts.
     pub fn linearisations(&self) -> usize {
         self.linearisations
@@ -122,9 +145,9 @@ impl<'a, E: Evaluator> Run<'a, E> {
     /// Runs the solver from `start`, a point of the unit box, to its end.
     pub fn solve(&mut self, solver: &mut dyn Solver, start: &[f64]) -> Stop {
         // The start is evaluated before all else: whatever happens, there is a point to report.
-        let first = self.problem.evaluate(start);
-        self.record(&first);
-        self.cache.insert(key(self.problem, start), first);
+        let first = self.answer(start);
+        self.keep(key(self.problem, start), first);
+        self.tell();
         let mut iterate = || -> Result<Stop, Halt> {
             solver.begin(self, start)?;
             loop {
@@ -175,6 +198,41 @@ impl<'a, E: Evaluator> Run<'a, E> {
         &self.cache[&bits(&self.archive[index].tuners)]
     }
 
+    /// The answer to a point, simulated as far as it is not known.
+    fn answer(&self, point: &[f64]) -> Kept {
+        answer(self.problem, self.store, point)
+    }
+
+    /// Records an answered point, and tells the store.
+    fn keep(&mut self, key: Vec<u64>, answer: Kept) {
+        let Kept { evaluation, learned } = answer;
+        self.record(&evaluation);
+        if let Some(store) = self.store {
+            self.reused += usize::from(learned.is_none());
+            store.answered(&evaluation.tuners, learned);
+        }
+        self.cache.insert(key, evaluation);
+    }
+
+    /// Tells who looks on where the run stands.
+    fn tell(&mut self) {
+        self.watch.evaluated(&self.state());
+        if let Some(best) = self.best.as_ref().filter(|_| std::mem::take(&mut self.improved)) {
+            self.watch.improved(best);
+        }
+    }
+
+    /// Exact slopes, from the store where it has them.
+    fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
+        let Some(store) = self.store else { return self.problem.slopes(at, reach) };
+        let known = store.known_slopes(&at.tuners, reach);
+        let KeptSlopes { slopes, learned } = self.problem.slopes_keeping(at, reach, known);
+        if let Some(learned) = learned {
+            store.learned_slopes(&at.tuners, reach, learned);
+        }
+        slopes
+    }
+
     fn record(&mut self, evaluation: &Evaluation) {
         for (job, failure) in &evaluation.failures {
             match self.failures.iter_mut().find(|f| f.job == *job && f.first.kind() == failure.kind()) {
@@ -194,6 +252,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         });
         if self.best.as_ref().is_none_or(|best| evaluation.merit.is_better_than(&best.merit)) {
             self.best = Some(evaluation.clone());
+            self.improved = true;
         }
     }
 
@@ -236,6 +295,14 @@ impl Hasher for Bits {
     }
 }
 
+/// The answer to a point, simulated as far as the store does not know it.
+fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) -> Kept {
+    match store {
+        None => Kept { evaluation: problem.evaluate(point), learned: None },
+        Some(store) => problem.evaluate_keeping(point, store.known(&problem.tuners_at(point))),
+    }
+}
+
 /// Bits of the values a point stands for: points that round to the same tuners are one.
 fn key(problem: &impl Evaluator, point: &[f64]) -> Vec<u64> {
     bits(&problem.tuners_at(point))
@@ -266,17 +333,16 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             if self.watch.wants_stop() {
                 return Err(Halt::Interrupted);
             }
-            let problem = self.problem;
+            let (problem, store) = (self.problem, self.store);
             // A single point is not worth the way to another thread.
-            let evaluated: Vec<Evaluation> = match batch {
-                [i] => vec![problem.evaluate(&points[*i])],
-                _ => batch.par_iter().map(|&i| problem.evaluate(&points[i])).collect(),
+            let answers: Vec<Kept> = match batch {
+                [i] => vec![answer(problem, store, &points[*i])],
+                _ => batch.par_iter().map(|&i| answer(problem, store, &points[i])).collect(),
             };
-            for (&i, evaluation) in batch.iter().zip(evaluated) {
-                self.record(&evaluation);
-                self.cache.insert(keys[i].clone(), evaluation);
+            for (&i, answer) in batch.iter().zip(answers) {
+                self.keep(keys[i].clone(), answer);
             }
-            self.watch.evaluated(&self.state());
+            self.tell();
         }
         if !within_budget {
             return Err(Halt::Budget);
@@ -303,7 +369,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }
-            if let Some(slopes) = self.problem.slopes(&at, differences.step(reach)) {
+            if let Some(slopes) = self.slopes(&at, differences.step(reach)) {
                 self.linearisations += 1;
                 return Ok(Some(Linearisation { at, rows: slopes.rows, residuals: slopes.residuals }));
             }

@@ -46,7 +46,7 @@ impl SolverOptions for LevenbergMarquardtOptions {
 
 impl LevenbergMarquardtOptions {
     /// The method itself, without further starts.
-    pub(crate) fn local(&self) -> Box<dyn Solver> {
+    pub fn local(&self) -> Box<dyn Solver> {
         Box::new(Local { options: self.clone(), state: None })
     }
 }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale};
+use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale, uncertain_reports};
 
 use super::families::folded;
 use super::places::places;
@@ -57,6 +57,9 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         })
     });
     text += &format!("\n{}", table(&["case", "fixed parameter", "value", "unit"], &[2], folded(fixed.collect(), 1)));
+    if !study.tasks.uncertain.is_empty() {
+        text += &super::robustness::parameters(&uncertain_reports(&study.over_uncertain(&start)));
+    }
     let models = study.models.iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
     let models: Vec<_> = models.filter(|row| !row[1].is_empty()).collect();
     if !models.is_empty() {

@@ -17,6 +17,9 @@ pub(super) fn page(effect: &dyn Effect) -> String {
         let free = if effect.free_start() { ", with a free start value in each experiment" } else { "" };
         page += &format!("States of its own: {}{free}.\n", effect.states());
     }
+    if effect.memory() > 0 && effect.free_start() {
+        page += "The first value that it lets through is free in each experiment.\n";
+    }
     page += "\nStrengths:\n";
     for strength in effect.strengths() {
         page += &format!("  {} ({})\n      {}\n", strength.name, facts(strength), strength.about);

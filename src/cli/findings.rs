@@ -3,6 +3,7 @@
 use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
 use mops_core::{Outcome, SweepReport};
 
+use super::robustness;
 use super::tables::{number, table};
 use crate::report::{combination, significant};
 
@@ -27,14 +28,15 @@ pub(super) fn text(outcome: &Outcome) -> String {
     if let Some(found) = &outcome.found.sweep {
         text += &sweep(found);
     }
+    text += &robustness::text(&outcome.found);
     text
 }
 
-fn sentences(words: &[String]) -> String {
+pub(super) fn sentences(words: &[String]) -> String {
     words.iter().map(|words| format!("- {words}\n")).collect()
 }
 
-fn share(value: f64) -> String {
+pub(super) fn share(value: f64) -> String {
     if value.abs() < 1e-13 {
         "0 %".to_owned()
     } else if value.is_finite() {
@@ -44,7 +46,7 @@ fn share(value: f64) -> String {
     }
 }
 
-fn known(value: f64) -> String {
+pub(super) fn known(value: f64) -> String {
     if value.is_finite() { number(value) } else { String::new() }
 }
 

@@ -2,6 +2,7 @@
 
 mod bench;
 mod check;
+mod compare;
 mod data;
 mod describe;
 mod diagnose;
@@ -9,13 +10,18 @@ mod diagnosis;
 mod effect;
 mod families;
 mod findings;
+mod history;
+mod keep;
 mod linear_plots;
 mod linearise;
 mod list;
 mod new;
+mod past;
 mod places;
 mod progress;
 mod remains;
+mod report;
+mod robustness;
 mod run;
 mod schema;
 mod simulate;
@@ -58,6 +64,12 @@ enum Command {
     Run(run::Arguments),
     /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
     Diagnose(diagnose::Arguments),
+    /// List the runs below a folder: study, date, worst scaled value, evaluations.
+    History(history::Arguments),
+    /// Show runs side by side: tuners, criteria, differences in percent; and a page with their responses.
+    Compare(compare::Arguments),
+    /// Write the report of a run again, from what it left; of a run that was killed, as far as it came.
+    Report(report::Arguments),
     /// Check a study and its data without running anything.
     Check(check::Arguments),
     /// List the kinds of model, criterion and solver, the effects a model may lack, and the shipped studies.
@@ -112,6 +124,9 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
+        Command::History(arguments) => history::history(catalogue, &arguments),
+        Command::Compare(arguments) => compare::compare(catalogue, &arguments),
+        Command::Report(arguments) => report::report(catalogue, &arguments),
         Command::Check(arguments) => check::check(catalogue, &arguments),
         Command::List(arguments) => list::list(catalogue, &arguments),
         Command::Describe(arguments) => describe::describe(catalogue, &arguments),

@@ -1,10 +1,13 @@
 //! Shows how a run goes, and hears Ctrl-C.
 
-use std::sync::Arc;
+use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mops_core::{RunState, Watch};
+use mops_core::{CriterionReport, Evaluation, RunState, Study, Usage, Watch, criterion_reports};
+
+use super::tables::number;
 
 /// A progress bar on standard error, with the best objective so far; and the ear for Ctrl-C.
 pub(super) struct Progress {
@@ -12,6 +15,10 @@ pub(super) struct Progress {
     interrupted: Arc<AtomicBool>,
     /// Whether the bar shows stages instead of points.
     staged: AtomicBool,
+    /// The study whose criteria are shown below the bar, where they are.
+    study: Option<Study>,
+    /// The lines below the bar.
+    below: Mutex<String>,
 }
 
 impl Progress {
@@ -41,7 +48,13 @@ impl Progress {
             }
             eprintln!("{heard}");
         });
-        Self { bar, interrupted, staged: AtomicBool::new(false) }
+        Self { bar, interrupted, staged: AtomicBool::new(false), study: None, below: Mutex::default() }
+    }
+
+    /// Shows the criteria of the best point below the bar.
+    #[must_use]
+    pub fn with_criteria_of(self, study: &Study) -> Self {
+        Self { study: Some(study.clone()), ..self }
     }
 
     /// Takes the bar away.
@@ -63,7 +76,14 @@ impl Watch for Progress {
         } else {
             format!(", violated by {:.3e}", state.best.violation)
         };
-        self.bar.set_message(format!("best {:.6}{violation}{failed}", state.best.objective));
+        let below = self.below.lock().unwrap_or_else(PoisonError::into_inner);
+        self.bar.set_message(format!("best {:.6}{violation}{failed}{below}", state.best.objective));
+    }
+
+    fn improved(&self, best: &Evaluation) {
+        if let Some(study) = &self.study {
+            *self.below.lock().unwrap_or_else(PoisonError::into_inner) = lines(&criterion_reports(study, best));
+        }
     }
 
     fn stage(&self, what: &str, done: f64) {
@@ -76,5 +96,49 @@ impl Watch for Progress {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
         self.bar.set_message(what.to_owned());
+    }
+}
+
+/// Criteria on the terminal, at most.
+const LINES: usize = 20;
+
+/// A line for every criterion: name, value, demand, and a bar from 0 to 2 in whose middle the demand is.
+fn lines(criteria: &[CriterionReport]) -> String {
+    let name = |criterion: &CriterionReport| format!("{}/{}", criterion.case, criterion.name);
+    let width = criteria.iter().map(|criterion| name(criterion).chars().count()).max().unwrap_or(0);
+    let mut text = String::new();
+    for criterion in criteria.iter().take(LINES) {
+        let unit = if criterion.unit == "1" { "" } else { &criterion.unit };
+        let _ = write!(text, "\n  {:width$}  {:>10} {unit:<6}", name(criterion), number(criterion.value));
+        if criterion.usage != Usage::Monitor {
+            let limit = criterion.demand.or(criterion.bad).map(number).unwrap_or_default();
+            let word = if criterion.met { "met" } else { "not met" };
+            let _ = write!(text, "  demand {limit:>8}  {}  {word}", bar(criterion.scaled));
+        }
+    }
+    if criteria.len() > LINES {
+        let _ = write!(text, "\n  and {} more", criteria.len() - LINES);
+    }
+    text
+}
+
+/// A scaled value as a bar of 20 places; `|` is the demand.
+fn bar(scaled: f64) -> String {
+    let filled = if scaled.is_nan() { 0.0 } else { 10.0 * scaled.clamp(0.0, 2.0) };
+    let place = |i: u32| if f64::from(i) < filled { '=' } else { ' ' };
+    let half = |from: u32| (from..from + 10).map(place).collect::<String>();
+    format!("[{}|{}]", half(0), half(10))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bar;
+
+    #[test]
+    fn the_bar_of_a_criterion_crosses_the_mark_where_the_demand_is_missed() {
+        assert_eq!(bar(0.5), "[=====     |          ]");
+        assert_eq!(bar(1.0), "[==========|          ]");
+        assert_eq!(bar(1.5), "[==========|=====     ]");
+        assert_eq!((bar(9.0), bar(f64::NAN)), ("[==========|==========]".into(), "[          |          ]".into()));
     }
 }

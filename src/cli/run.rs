@@ -6,15 +6,17 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Mistake, Place, Study, Task, suggestion};
+use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Place, Study, Task, Watch, suggestion};
 
 use super::progress::Progress;
 use super::remains::leave;
-use super::study::{StudyArguments, home, open, open_as};
-use super::{Trouble, cannot_write, diagnosis, findings, print, tables};
+use super::study::{StudyArguments, home, open, open_as, without_settings};
+use super::{Trouble, cannot_write, diagnosis, findings, keep, print, tables};
 use crate::diagnosis::Original;
 use crate::report::Report;
-use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solve};
+use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved};
+use crate::store::{Keeper, Opened, Start};
+use crate::watch::{Both, Page};
 
 /// What `mops diagnose` sets.
 const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
@@ -36,6 +38,14 @@ pub(super) struct Common {
     /// Say nothing but errors.
     #[arg(long)]
     quiet: bool,
+    /// Serve a live page of the run to this machine: best point against the demands, convergence, failures, time left.
+    ///
+    /// The address is printed; it holds a secret, and nobody else on the machine or in the network finds it.
+    #[arg(long)]
+    watch: bool,
+    /// Show the best criteria against their demands in the terminal while the run goes.
+    #[arg(long, conflicts_with_all = ["quiet", "json"])]
+    dashboard: bool,
     /// Print result.json on standard output, and nothing else.
     #[arg(long)]
     json: bool,
@@ -56,6 +66,8 @@ enum Language {
 pub(super) struct Arguments {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    keep: keep::Beginning,
     /// Kind of solver, with its default options, instead of the study's.
     #[arg(long)]
     solver: Option<String>,
@@ -67,14 +79,15 @@ pub(super) struct Arguments {
 /// What is done with the study.
 pub(super) enum Search<'a> {
     /// What it is for, with this solver and budget where they are given.
-    Task { solver: Option<&'a str>, max_evaluations: Option<u64> },
+    Task { solver: Option<&'a str>, max_evaluations: Option<u64>, start: Start },
     /// What its model lacks.
     Diagnosis,
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let Arguments { common, solver, max_evaluations } = arguments;
-    go(catalogue, common, &Search::Task { solver: solver.as_deref(), max_evaluations: *max_evaluations })
+    let Arguments { common, keep, solver, max_evaluations } = arguments;
+    let (solver, max_evaluations, start) = (solver.as_deref(), *max_evaluations, keep.start());
+    go(catalogue, common, &Search::Task { solver, max_evaluations, start })
 }
 
 /// Runs the study and leaves the result behind.
@@ -93,9 +106,9 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(seed) = arguments.seed {
         file.study.seed = seed;
     }
-    let (chosen, limit) = match search {
-        Search::Task { solver, max_evaluations } => (*solver, *max_evaluations),
-        Search::Diagnosis => (None, None),
+    let (chosen, limit, start) = match search {
+        Search::Task { solver, max_evaluations, start } => (*solver, *max_evaluations, start),
+        Search::Diagnosis => (None, None, &Start::Fresh),
     };
     let solver = match chosen {
         None => file.solver.clone(),
@@ -115,26 +128,55 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         max_evaluations: limit.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS),
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),
+        keeping: None,
     };
     let talks = !arguments.quiet && !arguments.json;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(&file.study.name));
-    let progress = Progress::new(talks, options.max_evaluations);
+    let mut progress = Progress::new(talks, options.max_evaluations);
+    if arguments.dashboard {
+        progress = progress.with_criteria_of(&file.study);
+    }
     if talks {
         for warning in &file.study.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
         }
         print(&introduction(&file.study, &options));
     }
-    let solved = solve(file.study.clone(), &options, &progress).map_err(|why| refused(&why.0, &file))?;
+    let home = home(catalogue, &arguments.study);
+    let keeper = keep::open((&folder, start), (&file, &arguments.study), &home, &options)?;
+    if let Some(note) = keeper.as_ref().and_then(|keeper| keeper.note.as_ref()).filter(|_| talks) {
+        let _ = writeln!(std::io::stderr(), "note: {note}");
+    }
+    let known = keeper.as_ref().map_or(0, Keeper::known);
+    let page = arguments.watch.then(|| watch(&file.study, &options)).transpose()?;
+    let both = page.as_ref().map(|page| Both { page, other: &progress });
+    let watch: &dyn Watch = both.as_ref().map_or(&progress, |both| both);
+    let (solved, opened) = keep::solve_keeping(&file.study, &options, keeper, watch);
     progress.finish();
+    let solved = match solved {
+        Ok(solved) => solved,
+        Err(why) => {
+            opened.into_iter().for_each(Opened::withdraw);
+            return Err(refused(&why.0, &file).into());
+        }
+    };
+    let told = opened.as_ref().map(|opened| keep::told(start, known, opened)).unwrap_or_default();
 
     let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
     write(&folder, &json, &solved, &file.source.text)?;
+    if let Some(page) = page {
+        page.finish(&folder);
+    }
+    if let Some(trouble) = opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop))) {
+        let _ = writeln!(std::io::stderr(), "warning: not every evaluation could be kept: {trouble}");
+    }
     if let Some(diagnosis) = &solved.diagnosis {
-        let text = without_settings(&file.source.text, &arguments.study.settings, search);
         let (settings, study) = (&arguments.study.settings, solved.problem.study());
+        let extra = matches!(search, Search::Diagnosis).then(|| DIAGNOSIS.to_owned());
+        let all: Vec<String> = settings.iter().cloned().chain(extra).collect();
+        let text = without_settings(&file.source.text, &all);
         let original = Original { text, settings, study, effects: &catalogue.effects };
-        leave(&folder, diagnosis, &original, &home(catalogue, &arguments.study), arguments.export.is_some())?;
+        leave(&folder, diagnosis, &original, &home, arguments.export.is_some())?;
     }
     if arguments.json {
         print(&json);
@@ -146,6 +188,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
             None => print(&tables::outcome(&solved.outcome)),
         }
         print(&findings::text(&solved.outcome));
+        print(&told);
         print(&format!("\nresult, report and plots are in {}\n", folder.display()));
     }
     if solved.best.scaled.is_none() {
@@ -158,6 +201,14 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
+/// The live page of a run; its address is all that is said of it.
+fn watch(study: &Study, options: &Options) -> Result<Page, Trouble> {
+    let cannot = |error| Trouble::Failure(format!("no page can be served for --watch: {error}"));
+    let page = Page::open(study, options.solver.kind, options.max_evaluations).map_err(cannot)?;
+    let _ = writeln!(std::io::stderr(), "watch the run at {}", page.address());
+    Ok(page)
+}
+
 /// A study that cannot be treated; the place is shown where there is one.
 fn refused(why: &Mistake, file: &StudyFile) -> Diagnostic {
     if why.path.is_empty() {
@@ -165,14 +216,6 @@ fn refused(why: &Mistake, file: &StudyFile) -> Diagnostic {
     } else {
         file.locate(why)
     }
-}
-
-/// The text of a study file as it was before the settings of the command line were put at its end.
-fn without_settings<'t>(text: &'t str, settings: &[String], search: &Search<'_>) -> &'t str {
-    let extra = matches!(search, Search::Diagnosis).then_some(DIAGNOSIS);
-    let all: String =
-        settings.iter().map(String::as_str).chain(extra).map(|setting| format!("# --set {setting}\n")).collect();
-    text.strip_suffix(all.as_str()).unwrap_or(text)
 }
 
 fn introduction(study: &Study, options: &Options) -> String {
@@ -196,12 +239,14 @@ fn introduction(study: &Study, options: &Options) -> String {
 }
 
 /// Whether the task of a study needs a solver.
-fn solves(study: &Study) -> bool {
+pub(super) fn solves(study: &Study) -> bool {
     match study.task {
         Task::Design | Task::Calibration => true,
         Task::Excitation | Task::Diagnosis => false,
         Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
         Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
+        Task::WorstCase => study.tasks.worst_case.at == Place::Optimum,
+        Task::MonteCarlo => study.tasks.monte_carlo.at == Place::Optimum,
     }
 }
 
@@ -212,10 +257,27 @@ fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), T
     std::fs::write(&result, json).map_err(cannot_write(&result))?;
     let evaluations = folder.join("evaluations.csv");
     write_evaluations(&evaluations, solved).map_err(|e| cannot_write(&evaluations)(std::io::Error::other(e)))?;
+    if let Some(found) = &solved.outcome.found.monte_carlo {
+        let samples = folder.join("samples.csv");
+        write_samples(&samples, found).map_err(|e| cannot_write(&samples)(std::io::Error::other(e)))?;
+    }
     let Solved { outcome, problem, best, archive, diagnosis } = solved;
     Report { outcome, problem, best, archive, diagnosis: diagnosis.as_ref(), text }
         .write(folder)
         .map_err(cannot_write(folder))
+}
+
+/// One line per sample: uncertain parameters, criteria.
+fn write_samples(path: &Path, found: &MonteCarloReport) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
+    let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
+    writer.write_record(parameters.chain(criteria))?;
+    for (parameters, values) in &found.table {
+        writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
+    }
+    writer.flush()?;
+    Ok(())
 }
 
 /// One line per point: tuners, criteria, objective, violation.

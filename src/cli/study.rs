@@ -90,6 +90,26 @@ pub(super) fn open_as(
     mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
 }
 
+/// Reads a study whose text is known; `home` is the file it was in, or the name of a shipped study.
+pub(super) fn read_at(
+    catalogue: &Catalogue,
+    home: &str,
+    text: &str,
+    settings: &[String],
+) -> Result<StudyFile, Diagnostic> {
+    if let Some(shipped) = catalogue.studies.iter().find(|shipped| shipped.name == home) {
+        return mops_core::file::read(catalogue, &format!("{home}/study.toml"), text, settings, &Inside(*shipped));
+    }
+    let folder = Path::new(home).parent().unwrap_or(Path::new("")).to_owned();
+    mops_core::file::read(catalogue, home, text, settings, &Folder(folder))
+}
+
+/// The text of a study file as it was before settings of the command line were put at its end.
+pub(super) fn without_settings<'t>(text: &'t str, settings: &[String]) -> &'t str {
+    let all: String = settings.iter().map(|setting| format!("# --set {setting}\n")).collect();
+    text.strip_suffix(all.as_str()).unwrap_or(text)
+}
+
 fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagnostic {
     let path = Path::new(study);
     if path.is_dir() {

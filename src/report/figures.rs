@@ -7,6 +7,7 @@ use super::bode;
 use super::comparison::Both;
 use super::numbers::{counted, with_unit};
 use super::plot::Plot;
+use super::uncertainty::{self, Around};
 
 /// More jobs than this are not shown, but only those that come closest to their demands or miss them most.
 const MOST_JOBS: usize = 30;
@@ -91,11 +92,17 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     };
     for channel in case.experiment.iter().flat_map(|e| &e.channels) {
         if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
-            let mut plots = vec![(format!("fit-{place}-{}", signal.name), both.fit(channel, signal, &case.name))];
-            plots.extend(
-                both.residual(channel, signal, &case.name)
-                    .map(|plot| (format!("residual-{place}-{}", signal.name), plot)),
-            );
+            let mut fit = both.fit(channel, signal, &case.name);
+            let bands = |around: Around| {
+                let told = report.outcome.found.uncertainty.as_ref();
+                told.map_or_else(Vec::new, |found| uncertainty::bands(found, &case.name, &signal.name, around))
+            };
+            fit.curves.extend(bands(Around::Prediction));
+            let mut plots = vec![(format!("fit-{place}-{}", signal.name), fit)];
+            plots.extend(both.residual(channel, signal, &case.name).map(|mut plot| {
+                plot.curves.extend(bands(Around::Zero));
+                (format!("residual-{place}-{}", signal.name), plot)
+            }));
             group.figures.push(Figure { plots, caption: captions(&signal.name) });
         }
     }

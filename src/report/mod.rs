@@ -17,15 +17,18 @@ mod page;
 mod plot;
 mod png;
 mod range;
+mod robustness;
 mod sampling;
 mod scene;
 mod sensitivity;
+mod side_by_side;
 mod surface;
 mod svg;
 mod sweep;
 #[cfg(test)]
 mod tests;
 mod tuners;
+mod uncertainty;
 mod verdict;
 
 use std::fs;
@@ -40,6 +43,7 @@ pub(crate) use numbers::{FileNames, file_name, significant};
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
+pub(crate) use side_by_side::{Responses, comparison_page};
 
 /// The style sheet of all pages.
 pub(crate) const STYLE: &str = include_str!("style.css");
@@ -77,9 +81,13 @@ impl Report<'_> {
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
         let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
-        let pictures = page::Pictures { responses, left_out, convergence, sweep, excitation, diagnosis };
-        let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation];
+        let robustness = robustness::sections(self);
+        let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
+        let pictures =
+            page::Pictures { responses, left_out, convergence, sweep, excitation, diagnosis, robustness, uncertainty };
+        let findings = [&pictures.convergence, &pictures.sweep, &pictures.excitation, &pictures.uncertainty];
         let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
+        let groups = groups.chain(pictures.robustness.iter().map(|section| &section.group));
         let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
         let mut names = FileNames::default();
         for (name, plot) in groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots) {
@@ -93,9 +101,11 @@ impl Report<'_> {
     /// Whether a search stands behind the result, and nothing but it.
     fn searched(&self) -> bool {
         match self.outcome.task {
-            Task::Design | Task::Calibration => true,
+            // The rounds of a design against worst cases have objectives of their own.
+            Task::Design | Task::Calibration => self.outcome.found.robust.is_none(),
             Task::Sensitivity => self.archive.len() > 1,
             Task::Excitation | Task::Sweep | Task::Diagnosis => false,
+            Task::WorstCase | Task::MonteCarlo => self.archive.len() > 1,
         }
     }
 

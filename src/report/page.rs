@@ -7,7 +7,7 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::numbers::significant;
 use super::verdict::{self, Tone};
-use super::{calibration, criteria, diagnosis, excitation, sensitivity, tuners};
+use super::{calibration, criteria, diagnosis, excitation, robustness, sensitivity, tuners, uncertainty};
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {
@@ -18,6 +18,8 @@ pub(super) struct Pictures {
     pub(super) sweep: Option<Group>,
     pub(super) excitation: Option<Group>,
     pub(super) diagnosis: Option<diagnosis::Pictures>,
+    pub(super) robustness: Vec<robustness::Section>,
+    pub(super) uncertainty: Option<Group>,
 }
 
 /// The whole page.
@@ -44,6 +46,9 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
                         (diagnosis::sections(found, pictures))
                     }
+                    @for one in &pictures.robustness {
+                        (section(one.title, html! { (one.content) (figures(&one.group)) }))
+                    }
                     @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
                     @if let Some(found) = &outcome.found.sensitivity {
                         (section(sensitivity::title(found), sensitivity::section(found)))
@@ -65,6 +70,12 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
                     @if let Some(results) = &outcome.calibration {
                         (section("Calibration", calibration::section(results)))
+                        @if let Some(found) = &outcome.found.uncertainty {
+                            (section(uncertainty::TITLE, html! {
+                                (uncertainty::section(found))
+                                @if let Some(group) = &pictures.uncertainty { (figures(group)) }
+                            }))
+                        }
                         @if results.sensitivity.is_some() || !results.excitation.is_empty() {
                             (section("What the data can tell", told(results, pictures)))
                         }
@@ -126,6 +137,7 @@ fn header(report: &Report<'_>) -> Markup {
                 } @else {
                     (fact("Solver", &outcome.solver))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
+                    @if let Some(reused) = outcome.reused { (fact("Known before", &reused.to_string())) }
                 }
                 (fact("Simulations", &outcome.simulations.to_string()))
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
@@ -151,6 +163,8 @@ fn task(task: Task) -> &'static str {
         Task::Sensitivity => "Sensitivity",
         Task::Sweep => "Sweep",
         Task::Diagnosis => "Diagnosis",
+        Task::WorstCase => "Worst case",
+        Task::MonteCarlo => "Monte Carlo",
     }
 }
 

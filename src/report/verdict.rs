@@ -22,6 +22,9 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     if outcome.task == Task::Excitation {
         return excitation(outcome);
     }
+    if let Some(told) = super::robustness::verdict(outcome) {
+        return told;
+    }
     if !outcome.objective.is_finite() {
         let why = "No point could be evaluated: at each of them a simulation or a criterion failed.";
         return (Tone::Bad, format!("Failed. {why}"));
@@ -50,6 +53,7 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
             None => (Tone::Bad, "Nothing was swept.".to_owned()),
         },
         Task::Diagnosis => (Tone::Bad, "Nothing was diagnosed.".to_owned()),
+        Task::WorstCase | Task::MonteCarlo => (Tone::Bad, "Nothing was found: the run was interrupted.".to_owned()),
     }
 }
 

@@ -1,9 +1,17 @@
 //! What a study can be for: a line for every task, and a file for each that is more than a search.
 
+mod batches;
 pub(crate) mod diagnosis;
 mod excitation;
+mod global_sensitivity;
+mod monte_carlo;
+mod robust;
 mod sensitivity;
 mod sweep;
+mod uncertainty;
+mod worst_case;
+
+use std::time::Instant;
 
 use mops_core::{Place, Study, Task, Watch};
 
@@ -14,13 +22,24 @@ use crate::solve::{Options, Solved, Unsuitable, look, search};
 /// # Errors
 /// The solver cannot treat the problem.
 pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
-    match study.task {
-        Task::Design | Task::Calibration => search(study, options, watch),
-        Task::Excitation => Ok(excitation::perform(study, options, watch)),
-        Task::Sensitivity => sensitivity::perform(study, options, watch),
-        Task::Sweep => sweep::perform(study, options, watch),
-        Task::Diagnosis => diagnosis::perform(study, options, watch),
-    }
+    let begun = Instant::now();
+    let mut solved = match study.task {
+        Task::Design if study.tasks.robust.is_some() => robust::perform(study, options, watch)?,
+        Task::Design => search(study, options, watch)?,
+        Task::Calibration => {
+            let mut solved = search(study, options, watch)?;
+            uncertainty::add(&mut solved, watch);
+            solved
+        }
+        Task::Excitation => excitation::perform(study, options, watch),
+        Task::Sensitivity => sensitivity::perform(study, options, watch)?,
+        Task::Sweep => sweep::perform(study, options, watch)?,
+        Task::Diagnosis => diagnosis::perform(study, options, watch)?,
+        Task::WorstCase => worst_case::perform(study, options, watch)?,
+        Task::MonteCarlo => monte_carlo::perform(study, options, watch)?,
+    };
+    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    Ok(solved)
 }
 
 /// The point that a task asks for.

@@ -1,14 +1,19 @@
-//! `task = "sensitivity"`: which tuners, or which combinations of them, the data or the criteria determine.
+//! `task = "sensitivity"`: which tuners, or which combinations of them, the data or the criteria determine; or which
+//! uncertain parameters matter.
 
 use mops_core::identification::sensitivity_at;
-use mops_core::{Study, Watch};
+use mops_core::{SensitivityMethod, Study, Watch};
 
-use super::at;
+use super::{at, global_sensitivity};
 use crate::solve::{Options, Solved, Unsuitable};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let task = study.tasks.sensitivity;
     let mut solved = at(task.at, study, options, watch)?;
+    if task.method != SensitivityMethod::Local {
+        global_sensitivity::add(&mut solved, watch);
+        return Ok(solved);
+    }
     // A calibration has found it already.
     let known = solved.outcome.calibration.as_mut().and_then(|calibration| calibration.sensitivity.take());
     let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, task.zero));

@@ -33,7 +33,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     };
     let rows: Vec<Option<f64>> = values.get(1).map_or(vec![None], |ys| ys.iter().map(|&y| Some(y)).collect());
 
-    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, watch);
+    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(options.store(problem));
     let mut merits: Vec<Vec<Merit>> = Vec::new();
     for &y in &rows {
         let points: Vec<Vec<f64>> = values[0].iter().map(|&x| moved(x, y)).collect();

@@ -26,6 +26,8 @@ pub fn shipped() -> Vec<Shipped> {
         study!("pid-design"),
         study!("pid-design-constrained"),
         study!("pid-design-multi-case"),
+        study!("pid-worst-case"),
+        study!("pid-robust"),
         study!("tank-level"),
         study!("multi-model"),
         study!("furuta-calibration", "data/horizontal.csv", "data/upright.csv"),

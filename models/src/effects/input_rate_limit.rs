@@ -25,6 +25,7 @@ impl Definition for InputRateLimit {
             .neutral_at(f64::INFINITY)
             .tried(Trials::Scaled(&[0.3, 1.0, 3.0, 10.0]))];
     const MEMORY: usize = 2;
+    const FREE_START: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { rate: s[0] })

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::clamp;
+use super::terms::{ANY, clamp};
 
 /// `sensor-saturation`.
 pub struct SensorSaturation;
@@ -11,26 +11,41 @@ pub struct SensorSaturation;
 /// At given strengths.
 struct AtStrengths<S> {
     limit: S,
+    side: f64,
 }
 
 impl Definition for SensorSaturation {
     const NAME: &'static str = "sensor-saturation";
-    const ABOUT: &'static str = "The sensor shows no more than a limit, either way.";
-    const FORMULA: &'static str = "clamp(y, -limit, limit)";
+    const ABOUT: &'static str = "The sensor shows nothing beyond a limit: above, below, or either way.";
+    const FORMULA: &'static str = "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit); limit infinite: y";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("limit", "limit", Dimension::VALUE)
-        .neutral_at(f64::INFINITY)
-        .tried(Trials::Within(&[0.6, 0.7, 0.8, 0.9, 0.96]))];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::positive("limit", "limit", Dimension::VALUE)
+            .within(ANY[0], ANY[1])
+            .neutral_at(f64::INFINITY)
+            .tried(Trials::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
+        Strength::shape("side", "the side that is cut", Dimension::ONE, [-1.0, 1.0], Trials::Plain(&[1.0, 0.0, -1.0]))
+            .kept(),
+    ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { limit: s[0] })
+        Box::new(AtStrengths { limit: s[0], side: s[1].value() })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        clamp(at.value, -self.limit, self.limit)
+        let (y, limit) = (at.value, self.limit);
+        if limit.value().is_infinite() {
+            return y;
+        }
+        if self.side == 0.0 {
+            let limit = if limit.value() < 0.0 { -limit } else { limit };
+            return clamp(y, -limit, limit);
+        }
+        let beyond = (y.value() - limit.value()) * self.side > 0.0;
+        if beyond { limit } else { y }
     }
 }

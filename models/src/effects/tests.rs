@@ -194,7 +194,7 @@ fn friction_with_states_takes_energy_over_a_cycle() {
 #[test]
 fn odd_effects_are_odd() {
     let odd = ["viscous-friction", "quadratic-drag", "cubic-drag", "power-friction", "quadratic-loss"];
-    let passing = ["input-saturation", "input-dead-zone", "quadratic-input", "sensor-saturation"];
+    let passing = ["input-saturation", "input-dead-zone", "quadratic-input"];
     let mut even = Even(0.4);
     for effect in effects().iter().filter(|e| odd.contains(&e.name()) || passing.contains(&e.name())) {
         let acting = effect.act(&strengths(effect.as_ref(), &mut even));

@@ -17,7 +17,21 @@ pub(super) struct Actor<S> {
     z: (usize, usize),
     /// What it remembers.
     pub(super) memory: Vec<S>,
+    /// By how much the first value that it lets through differs from the one that comes in.
+    begins: S,
     inertial: bool,
+}
+
+impl<S: Scalar> Actor<S> {
+    /// Moves what it remembers to a moment; gives what it lets through then.
+    pub(super) fn follow(&mut self, at: &At<'_, S>) -> S {
+        let first = self.memory[0].value().is_nan();
+        self.acting.remember(at, &mut self.memory);
+        if first {
+            self.memory[0] += self.begins;
+        }
+        self.acting.recall(at, &self.memory)
+    }
 }
 
 impl WithEffects {
@@ -41,6 +55,7 @@ impl WithEffects {
                 place,
                 z,
                 memory: vec![S::from(f64::NAN); effect.memory()],
+                begins: S::from(0.0),
                 inertial: effect.is_inertial(),
             }
         };
@@ -198,6 +213,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             if let Some(starts) = actor.place.starts {
                 z.iter_mut().zip(&parameters[starts..]).for_each(|(z, &over)| *z += over);
+                self.actors[index].begins = parameters[starts];
             }
             x[first..first + count].copy_from_slice(&z);
         }
@@ -392,8 +408,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             let passed = if actor.memory.is_empty() {
                 actor.acting.value(&at, &x[actor.z.0..actor.z.0 + actor.z.1])
             } else {
-                actor.acting.remember(&at, &mut actor.memory);
-                actor.acting.recall(&at, &actor.memory)
+                actor.follow(&at)
             };
             u[input] = passed;
         }

@@ -86,24 +86,12 @@ impl WithEffects {
                 interface.parameters.push(Parameter { variable, default, range: strength.bounds });
             }
             let starts = effect.free_start().then_some(interface.parameters.len());
-            if effect.free_start() {
-                for k in 0..effect.states() {
-                    let parameter = format!("{name}.start{}", k + 1);
-                    interface.parameters.push(
-                        Parameter::new(
-                            &parameter,
-                            "1",
-                            "start value of a state of the effect, over where it would rest",
-                        )
-                        .with_default(0.0),
-                    );
-                    interface.states.push(State {
-                        name: format!("{name}.{}", k + 1),
-                        start: parameter,
-                        signal: None,
-                        rate_of: None,
-                    });
-                }
+            for k in 0..effect.free_starts() {
+                let parameter = format!("{name}.start{}", k + 1);
+                let about = "start value of a state of the effect, over where it would rest";
+                interface.parameters.push(Parameter::new(&parameter, "1", about).with_default(0.0));
+                let name = format!("{name}.{}", k + 1);
+                interface.states.push(State { name, start: parameter, signal: None, rate_of: None });
             }
             places.push(Place { site: sites.0, companion: sites.1, strengths, starts });
         }

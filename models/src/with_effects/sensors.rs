@@ -48,8 +48,7 @@ impl<S: Opening> Driven<'_, S> {
                             other_speed: zero,
                             u: &[],
                         };
-                        actor.acting.remember(&at, &mut actor.memory);
-                        let measured = actor.acting.recall(&at, &actor.memory);
+                        let measured = actor.follow(&at);
                         nodes[0][node] = measured.value();
                         (0..S::DIRECTIONS).for_each(|d| nodes[1 + d][node] = measured.tangents()[d]);
                     }

@@ -1,11 +1,13 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
 //! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
 
+mod content;
 mod effects;
 mod entries;
 mod experiment;
 mod frequency;
 mod parts;
+mod robustness;
 mod schema;
 mod sections;
 mod shape;
@@ -54,6 +56,10 @@ pub struct StudyFile {
     pub max_evaluations: Option<usize>,
     /// Its text, with the settings of the command line at the end.
     pub source: Arc<Source>,
+    /// What it says, settings included, without comments and layout.
+    pub content: serde_json::Value,
+    /// The data files that were read, by the names the study has for them, with a digest of their bytes.
+    pub data: Vec<(String, String)>,
 }
 
 impl StudyFile {
@@ -84,6 +90,7 @@ pub fn read(
 
 fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
+    let files = &content::Listed::new(files);
     let tables = ["study", "models", "tuners", "cases", "experiments", "criteria", "solver"];
     root.check_keys(&[&tables[..], &tasks::TABLES[..]].concat())?;
     let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
@@ -119,7 +126,8 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
     draft.tasks = tasks::read(&root, catalogue)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
-    Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()) })
+    let (content, data) = (content::of(root.value()), files.digests());
+    Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()), content, data })
 }
 
 /// The one key of a table that is not among the common ones, as a kind of the catalogue.

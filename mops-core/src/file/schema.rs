@@ -7,6 +7,9 @@ use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
 use super::entries::Entries;
+use super::robustness::{
+    MonteCarloSection, RobustSection, UncertainSection, UncertainTable, UncertaintySection, WorstCaseSection,
+};
 use super::sections::{
     CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection,
     TunerSection,
@@ -53,6 +56,11 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "sensitivity": value(schema_of::<SensitivitySection>()),
             "sweep": value(schema_of::<SweepSection>()),
             "diagnosis": value(schema_of::<DiagnosisSection>()),
+            "uncertain": value(schema_of::<UncertainTable>()),
+            "worst-case": value(schema_of::<WorstCaseSection>()),
+            "robust": value(schema_of::<RobustSection>()),
+            "monte-carlo": value(schema_of::<MonteCarloSection>()),
+            "uncertainty": value(schema_of::<UncertaintySection>()),
         },
     })
 }
@@ -154,6 +162,11 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("sensitivity", schema_of::<SensitivitySection>()),
         ("sweep", schema_of::<SweepSection>()),
         ("diagnosis", schema_of::<DiagnosisSection>()),
+        ("uncertain", schema_of::<UncertainSection>()),
+        ("worst-case", schema_of::<WorstCaseSection>()),
+        ("robust", schema_of::<RobustSection>()),
+        ("monte-carlo", schema_of::<MonteCarloSection>()),
+        ("uncertainty", schema_of::<UncertaintySection>()),
     ]
 }
 

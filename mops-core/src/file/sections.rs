@@ -19,7 +19,8 @@ use crate::unit::{Quantity, Unit};
 pub(super) struct StudySection {
     /// Name, as it stands in reports.
     pub name: String,
-    /// What it is for: `design` (the default), `calibration`, `diagnosis`, `excitation`, `sensitivity` or `sweep`.
+    /// What it is for: `design` (the default), `calibration`, `diagnosis`, `excitation`, `monte-carlo`, `sensitivity`, `sweep`
+    /// or `worst-case`.
     #[serde(default)]
     pub task: Task,
     /// How scaled values are combined: `max` (of a design) or `sum` (of a calibration).

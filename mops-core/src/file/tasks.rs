@@ -3,12 +3,14 @@
 use schemars::JsonSchema;
 
 use super::entries::{Entries, Short};
+use super::robustness;
 use super::tree::Node;
 use super::{Diagnostic, read_seconds};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::study::{
-    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, Place, RegressionDraft, SensitivityTask, SweepDraft, TasksDraft,
+    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, Place, RegressionDraft, SensitivityMethod, SensitivityTask,
+    SweepDraft, TasksDraft,
 };
 use crate::unit::Quantity;
 
@@ -60,6 +62,13 @@ pub(super) struct SensitivitySection {
     pub at: Place,
     /// Share of the largest singular value below which one counts as zero; the accuracy of the slopes where absent.
     pub zero: Option<f64>,
+    /// `local` (the default): slopes along the tuners. Over the box of [uncertain] instead: `morris`, elementary effects,
+    /// which tell at little cost what matters at all; `sobol`, shares of the variance.
+    #[serde(default)]
+    pub method: SensitivityMethod,
+    /// Of `morris` the number of trajectories (20 where absent), each of one simulation more than there are uncertain
+    /// parameters; of `sobol` that of samples (512), each of two more.
+    pub samples: Option<usize>,
 }
 
 /// What `task = "sweep"` draws: the objective over one tuner, or over two.
@@ -111,7 +120,17 @@ pub(super) struct DiagnosisSection {
 }
 
 /// Names of the tables, as they stand at the top of a study file.
-pub(super) const TABLES: [&str; 4] = ["excitation", "sensitivity", "sweep", "diagnosis"];
+pub(super) const TABLES: [&str; 9] = [
+    "excitation",
+    "sensitivity",
+    "sweep",
+    "diagnosis",
+    "uncertain",
+    "worst-case",
+    "robust",
+    "monte-carlo",
+    "uncertainty",
+];
 
 /// Reads the tables of all tasks; what is absent has its defaults.
 pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {
@@ -133,7 +152,8 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
     }
     if let Some(node) = root.child("sensitivity") {
         let section: SensitivitySection = node.read()?;
-        tasks.sensitivity = SensitivityTask { at: section.at, zero: section.zero };
+        let SensitivitySection { at, zero, method, samples } = section;
+        tasks.sensitivity = SensitivityTask { at, zero, method, samples };
     }
     if let Some(node) = root.child("sweep") {
         let section: SweepSection = node.read()?;
@@ -155,6 +175,7 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
         let (max_effects, level) = (max_effects.unwrap_or(usual.max_effects), level.unwrap_or(usual.level));
         tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without };
     }
+    robustness::read(root, &mut tasks)?;
     Ok(tasks)
 }
 

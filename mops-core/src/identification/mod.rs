@@ -2,6 +2,7 @@
 //! linear regressions (FIR, ARX) that answer without a simulation. Pure computation on numbers and Jacobians.
 
 mod blind;
+mod covariance;
 mod excitation;
 mod fitted;
 mod insight;
@@ -14,6 +15,7 @@ mod whiteness;
 mod words;
 
 pub use blind::BlindDirection;
+pub use covariance::Covariance;
 pub use excitation::{Excitation, excitation};
 pub use fitted::regressions;
 pub use insight::{ExcitationQuestion, excitation_report, excitations, sensitivity_at, spacing};

@@ -2,8 +2,12 @@
 
 mod build;
 mod diagnosis;
+mod distribution;
 mod draft;
+mod robustness;
+mod scenarios;
 mod tasks;
+mod uncertain;
 
 use std::sync::Arc;
 
@@ -11,11 +15,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use diagnosis::DiagnosisTask;
+pub use distribution::{Distribution, Uncertain};
 pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
+pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
+pub use scenarios::Scenario;
 pub use tasks::{
     Axis, AxisDraft, ExcitationDraft, ExcitationTask, Place, RegressionDraft, RegressionTask, SensitivityTask,
     SweepDraft, SweepTask, Tasks, TasksDraft,
 };
+pub use uncertain::{DistributionDraft, UncertainDraft};
 
 use crate::case::Case;
 use crate::criterion::{Criterion, Demand, Usage};
@@ -26,7 +34,7 @@ use crate::unit::Unit;
 
 /// What a study is for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Task {
     /// Choose the tuners so that the worst scaled criterion is as small as it can be.
     #[default]
@@ -41,6 +49,10 @@ pub enum Task {
     Sweep,
     /// Find the physical effect that the model lacks.
     Diagnosis,
+    /// Find the largest scaled value of every criterion over a box of uncertain parameters.
+    WorstCase,
+    /// Tell how the criteria are distributed where parameters are uncertain.
+    MonteCarlo,
 }
 
 /// How the scaled values become one number to minimise.
@@ -145,6 +157,33 @@ impl Study {
         &self.cases[self.jobs[row.job].case]
     }
 
+    /// Whether the same values of all tuners give the same values of all rows in both studies: they have the same models,
+    /// criteria, cases and tuners. Demands, usages and weights may differ, and the roles of experiments.
+    pub fn measures_as(&self, other: &Self) -> bool {
+        let same_case = |a: &Case, b: &Case| {
+            (&a.name, &a.parameters, &a.inputs) == (&b.name, &b.parameters, &b.inputs)
+                && (a.horizon, a.begins) == (b.horizon, b.begins)
+                && match (&a.experiment, &b.experiment) {
+                    (Some(a), Some(b)) => a.channels == b.channels && a.responses == b.responses,
+                    (a, b) => a.is_none() && b.is_none(),
+                }
+        };
+        let same_job = |a: &JobPlan, b: &JobPlan| {
+            (a.model, a.case, &a.parameters, &a.signals, a.horizon)
+                == (b.model, b.case, &b.parameters, &b.signals, b.horizon)
+        };
+        let same_row = |a: &Row, b: &Row| a.job == b.job && Arc::ptr_eq(&a.criterion, &b.criterion);
+        let same_tuner = |a: &Tuner, b: &Tuner| {
+            let range = |t: &Tuner| (t.bounds.map(f64::to_bits), t.scale, t.grid.clone(), t.active);
+            (&a.name, a.case, a.tie.is_some(), range(a)) == (&b.name, b.case, b.tie.is_some(), range(b))
+        };
+        same(&self.models, &other.models, |(_, a), (_, b)| Arc::ptr_eq(a, b))
+            && same(&self.cases, &other.cases, same_case)
+            && same(&self.jobs, &other.jobs, same_job)
+            && same(&self.rows, &other.rows, same_row)
+            && same(&self.tuners, &other.tuners, same_tuner)
+    }
+
     /// Start values of all tuners, ties applied.
     pub fn start(&self) -> Vec<f64> {
         let mut values: Vec<f64> = self.tuners.iter().map(|t| t.start).collect();
@@ -181,4 +220,9 @@ impl Study {
         };
         job.parameters.iter().map(slope).collect()
     }
+}
+
+/// Whether two lists are as long, and the same one by one.
+fn same<T>(a: &[T], b: &[T], alike: impl Fn(&T, &T) -> bool) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| alike(a, b))
 }

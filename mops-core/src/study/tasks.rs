@@ -1,7 +1,10 @@
 //! What tasks other than design and calibration are asked: as it is written down, and checked.
 
 use super::diagnosis::{self, DiagnosisTask};
+use super::distribution::Uncertain;
 use super::draft::Mistake;
+use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
+use super::uncertain::{self, UncertainDraft};
 use super::{Study, Task};
 use crate::diagnostic::suggestion;
 use crate::experiment::Role;
@@ -31,6 +34,16 @@ pub struct TasksDraft {
     pub sweep: Option<SweepDraft>,
     /// Of `diagnosis`.
     pub diagnosis: DiagnosisTask,
+    /// Parameters that are not known exactly, by name.
+    pub uncertain: Vec<(String, UncertainDraft)>,
+    /// Of `worst-case`.
+    pub worst_case: WorstCaseTask,
+    /// Of a design against the worst cases, if it is one.
+    pub robust: Option<RobustTask>,
+    /// Of `monte-carlo`.
+    pub monte_carlo: MonteCarloTask,
+    /// Of the uncertainty of a calibration's estimates, if more than standard errors are asked for.
+    pub uncertainty: Option<UncertaintyTask>,
 }
 
 /// What the tasks of a study are asked.
@@ -44,6 +57,16 @@ pub struct Tasks {
     pub sweep: Option<SweepTask>,
     /// Of `diagnosis`.
     pub diagnosis: DiagnosisTask,
+    /// Parameters that are not known exactly.
+    pub uncertain: Vec<Uncertain>,
+    /// Of `worst-case`.
+    pub worst_case: WorstCaseTask,
+    /// Of a design against the worst cases, if it is one.
+    pub robust: Option<RobustTask>,
+    /// Of `monte-carlo`.
+    pub monte_carlo: MonteCarloTask,
+    /// Of the uncertainty of a calibration's estimates, if more than standard errors are asked for.
+    pub uncertainty: Option<UncertaintyTask>,
 }
 
 /// Which inputs are looked at, as it is written down.
@@ -117,6 +140,10 @@ pub struct SensitivityTask {
     pub at: Place,
     /// Share of the largest singular value below which one counts as zero; that of the slopes' accuracy where absent.
     pub zero: Option<f64>,
+    /// Slopes at the point, or effects over the uncertain parameters.
+    pub method: SensitivityMethod,
+    /// Of `morris` the number of trajectories, of `sobol` that of samples; their defaults where absent.
+    pub samples: Option<usize>,
 }
 
 /// Which tuners are swept, as it is written down.
@@ -192,7 +219,19 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
             .within("study"));
     }
     let diagnosis = diagnosis::check(draft.diagnosis, study)?;
-    Ok(Tasks { excitation, sensitivity: draft.sensitivity, sweep, diagnosis })
+    let tasks = Tasks {
+        excitation,
+        sensitivity: draft.sensitivity,
+        sweep,
+        diagnosis,
+        uncertain: uncertain::check(draft.uncertain, study)?,
+        worst_case: draft.worst_case,
+        robust: draft.robust,
+        monte_carlo: draft.monte_carlo,
+        uncertainty: draft.uncertainty,
+    };
+    robustness::check(&tasks, study)?;
+    Ok(tasks)
 }
 
 fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, Mistake> {

@@ -1,5 +1,6 @@
-//! Writes cases into a folder: `generate FOLDER [COUNT] [SEED]` draws a mix; `generate FOLDER all SEED` writes nothing, and
-//! shows which sizes every effect reaches in every plant.
+//! Writes cases into a folder: `generate FOLDER [COUNT] [SEED]` draws a mix; `generate FOLDER one SEED PLANT EFFECTS SIZE`
+//! writes a case that a benchmark named, with the effects joined by `+`; `generate FOLDER all SEED` writes nothing, and shows
+//! which sizes every effect reaches in every plant.
 
 use std::path::Path;
 use std::time::Instant;
@@ -9,12 +10,13 @@ use mops_testbed::{Draw, Effect, Missing, SIZES, effects, generate, outside, pla
 fn main() -> std::io::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let Some(folder) = arguments.first().map(Path::new) else {
-        eprintln!("generate FOLDER [COUNT | all] [SEED]");
+        eprintln!("generate FOLDER [COUNT | one | all] [SEED] [PLANT EFFECTS SIZE]");
         return Ok(());
     };
     let seed = arguments.get(2).and_then(|s| s.parse().ok()).unwrap_or(1);
     match arguments.get(1).map(String::as_str) {
         Some("all") => all(seed),
+        Some("one") => one(folder, seed, &arguments[3..]),
         count => mix(folder, count.and_then(|c| c.parse().ok()).unwrap_or(40), seed),
     }
 }
@@ -44,6 +46,22 @@ fn mix(folder: &Path, count: usize, seed: u64) -> std::io::Result<()> {
             written += 1;
         }
     }
+    Ok(())
+}
+
+/// The case of a seed.
+fn one(folder: &Path, seed: u64, of: &[String]) -> std::io::Result<()> {
+    let [plant, effects, size] = of else { return Err(std::io::Error::other("PLANT EFFECTS SIZE are missing")) };
+    let names: Vec<&str> = effects.split('+').collect();
+    let missing = match names[..] {
+        ["none"] => Missing::Nothing,
+        [outside] if outside.starts_with("outside-") => Missing::Outside(&outside["outside-".len()..]),
+        _ => Missing::Effects(&names),
+    };
+    let size = size.parse().map_err(std::io::Error::other)?;
+    let trial = generate(plant, missing, size, seed).ok_or_else(|| std::io::Error::other("there is no such case"))?;
+    trial.write(&folder.join(&trial.name))?;
+    println!("{:60} reached {:.3}", trial.name, trial.truth.size);
     Ok(())
 }
 

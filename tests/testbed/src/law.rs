@@ -53,8 +53,10 @@ pub enum Spot {
 /// An effect with all its numbers. What it does not do is `None`.
 #[derive(Default)]
 pub struct Law {
-    /// Start values of own states.
+    /// Start values of own states, where `begin` gives no others.
     pub states: Vec<f64>,
+    /// Writes the start values of own states in an experiment, from where the plant and its commands begin.
+    pub begin: Option<Own>,
     /// Derivatives of own states.
     pub rates: Option<Own>,
     /// Moves own states after every step, as play does; the time of the step plays no part.

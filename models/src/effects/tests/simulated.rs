@@ -179,15 +179,23 @@ fn an_actuator_of_limited_rate_takes_its_time() {
     let model = with(BLOCK, "input-rate-limit", "actuator:u", None);
     // To 2 in 0.5 s from 1 s on, and back to 0 from 3 s on.
     let pulse = Input::Sampled { times: vec![0.0, 1.0, 3.0], values: vec![0.0, 2.0, 0.0], hold: Hold::Zero };
-    let found = values(&model, &[1.0, 0.0, 0.0, 4.0], pulse, "v", &[1.0, 1.25, 1.5, 3.0, 3.25, 3.5, 4.0]);
+    let found = values(&model, &[1.0, 0.0, 0.0, 4.0, 0.0], pulse, "v", &[1.0, 1.25, 1.5, 3.0, 3.25, 3.5, 4.0]);
     close(&found, &[0.0, 0.125, 0.5, 3.5, 3.875, 4.0, 4.0], 5e-6);
+}
+
+#[test]
+fn an_actuator_of_limited_rate_begins_where_its_free_start_value_says() {
+    let model = with(BLOCK, "input-rate-limit", "actuator:u", None);
+    // From 1 to the command 0 in 0.25 s.
+    let found = values(&model, &[1.0, 0.0, 0.0, 4.0, 1.0], NOTHING, "v", &[0.125, 0.25, 1.0]);
+    close(&found, &[0.09375, 0.125, 0.125], 5e-6);
 }
 
 #[test]
 fn play_at_an_actuator_waits_for_half_its_gap() {
     let model = with(BLOCK, "backlash", "actuator:u", None);
     let pulse = Input::Sampled { times: vec![0.0, 1.0, 2.0, 3.0], values: vec![0.0, 2.0, 1.5, 0.0], hold: Hold::Zero };
-    let found = values(&model, &[1.0, 0.0, 0.0, 1.0], pulse, "v", &[1.0, 2.0, 3.0, 4.0]);
+    let found = values(&model, &[1.0, 0.0, 0.0, 1.0, 0.0], pulse, "v", &[1.0, 2.0, 3.0, 4.0]);
     close(&found, &[0.0, 1.5, 3.0, 3.5], 1e-9);
 }
 
@@ -197,7 +205,7 @@ fn play_at_a_sensor_keeps_what_it_shows_where_the_motion_turns() {
     // x = 1 - cos t; shown is x - 0.25 as it rises, and 1.75 behind the turn until x is below 1.5.
     let cosine = Input::Sine { amplitude: 1.0, frequency: 1.0 / TAU, phase: PI / 2.0, offset: 0.0 };
     let times = [1.0, 2.0, 3.1, 3.5, 4.0, 5.0, 6.0];
-    let found = values(&model, &[1.0, 0.0, 0.0, 0.5], cosine, "x", &times);
+    let found = values(&model, &[1.0, 0.0, 0.0, 0.5, 0.0], cosine, "x", &times);
     let shown = |t: f64| {
         let x = 1.0 - t.cos();
         if t < PI { x - 0.25 } else { (x + 0.25).min(1.75) }
@@ -367,7 +375,7 @@ fn what_stores_energy_gives_it_back() {
 
 #[test]
 fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
-    let cases: [(&str, &[f64], f64, f64); 18] = [
+    let cases: [(&str, &[f64], f64, f64); 23] = [
         ("input-bias", &[0.3], 1.0, 1.3),
         ("input-gain", &[-0.2], 2.0, 1.6),
         ("input-saturation", &[1.5], -2.0, -1.5),
@@ -380,7 +388,12 @@ fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
         ("input-quantisation", &[0.25], 0.9, 1.0),
         ("sensor-bias", &[0.3], 1.0, 1.3),
         ("sensor-gain", &[-0.2], 2.0, 1.6),
-        ("sensor-saturation", &[1.5], 2.0, 1.5),
+        ("sensor-saturation", &[1.5, 0.0], 2.0, 1.5),
+        ("sensor-saturation", &[1.5, 0.0], -2.0, -1.5),
+        ("sensor-saturation", &[1.5, 1.0], 2.0, 1.5),
+        ("sensor-saturation", &[1.5, 1.0], -2.0, -2.0),
+        ("sensor-saturation", &[-1.5, -1.0], -2.0, -1.5),
+        ("sensor-saturation", &[-1.5, -1.0], 2.0, 2.0),
         ("sensor-quantisation", &[0.25], -0.9, -1.0),
         ("sensor-dead-zone", &[0.5, 1.0], 2.0, 1.5),
         ("sensor-dead-zone", &[0.5, 1.0], 1.3, 1.0),

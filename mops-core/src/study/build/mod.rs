@@ -60,15 +60,14 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         }
     }
 
-    let objective =
-        draft.objective.unwrap_or(match draft.task {
-            Task::Design => Objective::Max,
-            Task::Calibration | Task::Diagnosis => Objective::Sum,
-            // As the study of which they tell would be solved.
-            Task::Excitation | Task::Sensitivity | Task::Sweep => {
-                if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
-            }
-        });
+    let objective = draft.objective.unwrap_or(match draft.task {
+        Task::Design => Objective::Max,
+        Task::Calibration | Task::Diagnosis => Objective::Sum,
+        // As the study of which they tell would be solved.
+        Task::Excitation | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => {
+            if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
+        }
+    });
     let notes = drafts.iter().flat_map(|case| assumed_units(case, &models)).collect();
     let mut study = Study {
         name: draft.name,
@@ -111,5 +110,9 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     study.tasks = tasks::build(draft.tasks, &study)?;
+    if study.task == Task::Design && !study.tasks.uncertain.is_empty() && study.tasks.robust.is_none() {
+        let fact = "the design takes no notice of [uncertain]: a table [robust] makes it one against the worst cases";
+        study.notes.push(fact.to_owned());
+    }
     Ok(study)
 }

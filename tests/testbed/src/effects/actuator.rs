@@ -1,17 +1,16 @@
 //! What an actuator makes of its command.
 
-use super::{Effect, Family, Scene, any_actuator, real_actuator};
-use crate::law::Law;
+use super::{Effect, Family, any_actuator, real_actuator};
+use crate::law::{Law, Own};
 
 /// A curve of the command.
 fn curve(f: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
     Law { actuate: Some(Box::new(move |_, u| f(u))), ..Law::default() }
 }
 
-/// What acts at the start: the first command, or nothing as after switching on.
-fn first(s: &Scene<'_>) -> f64 {
-    let crate::law::Spot::Actuator(i) = s.spot else { return 0.0 };
-    if s.chance(0.6) { s.setup.inputs[i][0] } else { 0.0 }
+/// What acts at the start of an experiment: the first command, or nothing as after switching on.
+fn first(from_command: bool) -> Option<Own> {
+    from_command.then(|| -> Own { Box::new(|at, z| z[0] = at.q) })
 }
 
 pub const ALL: &[Effect] = &[
@@ -27,12 +26,13 @@ pub const ALL: &[Effect] = &[
         name: "actuator-lag",
         fits: real_actuator,
         build: |s| {
-            let (start, most) = (first(s), (0.12 * s.setup.duration()).min(80.0 * s.setup.dt));
+            let (from_command, most) = (s.chance(0.6), (0.12 * s.setup.duration()).min(80.0 * s.setup.dt));
             let least = 0.05 * s.setup.dt;
             Family::up_to(most, move |time| {
                 let slow = time.max(least);
                 let law = Law {
-                    states: vec![start],
+                    states: vec![0.0],
+                    begin: first(from_command),
                     rates: Some(Box::new(move |at, dz| dz[0] = (at.q - at.z[0]) / slow)),
                     actuate: Some(Box::new(|at, _| at.z[0])),
                     ..Law::default()
@@ -105,11 +105,12 @@ pub const ALL: &[Effect] = &[
         fits: real_actuator,
         build: |s| {
             // The limit is neutral at infinity: what is open is its inverse.
-            let (start, peak, quick) = (first(s), s.peak(), 0.1 * s.setup.dt);
+            let (from_command, peak, quick) = (s.chance(0.6), s.peak(), 0.1 * s.setup.dt);
             Family::up_to(0.25 * s.setup.duration(), move |slowness| {
                 let limit = peak / slowness;
                 let law = Law {
-                    states: vec![start],
+                    states: vec![0.0],
+                    begin: first(from_command),
                     rates: Some(Box::new(move |at, dz| dz[0] = ((at.q - at.z[0]) / quick).clamp(-limit, limit))),
                     actuate: Some(Box::new(|at, _| at.z[0])),
                     ..Law::default()
@@ -122,10 +123,11 @@ pub const ALL: &[Effect] = &[
         name: "backlash",
         fits: real_actuator,
         build: |s| {
-            let start = first(s);
+            let from_command = s.chance(0.6);
             Family::up_to(0.6 * s.peak(), move |gap| {
                 let law = Law {
-                    states: vec![start],
+                    states: vec![0.0],
+                    begin: first(from_command),
                     settle: Some(Box::new(move |at, z| z[0] = z[0].clamp(at.q - gap, at.q + gap))),
                     actuate: Some(Box::new(|at, _| at.z[0])),
                     ..Law::default()

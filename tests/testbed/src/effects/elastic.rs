@@ -124,12 +124,12 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             // A mass on a spring: z'' = w0^2 (q - z) + 2 zeta w0 (v - z'), which pulls back with m z''.
             let w0 = (s.omega * s.between(1.3, 4.0)).min(1.5 / s.setup.dt * 0.2);
-            let (zeta, start) = (s.between(0.02, 0.1), s.joint()?.state());
-            let (q0, v0) = (s.setup.start[start], s.setup.start[s.joint()?.equation()]);
+            let zeta = s.between(0.02, 0.1);
             Family::up_to(0.8 * s.inertia.abs(), move |m| {
                 let pull = move |q: f64, v: f64, z: &[f64]| w0 * w0 * (q - z[0]) + 2.0 * zeta * w0 * (v - z[1]);
                 let law = Law {
-                    states: vec![q0, v0],
+                    states: vec![0.0; 2],
+                    begin: Some(Box::new(|at, z| z.copy_from_slice(&[at.q, at.v]))),
                     rates: Some(Box::new(move |at, dz| {
                         dz[0] = at.z[1];
                         dz[1] = pull(at.q, at.v, at.z);

@@ -79,10 +79,11 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             // Walls: z' = (T - z)/time, which take coupling*(T - z).
             let time = s.setup.duration() * s.between(0.03, 0.15);
-            let start = s.setup.start[s.joint()?.state()] + s.between(-3.0, 3.0);
+            let apart = s.between(-3.0, 3.0);
             Family::up_to(4.0 * s.force / s.reach(), move |k| {
                 let law = Law {
-                    states: vec![start],
+                    states: vec![0.0],
+                    begin: Some(Box::new(move |at, z| z[0] = at.q + apart)),
                     rates: Some(Box::new(move |at, dz| dz[0] = (at.q - at.z[0]) / time)),
                     force: Some(Box::new(move |at| -k * (at.q - at.z[0]))),
                     ..Law::default()

@@ -48,13 +48,12 @@ pub const ALL: &[Effect] = &[
         name: "sensor-lag",
         fits: any_sensor,
         build: |s| {
-            let Spot::Sensor(o) = s.spot else { return None };
-            let start = s.setup.start[s.plant.outputs[o].state];
             let (most, least) = ((0.08 * s.setup.duration()).min(60.0 * s.setup.dt), 0.05 * s.setup.dt);
             Family::up_to(most, move |time| {
                 let slow = time.max(least);
                 let law = Law {
-                    states: vec![start],
+                    states: vec![0.0],
+                    begin: Some(Box::new(|at, z| z[0] = at.q)),
                     rates: Some(Box::new(move |at, dz| dz[0] = (at.q - at.z[0]) / slow)),
                     sense: Some(Box::new(|at, _| at.z[0])),
                     ..Law::default()

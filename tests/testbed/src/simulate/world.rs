@@ -67,6 +67,12 @@ impl<'a> World<'a> {
         // What a delayed measurement shows at first has happened before.
         let mut past: Vec<(f64, State)> = Vec::new();
         self.commands(0.0);
+        for (i, effect) in self.effects.iter().enumerate() {
+            if let Some(begin) = &effect.law.begin {
+                let plant = x;
+                begin(&self.at(i, 0.0, &plant), &mut x[self.own[i]..][..effect.law.states.len()]);
+            }
+        }
         self.settle(-before, &mut x);
         self.begin(-before, &x);
         if before > 0.0 {

@@ -1,0 +1,20 @@
+//! Statistics of samples: how points are drawn, what values tell of their distribution, and whose variance it is. Pure
+//! computation on numbers.
+
+mod blocks;
+mod elementary;
+mod sampling;
+mod share;
+mod sobol_sequence;
+mod student;
+mod summary;
+mod variance;
+
+pub use blocks::moving_blocks;
+pub use elementary::{ElementaryEffect, elementary_effects, trajectories};
+pub use sampling::{Sampling, draw};
+pub use share::share_interval;
+pub use sobol_sequence::{MOST_DIMENSIONS, sobol_sequence};
+pub use student::t_quantile;
+pub use summary::{Summary, quantile, quantile_interval};
+pub use variance::{VarianceShares, radial, variance_shares};

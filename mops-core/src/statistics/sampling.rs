@@ -1,0 +1,100 @@
+//! Points of the unit cube: at random, in a Latin hypercube, or of a scrambled Sobol sequence.
+
+use rand::Rng;
+use rand::seq::SliceRandom;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::sobol_sequence::{MOST_DIMENSIONS, sobol_sequence};
+use crate::random::Stream;
+
+/// How samples are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Independently. Intervals of confidence hold as they are told.
+    #[default]
+    Random,
+    /// Of every parameter, one value in each of as many equally probable ranges as there are samples. Means are more
+    /// accurate than intervals of confidence say.
+    LatinHypercube,
+    /// A Sobol sequence with a random digital shift; the same remark. Up to 21 parameters; more are drawn at random.
+    Sobol,
+}
+
+/// `count` points of the open unit cube.
+pub fn draw(method: Sampling, count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
+    match method {
+        Sampling::Sobol if dimensions <= MOST_DIMENSIONS => shifted(count, dimensions, random),
+        Sampling::LatinHypercube => latin_hypercube(count, dimensions, random),
+        Sampling::Random | Sampling::Sobol => {
+            (0..count).map(|_| (0..dimensions).map(|_| inner(random.random())).collect()).collect()
+        }
+    }
+}
+
+/// Away from the ends, where quantiles may be infinite.
+fn inner(u: f64) -> f64 {
+    u.clamp(f64::EPSILON, 1.0 - f64::EPSILON)
+}
+
+/// Every coordinate has all its digits changed by the same random ones, so that each point is uniform and together they
+/// still fill the cube evenly. Source: C. Lemieux, Monte Carlo and Quasi-Monte Carlo Sampling (2009), section 6.2.
+fn shifted(count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
+    let shifts: Vec<u32> = (0..dimensions).map(|_| random.random()).collect();
+    // The middle of the cell that 32 digits leave.
+    let fraction = |x: u32| (f64::from(x) + 0.5) / 4_294_967_296.0;
+    let points = sobol_sequence(count, dimensions).into_iter();
+    points.map(|point| point.iter().zip(&shifts).map(|(x, shift)| fraction(x ^ shift)).collect()).collect()
+}
+
+/// Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245.
+#[allow(clippy::cast_precision_loss)]
+fn latin_hypercube(count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
+    let mut points = vec![vec![0.0; dimensions]; count];
+    for j in 0..dimensions {
+        let mut cells: Vec<usize> = (0..count).collect();
+        cells.shuffle(random);
+        for (point, cell) in points.iter_mut().zip(cells) {
+            point[j] = inner((cell as f64 + random.random::<f64>()) / count as f64);
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::stream;
+
+    const ALL: [Sampling; 3] = [Sampling::Random, Sampling::LatinHypercube, Sampling::Sobol];
+
+    #[test]
+    fn points_lie_inside_the_cube_and_depend_on_the_seed_alone() {
+        for method in ALL {
+            let points = |seed| draw(method, 100, 5, &mut stream(seed, "test"));
+            assert!(points(1).iter().flatten().all(|u| (0.0..1.0).contains(u) && *u > 0.0), "{method:?}");
+            assert!(points(1) == points(1) && points(1) != points(2), "{method:?}");
+        }
+    }
+
+    /// The mean of `u1 u2` is 1/4. Independent draws err by 0.0069 (one standard deviation), the others by less.
+    #[test]
+    fn means_are_those_of_the_uniform_distribution() {
+        for (method, error) in ALL.into_iter().zip([0.021, 0.01, 0.001]) {
+            let points = draw(method, 1024, 2, &mut stream(3, "test"));
+            let mean = points.iter().map(|p| p[0] * p[1]).sum::<f64>() / 1024.0;
+            assert!((mean - 0.25).abs() < error, "{method:?}: {mean}");
+        }
+    }
+
+    #[test]
+    fn a_latin_hypercube_has_one_point_in_every_row() {
+        let points = draw(Sampling::LatinHypercube, 50, 3, &mut stream(1, "test"));
+        for j in 0..3 {
+            let mut cells: Vec<usize> = points.iter().map(|p| (p[j] * 50.0) as usize).collect();
+            cells.sort_unstable();
+            assert_eq!(cells, (0..50).collect::<Vec<_>>());
+        }
+    }
+}

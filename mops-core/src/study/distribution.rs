@@ -1,0 +1,158 @@
+//! What is known of an uncertain parameter: its range, and how its values are distributed.
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::unit::Unit;
+
+/// A parameter of models, or a tuner, that is not known exactly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertain {
+    /// Name of the parameter, or of the tuner.
+    pub name: String,
+    /// The tuner, by index, where it is one.
+    pub tuner: Option<usize>,
+    /// Unit of all numbers.
+    pub unit: Unit,
+    /// Smallest and largest value; infinite where there is none.
+    pub bounds: [f64; 2],
+    /// Of a tuner: the share of its value by which it is off at most; the bounds follow from the design.
+    pub tolerance: Option<f64>,
+    /// How values are distributed.
+    pub distribution: Distribution,
+}
+
+/// How the values of an uncertain parameter are distributed; what lies outside its bounds is cut off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Distribution {
+    /// Evenly between the bounds.
+    Uniform,
+    /// `exp(-(x - mean)^2 / (2 deviation^2))`.
+    Normal {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        deviation: f64,
+    },
+    /// The logarithm is normal.
+    LogNormal {
+        /// Median.
+        median: f64,
+        /// Standard deviation of the natural logarithm.
+        deviation: f64,
+    },
+    /// Rises linearly from the lower bound to the mode, and falls to the upper one.
+    Triangular {
+        /// Most probable value.
+        mode: f64,
+    },
+}
+
+impl Distribution {
+    /// Probability of a value up to `x`, nothing cut off but by `bounds` where the distribution needs them.
+    pub(super) fn below(self, x: f64, [min, max]: [f64; 2]) -> f64 {
+        let standard = Normal::standard();
+        match self {
+            Self::Uniform => ((x - min) / (max - min)).clamp(0.0, 1.0),
+            Self::Normal { mean, deviation } => standard.cdf((x - mean) / deviation),
+            Self::LogNormal { .. } if x <= 0.0 => 0.0,
+            Self::LogNormal { median, deviation } => standard.cdf((x / median).ln() / deviation),
+            Self::Triangular { mode } if x <= mode => {
+                if x <= min {
+                    0.0
+                } else {
+                    (x - min).powi(2) / ((max - min) * (mode - min))
+                }
+            }
+            Self::Triangular { mode } => {
+                if x >= max {
+                    1.0
+                } else {
+                    1.0 - (max - x).powi(2) / ((max - min) * (max - mode))
+                }
+            }
+        }
+    }
+
+    /// The value that a share `p` of the values does not exceed.
+    fn quantile(self, p: f64, [min, max]: [f64; 2]) -> f64 {
+        let standard = |p: f64| Normal::standard().inverse_cdf(p);
+        match self {
+            Self::Uniform => min + p * (max - min),
+            Self::Normal { mean, deviation } => mean + deviation * standard(p),
+            Self::LogNormal { median, deviation } => median * (deviation * standard(p)).exp(),
+            Self::Triangular { mode } => {
+                let (span, rise) = (max - min, mode - min);
+                if p * span <= rise {
+                    min + (p * span * rise).sqrt()
+                } else {
+                    max - ((1.0 - p) * span * (max - mode)).sqrt()
+                }
+            }
+        }
+    }
+}
+
+impl Uncertain {
+    /// The value that a share `p` in (0, 1) of the values does not exceed.
+    pub fn quantile(&self, p: f64) -> f64 {
+        let [low, high] = self.bounds.map(|bound| self.distribution.below(bound, self.bounds));
+        let value = self.distribution.quantile(low + p * (high - low), self.bounds);
+        value.clamp(self.bounds[0], self.bounds[1])
+    }
+
+    /// Whether both bounds are finite.
+    pub fn is_bounded(&self) -> bool {
+        self.tolerance.is_some() || self.bounds.iter().all(|bound| bound.is_finite())
+    }
+
+    /// The same for a design: a tolerance becomes bounds.
+    pub(super) fn at(&self, tuners: &[f64]) -> Self {
+        let mut settled = self.clone();
+        if let (Some(share), Some(tuner)) = (self.tolerance, self.tuner) {
+            let half = share * tuners[tuner].abs();
+            settled.bounds = [tuners[tuner] - half, tuners[tuner] + half];
+        }
+        settled
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uncertain(distribution: Distribution, bounds: [f64; 2]) -> Uncertain {
+        Uncertain { name: "a".into(), tuner: None, unit: Unit::one(), bounds, tolerance: None, distribution }
+    }
+
+    const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+    /// Published quantiles of the normal distribution: 0.8413447, 0.9772499 at one and two deviations.
+    #[test]
+    fn quantiles_are_those_of_closed_forms() {
+        let normal = uncertain(Distribution::Normal { mean: 2.0, deviation: 0.5 }, FREE);
+        let log = uncertain(Distribution::LogNormal { median: 3.0, deviation: 0.2 }, [0.0, f64::INFINITY]);
+        let triangle = uncertain(Distribution::Triangular { mode: 1.0 }, [0.0, 4.0]);
+        let uniform = uncertain(Distribution::Uniform, [-1.0, 3.0]);
+        for (found, exact) in [
+            (normal.quantile(0.841_344_746_068_542_9), 2.5),
+            (normal.quantile(0.022_750_131_948_179_21), 1.0),
+            (log.quantile(0.841_344_746_068_542_9), 3.0 * 0.2_f64.exp()),
+            (log.quantile(0.5), 3.0),
+            (triangle.quantile(0.25), 1.0),
+            (triangle.quantile(0.0625), 0.5),
+            (triangle.quantile(1.0 - 1.0 / 12.0), 3.0),
+            (uniform.quantile(0.25), 0.0),
+        ] {
+            assert!((found - exact).abs() < 1e-9, "{found} {exact}");
+        }
+    }
+
+    #[test]
+    fn what_lies_outside_the_bounds_is_cut_off() {
+        // Half a normal distribution: its median is the upper quartile of the whole.
+        let half = uncertain(Distribution::Normal { mean: 0.0, deviation: 1.0 }, [0.0, f64::INFINITY]);
+        assert!((half.quantile(0.5) - 0.674_489_750_196_081_7).abs() < 1e-9);
+        let narrow = uncertain(Distribution::Normal { mean: 0.0, deviation: 1.0 }, [-0.1, 0.3]);
+        assert!((0..=100).all(|i| (-0.1..=0.3).contains(&narrow.quantile(f64::from(i) / 100.0))));
+    }
+}

@@ -1,0 +1,118 @@
+//! The study over its uncertain parameters at a design, and with some of their values as cases.
+
+use super::distribution::Uncertain;
+use super::{JobPlan, Objective, ParameterSource, Study};
+use crate::tuner::{Grid, Scale, Tuner};
+
+impl Study {
+    /// The study over its uncertain parameters at a design: these are the active tuners, at the end of the list, in their
+    /// order; the tuners of the study keep the values given. Cases that differ in nothing but uncertain parameters become
+    /// one.
+    pub fn over_uncertain(&self, tuners: &[f64]) -> Self {
+        let mut study = self.clone();
+        for (tuner, &value) in study.tuners.iter_mut().zip(tuners) {
+            (tuner.start, tuner.active, tuner.tie) = (value, false, None);
+        }
+        let first = study.tuners.len();
+        for uncertain in &self.tasks.uncertain {
+            let settled = uncertain.at(tuners);
+            study.tuners.push(Tuner {
+                name: settled.name.clone(),
+                parameter: settled.name.clone(),
+                start: self.nominal(&settled, tuners),
+                bounds: settled.bounds,
+                scale: Scale::Linear,
+                grid: Grid::Continuous,
+                unit: settled.unit.clone(),
+                case: None,
+                active: true,
+                tie: None,
+            });
+        }
+        study.tasks.uncertain = self.tasks.uncertain.iter().map(|uncertain| uncertain.at(tuners)).collect();
+        for job in &mut study.jobs {
+            for (index, uncertain, factor) in self.touched(job) {
+                job.parameters[index] = ParameterSource::Tuner { tuner: first + uncertain, factor };
+            }
+        }
+        study.objective = Objective::Max;
+        study.keep_distinct();
+        study
+    }
+
+    /// Parameters of a job that are uncertain: index of the parameter, index of the uncertain one, factor of the unit.
+    fn touched(&self, job: &JobPlan) -> Vec<(usize, usize, f64)> {
+        let parameters = &self.models[job.model].1.interface().parameters;
+        let found = |(index, p): (usize, &crate::model::Parameter)| {
+            let uncertain = self.tasks.uncertain.iter().position(|u| u.name == p.variable.name)?;
+            let factor = self.tasks.uncertain[uncertain].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
+            Some((index, uncertain, factor))
+        };
+        parameters.iter().enumerate().filter_map(found).collect()
+    }
+
+    /// The value that the first simulation has, within the bounds.
+    fn nominal(&self, uncertain: &Uncertain, tuners: &[f64]) -> f64 {
+        let first = self.jobs.iter().find_map(|job| {
+            let (index, _, factor) =
+                self.touched(job).into_iter().find(|t| self.tasks.uncertain[t.1].name == uncertain.name)?;
+            Some(self.parameters(job, tuners)[index] / factor)
+        });
+        first.unwrap_or_else(|| uncertain.quantile(0.5)).clamp(uncertain.bounds[0], uncertain.bounds[1])
+    }
+
+    /// Leaves out simulations that are the same as an earlier one, with their criteria.
+    fn keep_distinct(&mut self) {
+        let same = |a: &JobPlan, b: &JobPlan| {
+            let (of_a, of_b) = (&self.cases[a.case], &self.cases[b.case]);
+            let settings = (a.model, a.horizon, &a.parameters) == (b.model, b.horizon, &b.parameters);
+            settings && of_a.inputs == of_b.inputs && of_a.experiment.is_none() && of_b.experiment.is_none()
+        };
+        let first: Vec<usize> =
+            (0..self.jobs.len()).map(|j| (0..j).find(|&i| same(&self.jobs[i], &self.jobs[j])).unwrap_or(j)).collect();
+        let known: Vec<(usize, String)> = self.rows.iter().map(|row| (row.job, row.name.clone())).collect();
+        self.rows.retain(|row| {
+            // N.B.: a criterion may be read in the later case alone.
+            first[row.job] == row.job || !known.contains(&(first[row.job], row.name.clone()))
+        });
+        // What nobody reads is not simulated.
+        let read: Vec<usize> = (0..self.jobs.len()).filter(|&j| self.rows.iter().any(|row| row.job == j)).collect();
+        self.jobs = read.iter().map(|&j| self.jobs[j].clone()).collect();
+        for row in &mut self.rows {
+            row.job = read.iter().position(|&j| j == row.job).expect("it is read");
+        }
+    }
+
+    /// The study with these cases besides its own: values of the uncertain parameters, in their units, in a case.
+    pub fn with_scenarios(&self, scenarios: &[Scenario]) -> Self {
+        let mut study = self.clone();
+        for scenario in scenarios {
+            let case = study.cases.len();
+            let mut copy = self.cases[scenario.case].clone();
+            copy.name.clone_from(&scenario.name);
+            study.cases.push(copy);
+            for (index, job) in self.jobs.iter().enumerate().filter(|(_, job)| job.case == scenario.case) {
+                let mut plan = JobPlan { case, ..job.clone() };
+                for (parameter, uncertain, factor) in self.touched(job) {
+                    plan.parameters[parameter] = ParameterSource::Constant(scenario.values[uncertain] * factor);
+                }
+                let moved = study.jobs.len();
+                study.jobs.push(plan);
+                let rows: Vec<_> = self.rows.iter().filter(|row| row.job == index).cloned().collect();
+                study.rows.extend(rows.into_iter().map(|row| super::Row { job: moved, ..row }));
+            }
+        }
+        study
+    }
+}
+
+/// Values of the uncertain parameters, as a case of their own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Name of the case.
+    pub name: String,
+    /// The case that it is otherwise like, by index.
+    pub case: usize,
+    /// Values of the uncertain parameters, in their units.
+    pub values: Vec<f64>,
+}

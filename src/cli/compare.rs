@@ -1,0 +1,168 @@
+//! `mops compare`: runs side by side.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use mops_core::{Catalogue, Diagnostic, Problem};
+use serde_json::{Value, json};
+
+use super::past::Past;
+use super::tables::{number, table};
+use super::{Trouble, cannot_write, print};
+use crate::report::{Responses, comparison_page, significant};
+
+/// What is compared.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Folders of runs, as --out had them; differences are to the first.
+    #[arg(required = true, num_args = 2..)]
+    folders: Vec<PathBuf>,
+    /// Write a page with the responses of all of them drawn over each other.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print a JSON object instead of the tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A quantity in all runs: name, unit, a value for each.
+struct Line {
+    name: String,
+    unit: String,
+    values: Vec<Option<f64>>,
+}
+
+pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let runs = arguments.folders.iter().map(|folder| Past::of(folder)).collect::<Result<Vec<_>, _>>()?;
+    let results: Vec<&Value> = runs.iter().map(result).collect::<Result<_, _>>()?;
+    let names: Vec<String> = runs.iter().map(|run| run.folder.display().to_string()).collect();
+    let tuners = lines(&results, "tuners", |tuner| tuner["name"].as_str().unwrap_or_default().to_owned());
+    let of_case =
+        |criterion: &Value| [&criterion["case"], &criterion["name"]].map(|v| v.as_str().unwrap_or_default()).join("/");
+    let criteria = lines(&results, "criteria", of_case);
+    let whole = whole(&results);
+    if arguments.json {
+        let of = |lines: &[Line]| -> Vec<Value> { lines.iter().map(json_of).collect() };
+        let all = json!({ "runs": names, "outcome": of(&whole), "tuners": of(&tuners), "criteria": of(&criteria) });
+        print(&(serde_json::to_string_pretty(&all).expect("lines are JSON") + "\n"));
+    }
+    let mut text = legend(&names);
+    text += &format!("\n{}", rows("run", names.len(), &whole));
+    text += &format!("\n{}", rows("tuner", names.len(), &tuners));
+    text += &format!("\n{}", rows("criterion", names.len(), &criteria));
+    if !arguments.json {
+        print(&text);
+    }
+    if let Some(path) = &arguments.out {
+        let (responses, silent) = responses(catalogue, &runs, &results);
+        let page = comparison_page(&text, &responses, &silent);
+        std::fs::write(path, page).map_err(cannot_write(path))?;
+        if !arguments.json {
+            print(&format!("\nthe responses are drawn in {}\n", path.display()));
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn result(run: &Past) -> Result<&Value, Diagnostic> {
+    run.ended().ok_or_else(|| {
+        Diagnostic::new(format!("the run in {} has no result", run.folder.display()))
+            .with_help("`mops run --resume` takes it to its end")
+    })
+}
+
+/// What the runs have under a key, by names in the order of their first appearance.
+fn lines(results: &[&Value], key: &str, name: impl Fn(&Value) -> String) -> Vec<Line> {
+    let of = |result: &&Value| result[key].as_array().cloned().unwrap_or_default();
+    let all: Vec<Vec<Value>> = results.iter().map(of).collect();
+    let mut found: Vec<Line> = Vec::new();
+    for entry in all.iter().flatten() {
+        let name_of = name(entry);
+        if found.iter().all(|line| line.name != name_of) {
+            let value =
+                |entries: &Vec<Value>| entries.iter().find(|e| name(e) == name_of).and_then(|e| e["value"].as_f64());
+            let values = all.iter().map(value).collect();
+            let unit = entry["unit"].as_str().unwrap_or_default().to_owned();
+            found.push(Line { name: name_of, unit, values });
+        }
+    }
+    found
+}
+
+/// What each run as a whole came to.
+fn whole(results: &[&Value]) -> Vec<Line> {
+    let keys = [("worst_scaled", "1"), ("objective", "1"), ("violation", "1"), ("evaluations", "1"), ("seconds", "s")];
+    let line = |(key, unit): (&str, &str)| Line {
+        name: key.replace('_', " "),
+        unit: unit.to_owned(),
+        values: results.iter().map(|result| result[key].as_f64()).collect(),
+    };
+    keys.map(line).into()
+}
+
+/// How far each value is from the first, in percent of the first.
+fn differences(line: &Line) -> Vec<Option<f64>> {
+    let first = line.values[0].filter(|first| *first != 0.0);
+    line.values.iter().skip(1).map(|value| Some(100.0 * ((*value)? - first?) / first?.abs())).collect()
+}
+
+fn json_of(line: &Line) -> Value {
+    json!({ "name": line.name, "unit": line.unit, "values": line.values, "differences_percent": differences(line) })
+}
+
+/// Which letter stands for which folder.
+fn legend(names: &[String]) -> String {
+    names.iter().enumerate().map(|(i, name)| format!("{}  {name}\n", letter(i))).collect()
+}
+
+/// A, B, ... Z, then numbers.
+fn letter(index: usize) -> String {
+    let of_alphabet = u8::try_from(index).ok().filter(|index| *index < 26).map(|index| char::from(b'A' + index));
+    of_alphabet.map_or_else(|| format!("{}", index + 1), String::from)
+}
+
+fn rows(what: &str, runs: usize, lines: &[Line]) -> String {
+    let mut header = vec![what.to_owned(), "unit".to_owned()];
+    header.extend((0..runs).map(letter));
+    header.extend((1..runs).map(|i| format!("{} to A, %", letter(i))));
+    let percent = |difference: Option<f64>| match difference {
+        Some(0.0) => "0".to_owned(),
+        Some(difference) => format!("{}{}", if difference > 0.0 { "+" } else { "" }, significant(difference, 3)),
+        None => String::new(),
+    };
+    let row = |line: &Line| {
+        let values = line.values.iter().map(|value| value.map(number).unwrap_or_default());
+        let differences = differences(line).into_iter().map(percent);
+        [line.name.clone(), line.unit.clone()].into_iter().chain(values).chain(differences).collect()
+    };
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let numeric: Vec<usize> = (2..header.len()).collect();
+    table(&header, &numeric, lines.iter().map(row).collect())
+}
+
+/// The responses of every run at its tuners; and of which there are none, and why.
+fn responses(catalogue: &Catalogue, runs: &[Past], results: &[&Value]) -> (Vec<Responses>, Vec<String>) {
+    let (mut found, mut silent) = (Vec::new(), Vec::new());
+    for (i, (run, result)) in runs.iter().zip(results).enumerate() {
+        match at_result(catalogue, run, result) {
+            Ok((problem, tuners)) => found.push(Responses { name: letter(i), problem, tuners }),
+            Err(why) => silent.push(format!("No responses of {}: {}.", letter(i), why.message)),
+        }
+    }
+    (found, silent)
+}
+
+/// The problem of a run, and the tuners of its result.
+fn at_result(catalogue: &Catalogue, run: &Past, result: &Value) -> Result<(Problem, Vec<f64>), Diagnostic> {
+    let study = run.study(catalogue)?.study;
+    let of = |name: &str| {
+        let tuner = result["tuners"].as_array()?.iter().find(|tuner| tuner["name"] == name)?;
+        tuner["value"].as_f64()
+    };
+    let missing = |folder: &Path| Diagnostic::new(format!("the result in {} has not every tuner", folder.display()));
+    let tuners = study.tuners.iter().map(|tuner| of(&tuner.name)).collect::<Option<Vec<f64>>>();
+    let tuners = tuners.ok_or_else(|| missing(&run.folder))?;
+    Ok((Problem::new(Arc::new(study)), tuners))
+}

@@ -1,0 +1,106 @@
+//! `mops history`: the runs below a folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::{Catalogue, Diagnostic};
+use serde_json::{Value, json};
+
+use super::past::{Past, date};
+use super::tables::{number, table};
+use super::{Trouble, print};
+
+/// Folders within folders that are looked into, at most.
+const DEPTH: usize = 8;
+
+/// Which runs are listed.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Folder below which runs are looked for.
+    #[arg(default_value = "results")]
+    folder: PathBuf,
+    /// Print a JSON array instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    let folder = &arguments.folder;
+    if !folder.is_dir() {
+        return Err(Diagnostic::new(format!("there is no folder `{}`", folder.display()))
+            .with_help("name the folder that --out had, or one above it; without --out runs go to results")
+            .into());
+    }
+    let mut runs = Vec::new();
+    collect(folder, DEPTH, &mut runs);
+    runs.sort_by(|a, b| (a.date, &a.folder).cmp(&(b.date, &b.folder)));
+    if arguments.json {
+        let all: Vec<Value> = runs.iter().map(json_of).collect();
+        print(&(serde_json::to_string_pretty(&all).expect("runs are JSON") + "\n"));
+    } else if runs.is_empty() {
+        print(&format!("no run left anything below {}\n", folder.display()));
+    } else {
+        let header = [
+            "date (UTC)",
+            "study",
+            "task",
+            "state",
+            "worst scaled",
+            "feasible",
+            "evaluations",
+            "seconds",
+            "mops",
+            "folder",
+        ];
+        print(&table(&header, &[4, 6, 7], runs.iter().map(row).collect()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The runs in a folder and below it; links are not followed.
+fn collect(folder: &Path, depth: usize, runs: &mut Vec<Past>) {
+    runs.extend(Past::read(folder));
+    if depth == 0 {
+        return;
+    }
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
+    for entry in folders.filter(|entry| !entry.file_name().to_string_lossy().starts_with('.')) {
+        collect(&entry.path(), depth - 1, runs);
+    }
+}
+
+/// A run as an object.
+fn json_of(past: &Past) -> Value {
+    let of = |key: &str| past.ended().map_or(Value::Null, |result| result[key].clone());
+    let run = past.run.as_ref().map(|(run, _)| run);
+    let or = |key: &str, kept: Option<Value>| {
+        kept.unwrap_or_else(|| past.result.as_ref().map_or(Value::Null, |r| r[key].clone()))
+    };
+    json!({
+        "folder": past.folder.display().to_string(), "date": date(past.date),
+        "study": or("study", run.map(|run| json!(run.name))), "task": or("task", run.map(|run| json!(run.task))),
+        "state": past.state(), "worst_scaled": of("worst_scaled"), "feasible": of("feasible"),
+        "evaluations": run.map_or_else(|| of("evaluations"), |run| json!(run.evaluations)),
+        "seconds": of("seconds"), "mops": or("mops", run.map(|run| json!(run.mops))),
+        "seed": or("seed", run.map(|run| json!(run.seed))), "solver": or("solver", run.map(|run| json!(run.solver))),
+        "command": run.map(|run| &run.command), "reused": of("reused"),
+    })
+}
+
+/// A run as a row of the table.
+fn row(past: &Past) -> Vec<String> {
+    let told = json_of(past);
+    let cell = |key: &str| match &told[key] {
+        Value::Null => String::new(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(value) if key == "seconds" => crate::report::significant(value.as_f64().unwrap_or(f64::NAN), 3),
+        value => value.as_f64().map(number).unwrap_or_default(),
+    };
+    let keys =
+        ["date", "study", "task", "state", "worst_scaled", "feasible", "evaluations", "seconds", "mops", "folder"];
+    keys.map(cell).to_vec()
+}

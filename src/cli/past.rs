@@ -1,0 +1,110 @@
+//! Runs that are over: what they left in their folders.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use mops_core::file::StudyFile;
+use mops_core::{Catalogue, Diagnostic};
+use serde_json::Value;
+
+use super::study::{read_at, without_settings};
+use crate::store::{self, RunRow, RunState};
+
+/// What a run left in its folder.
+pub(super) struct Past {
+    pub folder: PathBuf,
+    /// The content of result.json.
+    pub result: Option<Value>,
+    /// The run, as its database has it, and whether it goes on.
+    pub run: Option<(RunRow, bool)>,
+    /// When it began or, where nobody noted that, when its result was written: seconds since 1970-01-01 UTC.
+    pub date: i64,
+}
+
+impl Past {
+    /// Reads a folder; `None` where no run left anything.
+    pub fn read(folder: &Path) -> Option<Self> {
+        let path = folder.join("result.json");
+        let result = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let result = result.filter(|result| result["format"].is_u64() && result["study"].is_string());
+        let run = store::last_run(folder);
+        let written = || {
+            let since = fs::metadata(&path).ok()?.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+            i64::try_from(since.as_secs()).ok()
+        };
+        let date = run.as_ref().map(|(run, _)| run.begun).or_else(written).unwrap_or(0);
+        (result.is_some() || run.is_some()).then(|| Self { folder: folder.to_owned(), result, run, date })
+    }
+
+    /// Reads a folder that must be one of a run.
+    ///
+    /// # Errors
+    /// No run left anything there.
+    pub fn of(folder: &Path) -> Result<Self, Diagnostic> {
+        Self::read(folder).ok_or_else(|| {
+            let what = if folder.is_dir() { "is not the folder of a run" } else { "is no folder" };
+            Diagnostic::new(format!("{} {what}", folder.display()))
+                .with_help("name a folder as --out had it; `mops history` lists them")
+        })
+    }
+
+    /// How the run stands in one word.
+    pub fn state(&self) -> &str {
+        match &self.run {
+            Some((_, true)) => "running",
+            Some((run, false)) if run.state == RunState::Running => "unfinished",
+            Some((run, false)) => run.state.name(),
+            None => self.result.as_ref().and_then(|result| result["stop"].as_str()).unwrap_or("unfinished"),
+        }
+    }
+
+    /// The result, where it is that of the run in the database.
+    pub fn ended(&self) -> Option<&Value> {
+        self.result.as_ref().filter(|_| self.run.as_ref().is_none_or(|(run, _)| run.state != RunState::Running))
+    }
+
+    /// The study of the run, as it was; its data are read from where they are.
+    ///
+    /// # Errors
+    /// The run kept no study, or its data are gone.
+    pub fn study(&self, catalogue: &Catalogue) -> Result<StudyFile, Diagnostic> {
+        let Some((run, _)) = &self.run else {
+            return Err(Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
+                .with_help("a run of this version of mops writes it; diagnoses have none"));
+        };
+        let text = without_settings(&run.text, &run.settings);
+        read_at(catalogue, &run.home, text, &run.settings)
+    }
+}
+
+/// The date and time of seconds since 1970-01-01, UTC: `2026-11-21 14:05`.
+///
+/// Source: H. Hinnant, chrono-Compatible Low-Level Date Algorithms (2013), `civil_from_days`.
+pub(super) fn date(seconds: i64) -> String {
+    let (days, second) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
+    let shifted = days + 719_468;
+    let (era, day) = (shifted.div_euclid(146_097), shifted.rem_euclid(146_097));
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let of_year = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let of_month = of_year - (153 * month + 2) / 5 + 1;
+    let (month, carry) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
+    let year = year + era * 400 + carry;
+    format!("{year:04}-{month:02}-{of_month:02} {:02}:{:02}", second / 3600, second / 60 % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::date;
+
+    /// As `date -u -d @SECONDS` of GNU coreutils says.
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        assert_eq!(date(0), "1970-01-01 00:00");
+        assert_eq!(date(951_782_400), "2000-02-29 00:00");
+        assert_eq!(date(1_709_251_199), "2024-02-29 23:59");
+        assert_eq!(date(4_107_542_400), "2100-03-01 00:00");
+        assert_eq!(date(-1), "1969-12-31 23:59");
+    }
+}

@@ -1,0 +1,108 @@
+//! What is found where parameters are uncertain: sentences, tables, plots.
+
+mod distributions;
+mod effects;
+mod rounds;
+mod worst;
+
+use maud::{Markup, html};
+use mops_core::{Outcome, UncertainReport};
+
+use super::Report;
+use super::figures::Group;
+use super::numbers::{number, significant};
+use super::page::scrolling;
+use super::verdict::Tone;
+
+/// A section of the page: its title, what is said, and its plots.
+pub(super) struct Section {
+    pub(super) title: &'static str,
+    pub(super) content: Markup,
+    pub(super) group: Group,
+}
+
+/// The sections of what was found.
+pub(super) fn sections(report: &Report<'_>) -> Vec<Section> {
+    let found = &report.outcome.found;
+    let robust = found.robust.as_ref().map(rounds::section);
+    let worst = found.worst_case.as_ref().map(|found| worst::section(report, found));
+    let drawn = found.monte_carlo.as_ref().map(distributions::section);
+    let effects = found.global_sensitivity.as_ref().map(effects::section);
+    [robust, worst, drawn, effects].into_iter().flatten().collect()
+}
+
+/// The verdict, and how good it is; `None` where parameters are taken as known.
+pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
+    let found = &outcome.found;
+    if let Some(found) = &found.robust {
+        let round = found.rounds.get(found.chosen)?;
+        let violated = round.violation_found > found.tolerance;
+        let tone = match (violated, found.settled && found.criteria.iter().all(|worst| worst.met)) {
+            (true, _) => Tone::Bad,
+            (false, true) => Tone::Good,
+            (false, false) => Tone::Mixed,
+        };
+        return Some((tone, found.words.iter().take(2).cloned().collect::<Vec<_>>().join(" ")));
+    }
+    if let Some(found) = &found.worst_case {
+        let asked = found.criteria.iter().filter(|c| c.of.demand.is_some());
+        let tone = if asked.clone().all(|c| c.met) && found.criteria.iter().all(|c| c.failed == 0) {
+            Tone::Good
+        } else {
+            Tone::Mixed
+        };
+        let worst = asked.filter(|c| !c.met).max_by(|a, b| a.scaled.total_cmp(&b.scaled));
+        let words = worst.map(|worst| {
+            let missed = significant(worst.scaled, 4);
+            format!(
+                "Not met everywhere in the box: `{}` in case `{}` comes to {missed} times its demand at worst.",
+                worst.of.criterion, worst.of.case
+            )
+        });
+        let met = "Every demand is met at every point of the box that was looked at.";
+        return Some((tone, words.unwrap_or_else(|| met.to_owned())));
+    }
+    if let Some(found) = &found.monte_carlo {
+        let tone = match &found.all {
+            Some(all) if all.count < all.of => Tone::Mixed,
+            _ => Tone::Good,
+        };
+        return Some((tone, found.words.first().cloned()?));
+    }
+    let found = found.global_sensitivity.as_ref()?;
+    Some((Tone::Good, found.words.first().cloned()?))
+}
+
+/// What is uncertain, as a table.
+fn parameters(list: &[UncertainReport]) -> Markup {
+    let bound = |value: f64| if value.is_finite() { number(value) } else { String::new() };
+    scrolling(
+        "Uncertain parameters",
+        html! {
+            table {
+                thead {
+                    tr {
+                        th scope="col" { "uncertain" }
+                        th scope="col" class="number" { "nominal" }
+                        th scope="col" class="number" { "from" }
+                        th scope="col" class="number" { "to" }
+                        th scope="col" { "unit" }
+                        th scope="col" { "distribution" }
+                    }
+                }
+                tbody {
+                    @for one in list {
+                        tr {
+                            th scope="row" { (one.name) }
+                            td class="number" { (number(one.nominal)) }
+                            td class="number" { (bound(one.bounds[0])) }
+                            td class="number" { (bound(one.bounds[1])) }
+                            td { (one.unit) }
+                            td { (one.distribution) }
+                        }
+                    }
+                }
+            }
+        },
+    )
+}

@@ -1,0 +1,101 @@
+//! How a design against worst cases came about: rounds, bounds, cases that were added.
+
+use maud::{Markup, html};
+use mops_core::RobustReport;
+
+use super::super::figures::{Figure, Group};
+use super::super::numbers::{number, significant};
+use super::super::page::scrolling;
+use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::sensitivity::sentences;
+use super::{Section, parameters, worst};
+
+pub(super) fn section(found: &RobustReport) -> Section {
+    let content = html! {
+        (sentences(&found.words))
+        (parameters(&found.parameters))
+        h3 { "Rounds" }
+        p {
+            "Each round makes the best design for the cases at hand, and searches the box for worse ones. The worst over the "
+            "cases at hand can only rise; the worst that is found in the box is what the design of the round would do."
+        }
+        (rounds(found))
+        h3 { "Worst cases of the design" }
+        (worst::table(&found.criteria, &found.parameters))
+    };
+    Section {
+        title: "Design against worst cases",
+        content,
+        group: Group { figures: vec![bounds(found)], ..Group::default() },
+    }
+}
+
+fn rounds(found: &RobustReport) -> Markup {
+    scrolling(
+        "Rounds",
+        html! {
+            table {
+                thead {
+                    tr {
+                        th scope="col" class="number" { "round" }
+                        th scope="col" class="number" { "cases" }
+                        th scope="col" class="number" { "worst of these" }
+                        th scope="col" class="number" { "worst found" }
+                        th scope="col" class="number" { "violation found" }
+                        th scope="col" class="number" { "evaluations" }
+                        th scope="col" { "added" }
+                    }
+                }
+                tbody {
+                    @for (i, round) in found.rounds.iter().enumerate() {
+                        tr {
+                            th scope="row" class="number" { (i + 1) @if i == found.chosen { small { "reported" } } }
+                            td class="number" { (round.cases) }
+                            td class="number" { (number(round.for_cases)) }
+                            td class="number" { (number(round.found)) }
+                            td class="number" { (significant(round.violation_found.max(0.0), 3)) }
+                            td class="number" { (round.evaluations) }
+                            td {
+                                @for added in &round.added {
+                                    div { (added.name) ", scaled " (significant(added.scaled, 4)) ": "
+                                        @for (j, c) in added.at.iter().enumerate() { @if j > 0 { ", " } (c.name) " = " (number(c.value)) }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        },
+    )
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn bounds(found: &RobustReport) -> Figure {
+    let curve = |name: &str, ink: Ink, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
+        name: name.into(),
+        points: found.rounds.iter().enumerate().map(|(i, round)| ((i + 1) as f64, of(round))).collect(),
+        ink,
+        style,
+        ..Curve::default()
+    };
+    let mut curves = vec![
+        curve("worst found in the box", Ink::Measured, CurveStyle::Line, &|round| round.found),
+        curve("", Ink::Measured, CurveStyle::Dots, &|round| round.found),
+        curve("worst over the cases at hand", Ink::Result, CurveStyle::Line, &|round| round.for_cases),
+        curve("", Ink::Result, CurveStyle::Dots, &|round| round.for_cases),
+    ];
+    if found.rounds.iter().any(|round| round.violation_found > 0.0) {
+        curves.push(curve("violation found in the box", Ink::Demand, CurveStyle::Dashed, &|round| {
+            round.violation_found.max(0.0)
+        }));
+    }
+    let plot = Plot {
+        title: "Worst scaled value by rounds".into(),
+        x_label: "round".into(),
+        y_label: "scaled value".into(),
+        curves,
+        ..Plot::default()
+    };
+    Figure { plots: vec![("rounds".into(), plot)], caption: Vec::new() }
+}

@@ -1,0 +1,94 @@
+//! The page of a comparison: the responses of several runs over each other.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use mops_core::{Analysis, Problem};
+
+use super::numbers::labelled;
+use super::plot::{Curve, Ink, Plot};
+use super::sampling;
+
+/// A run whose responses are drawn.
+pub(crate) struct Responses {
+    /// Name in the legends.
+    pub(crate) name: String,
+    /// The problem.
+    pub(crate) problem: Problem,
+    /// Values of all its tuners.
+    pub(crate) tuners: Vec<f64>,
+}
+
+/// The page: tables as text, responses as pictures, sentences on what is not shown.
+pub(crate) fn comparison_page(tables: &str, runs: &[Responses], silent: &[String]) -> String {
+    let plots = plots(runs);
+    let page: Markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { "Comparison of runs" }
+                style { (PreEscaped(super::STYLE)) }
+            }
+            body {
+                header { p class="task" { "comparison" } h1 { "Runs side by side" } }
+                main {
+                    section { h2 { "Results" } pre tabindex="0" { (tables) } }
+                    section {
+                        h2 { "Responses" }
+                        @for sentence in silent { p { (sentence) } }
+                        @if plots.is_empty() { p { "There is no signal over time to draw." } }
+                        div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
+                    }
+                }
+                footer { "Written by mops " (env!("CARGO_PKG_VERSION")) "." }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// A curve, with the plot it belongs to: case, model, signal, and its label.
+type Drawn = ([String; 3], String, Curve);
+
+/// A plot for every signal that criteria read, with a curve for every run that has it.
+fn plots(runs: &[Responses]) -> Vec<Plot> {
+    let drawn: Vec<Drawn> = runs.iter().enumerate().flat_map(|(i, run)| curves(i, run)).collect();
+    let mut places: Vec<(&[String; 3], &String)> = Vec::new();
+    for (place, label, _) in &drawn {
+        if places.iter().all(|(known, _)| *known != place) {
+            places.push((place, label));
+        }
+    }
+    let several = places.iter().any(|(place, _)| place[1] != places[0].0[1]);
+    let plot = |(place, label): (&[String; 3], &String)| {
+        let [case, model, signal] = place;
+        let of = if several { format!(" of {model}") } else { String::new() };
+        Plot {
+            title: format!("{signal}{of} in case {case}"),
+            x_label: "time (s)".into(),
+            y_label: label.clone(),
+            curves: drawn.iter().filter(|(at, ..)| at == place).map(|(_, _, curve)| curve.clone()).collect(),
+            ..Plot::default()
+        }
+    };
+    places.into_iter().map(plot).collect()
+}
+
+/// The responses of a run; a simulation that fails has none.
+fn curves(index: usize, run: &Responses) -> Vec<Drawn> {
+    let study = run.problem.study();
+    let mut drawn = Vec::new();
+    for (job, plan) in study.jobs.iter().enumerate() {
+        let (model_name, model) = &study.models[plan.model];
+        let Ok(Analysis::Time(response)) = run.problem.analyse_all(job, &run.tuners, None) else { continue };
+        for signal in plan.signals.iter().map(|&i| &model.interface().signals[i]) {
+            let Some(trace) = response.trace(&signal.name) else { continue };
+            let place = [study.cases[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
+            let ink = Ink::Series(index % 6);
+            let curve = Curve { name: run.name.clone(), points: sampling::points(trace), ink, ..Curve::default() };
+            drawn.push((place, labelled(&signal.name, &signal.unit.to_string()), curve));
+        }
+    }
+    drawn
+}

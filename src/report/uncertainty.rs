@@ -1,0 +1,219 @@
+//! What a calibration tells of the uncertainty of its estimates besides standard errors: profiles, bootstrap, bands.
+
+use maud::{Markup, html};
+use mops_core::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
+
+use super::figures::{Figure, Group};
+use super::numbers::{labelled, number, significant};
+use super::page::scrolling;
+use super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::sensitivity::sentences;
+
+/// Title of the section.
+pub(super) const TITLE: &str = "Uncertainty of the estimates";
+
+/// What is said.
+pub(super) fn section(found: &UncertaintyReport) -> Markup {
+    html! {
+        (sentences(&found.words))
+        @if !found.profiles.is_empty() {
+            h3 { "Profiles of the likelihood" }
+            p {
+                "One parameter is held, all others are estimated again. The root of the likelihood ratio, in standard errors, is a "
+                "straight line where the model is linear; where it is bent, the interval to first order is wrong. The interval ends "
+                "where the root meets the t quantile."
+            }
+            (scrolling("Profiles", profiles(&found.profiles)))
+        }
+        @if let Some(bootstrap) = &found.bootstrap {
+            h3 { "Bootstrap" }
+            p {
+                "Residuals are drawn anew in blocks of " (blocks(bootstrap)) " samples, and everything is estimated again: this holds "
+                "where residuals are correlated over less than a block. Intervals are percentiles of the replicates."
+            }
+            (scrolling("Bootstrap", replicates(bootstrap)))
+        }
+        @if !found.bands.is_empty() {
+            p {
+                "Bands are drawn beside the responses: of the response, as far as the parameters are uncertain, and of a new "
+                "measurement, noise included; both point by point and to first order."
+            }
+        }
+    }
+}
+
+fn blocks(found: &BootstrapReport) -> String {
+    let mut lengths = found.blocks.clone();
+    lengths.sort_unstable();
+    lengths.dedup();
+    lengths.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn end(value: f64, why: &str) -> Markup {
+    html! {
+        @if value.is_finite() { (number(value)) } @else { "none found" }
+        @if why == "bound" { small { "bound of the tuner" } }
+    }
+}
+
+fn profiles(list: &[ProfileReport]) -> Markup {
+    html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "parameter" }
+                    th scope="col" class="number" { "estimate" }
+                    th scope="col" class="number" { "from" }
+                    th scope="col" class="number" { "to" }
+                    th scope="col" class="number" { "to first order from" }
+                    th scope="col" class="number" { "to" }
+                    th scope="col" { "unit" }
+                }
+            }
+            tbody {
+                @for one in list {
+                    tr {
+                        th scope="row" { (one.parameter) }
+                        td class="number" { (number(one.value)) }
+                        td class="number" { (end(one.interval[0], one.ends[0])) }
+                        td class="number" { (end(one.interval[1], one.ends[1])) }
+                        td class="number" { (number(one.linear_interval[0])) }
+                        td class="number" { (number(one.linear_interval[1])) }
+                        td { (one.unit) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn replicates(found: &BootstrapReport) -> Markup {
+    html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "parameter" }
+                    th scope="col" class="number" { "estimate" }
+                    th scope="col" class="number" { "standard error" }
+                    th scope="col" class="number" { "bias" }
+                    th scope="col" class="number" { "from" }
+                    th scope="col" class="number" { "to" }
+                    th scope="col" { "unit" }
+                }
+            }
+            tbody {
+                @for one in &found.parameters {
+                    tr {
+                        th scope="row" { (one.parameter) }
+                        td class="number" { (number(one.value)) }
+                        td class="number" { (significant(one.std_error, 3)) }
+                        td class="number" { (significant(one.bias, 2)) }
+                        td class="number" { (number(one.interval[0])) }
+                        td class="number" { (number(one.interval[1])) }
+                        td { (one.unit) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Profiles, and distributions of the bootstrap.
+pub(super) fn group(found: &UncertaintyReport) -> Group {
+    let figures = found.profiles.iter().map(profile);
+    let replicates = found.bootstrap.iter().flat_map(|b| &b.parameters).map(|one| {
+        let mut sorted = one.draws.clone();
+        sorted.sort_by(f64::total_cmp);
+        let n = sorted.len() as f64;
+        let steps =
+            sorted.iter().enumerate().flat_map(|(i, &v)| [(v, i as f64 / n), (v, (i + 1) as f64 / n)]).collect();
+        let upright = |name: &str, x: f64, ink, style| Curve {
+            name: name.into(),
+            points: vec![(x, 0.0), (x, 1.0)],
+            ink,
+            style,
+            ..Curve::default()
+        };
+        let mut curves = vec![Curve { name: "share of replicates up to".into(), points: steps, ..Curve::default() }];
+        curves.push(upright("estimate", one.value, Ink::Start, CurveStyle::Dashed));
+        curves.push(upright("interval", one.interval[0], Ink::Demand, CurveStyle::Line));
+        curves.push(upright("", one.interval[1], Ink::Demand, CurveStyle::Line));
+        let plot = Plot {
+            title: format!("Bootstrap of {}", one.parameter),
+            x_label: labelled(&one.parameter, &one.unit),
+            y_label: "share of replicates".into(),
+            curves,
+            ..Plot::default()
+        };
+        Figure { plots: vec![(format!("bootstrap-{}", one.parameter), plot)], caption: Vec::new() }
+    });
+    Group { figures: figures.chain(replicates).collect(), ..Group::default() }
+}
+
+fn profile(one: &ProfileReport) -> Figure {
+    let line = |name: &str, points: Vec<(f64, f64)>, ink, style| Curve {
+        name: name.into(),
+        points,
+        ink,
+        style,
+        ..Curve::default()
+    };
+    let half = (one.linear_interval[1] - one.value) / one.limit;
+    let ends = [one.points.first(), one.points.last()].map(|p| p.map_or(one.value, |p| p.0));
+    let first_order = ends.map(|x| (x, (x - one.value) / half)).to_vec();
+    let ends = |y: f64| ends.map(|x| (x, y)).to_vec();
+    let curves = vec![
+        line("to first order", first_order, Ink::Start, CurveStyle::Dashed),
+        line("root of the likelihood ratio", one.points.clone(), Ink::Result, CurveStyle::Line),
+        line("", one.points.clone(), Ink::Result, CurveStyle::Dots),
+        line("t quantile", ends(one.limit), Ink::Demand, CurveStyle::Line),
+        line("", ends(-one.limit), Ink::Demand, CurveStyle::Line),
+    ];
+    let plot = Plot {
+        title: format!("Profile of {}", one.parameter),
+        x_label: labelled(&one.parameter, &one.unit),
+        y_label: "root of the likelihood ratio".into(),
+        curves,
+        ..Plot::default()
+    };
+    Figure { plots: vec![(format!("profile-{}", one.parameter), plot)], caption: Vec::new() }
+}
+
+/// What bands lie around.
+#[derive(Clone, Copy)]
+pub(super) enum Around {
+    /// The prediction.
+    Prediction,
+    /// Zero, as residuals do.
+    Zero,
+}
+
+/// The curves of the bands of a channel, to lie over its plot.
+pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, around: Around) -> Vec<Curve> {
+    let Some(band) = found.bands.iter().find(|b| b.experiment == experiment && b.channel == channel) else {
+        return Vec::new();
+    };
+    let percent = significant(100.0 * found.level, 4);
+    let curve = |name: String, half: &[f64], sign: f64, ink: Ink| Curve {
+        name,
+        points: points(band, half, sign, around),
+        ink,
+        style: CurveStyle::Dashed,
+        may_leave: true,
+    };
+    let (response, measurement) = (Ink::Series(2), Ink::Series(3));
+    vec![
+        curve(format!("{percent} % of responses"), &band.response, 1.0, response),
+        curve(String::new(), &band.response, -1.0, response),
+        curve(format!("{percent} % of measurements"), &band.measurement, 1.0, measurement),
+        curve(String::new(), &band.measurement, -1.0, measurement),
+    ]
+}
+
+fn points(band: &BandReport, half: &[f64], sign: f64, around: Around) -> Vec<(f64, f64)> {
+    let middle = |value: f64| match around {
+        Around::Prediction => value,
+        Around::Zero => 0.0,
+    };
+    band.times.iter().zip(&band.value).zip(half).map(|((&t, &value), half)| (t, middle(value) + sign * half)).collect()
+}

@@ -1,0 +1,418 @@
+//! The tables of `evaluations.sqlite`, and every statement that reads or writes them.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use mops_core::{Failure, JobValues, Known, RowSlopes, Study, Value};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
+use serde_json::json;
+
+use super::bytes;
+
+/// `PRAGMA application_id`: the letters of mops.
+const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
+
+/// Version of the tables.
+const FORMAT: i32 = 1;
+
+const TABLES: &str = "
+CREATE TABLE runs (
+    id INTEGER PRIMARY KEY,
+    begun INTEGER NOT NULL,            -- seconds since 1970-01-01 UTC
+    ended INTEGER,                     -- the same; NULL while it runs, and where it was killed
+    state TEXT NOT NULL,               -- running, converged, budget, stalled, interrupted
+    mops TEXT NOT NULL,                -- version of the program
+    command TEXT NOT NULL,             -- command line
+    home TEXT NOT NULL,                -- the study file, or the name of a shipped study
+    settings TEXT NOT NULL,            -- JSON: the --set of the command line
+    name TEXT NOT NULL,                -- name of the study
+    task TEXT NOT NULL,
+    text TEXT NOT NULL,                -- the study file, settings at its end
+    identity TEXT NOT NULL,            -- JSON: what the study says and the digests of its data
+    seed INTEGER NOT NULL,
+    solver TEXT NOT NULL,
+    max_evaluations INTEGER NOT NULL,
+    begin BLOB,                        -- point of the unit box where it began, float64; NULL: at the start values
+    evaluations INTEGER NOT NULL,      -- points of this run so far
+    reused INTEGER NOT NULL            -- those of them that were known already
+);
+CREATE TABLE points (
+    id INTEGER PRIMARY KEY,            -- in the order of evaluation
+    run INTEGER NOT NULL REFERENCES runs (id),
+    tuners BLOB NOT NULL UNIQUE,       -- values of all tuners, float64 little-endian
+    criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN where there is none
+    notes TEXT,                        -- JSON: row -> what a reader must know of its value
+    failures TEXT,                     -- JSON: jobs that failed, rows without a value
+    residuals BLOB                     -- lists: row, length, float64; absent where none are needed or room is short
+);
+CREATE TABLE slopes (
+    tuners BLOB NOT NULL,              -- the point
+    reach REAL NOT NULL,               -- the distance within which they describe it, in the unit box
+    slopes BLOB,                       -- lists, one per row and coordinate; NULL: there are none
+    PRIMARY KEY (tuners, reach)
+) WITHOUT ROWID;
+";
+
+/// An open database.
+pub(crate) struct Database {
+    connection: Connection,
+}
+
+/// How a run stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RunState {
+    /// It goes on, or was killed.
+    Running,
+    /// It came to its end.
+    Converged,
+    /// It spent its budget.
+    Budget,
+    /// It could not improve any more.
+    Stalled,
+    /// The user ended it.
+    Interrupted,
+}
+
+impl RunState {
+    const ALL: [(Self, &'static str); 5] = [
+        (Self::Running, "running"),
+        (Self::Converged, "converged"),
+        (Self::Budget, "budget"),
+        (Self::Stalled, "stalled"),
+        (Self::Interrupted, "interrupted"),
+    ];
+
+    /// As it stands in the table.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(state, _)| *state == self).map_or("running", |(_, name)| name)
+    }
+
+    fn of(name: &str) -> Self {
+        Self::ALL.iter().find(|(_, known)| *known == name).map_or(Self::Running, |(state, _)| *state)
+    }
+}
+
+/// A run, as it stands in its table.
+#[derive(Debug, Clone)]
+pub(crate) struct RunRow {
+    pub begun: i64,
+    pub state: RunState,
+    pub mops: String,
+    pub command: String,
+    pub home: String,
+    pub settings: Vec<String>,
+    pub name: String,
+    pub task: String,
+    pub text: String,
+    pub identity: String,
+    pub seed: u64,
+    pub solver: String,
+    pub max_evaluations: usize,
+    pub begin: Option<Vec<f64>>,
+    pub evaluations: usize,
+}
+
+/// A point as it is written.
+pub(super) struct PointRow {
+    pub tuners: Vec<u64>,
+    pub known: Known,
+}
+
+/// Points by their tuners.
+pub(super) type Points = HashMap<Vec<u64>, Known>;
+
+/// Derivatives by tuners and reach.
+pub(super) type Slopes = HashMap<(Vec<u64>, u64), Option<RowSlopes>>;
+
+impl Database {
+    /// Makes a new one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn create(path: &Path) -> rusqlite::Result<Self> {
+        let connection = Connection::open(path)?;
+        // A killed process loses nothing that is committed; a machine without power, the last moments.
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        connection.pragma_update(None, "synchronous", "NORMAL")?;
+        connection.pragma_update(None, "application_id", APPLICATION)?;
+        connection.pragma_update(None, "user_version", FORMAT)?;
+        connection.execute_batch(&format!("BEGIN; {TABLES} COMMIT;"))?;
+        Ok(Self { connection })
+    }
+
+    /// Opens one that is there, to write or only to read; `None` where the file is none of mops, or of another format.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn open(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
+        let mode = if writes { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
+        let connection = Connection::open_with_flags(path, mode | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        connection.busy_timeout(Duration::from_secs(5))?;
+        let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
+        if pragma("application_id")? != APPLICATION || pragma("user_version")? != FORMAT {
+            return Ok(None);
+        }
+        if writes {
+            connection.pragma_update(None, "journal_mode", "WAL")?;
+            connection.pragma_update(None, "synchronous", "NORMAL")?;
+        }
+        Ok(Some(Self { connection }))
+    }
+
+    /// The run that began last.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn last_run(&self) -> rusqlite::Result<Option<RunRow>> {
+        let columns = "begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
+                       max_evaluations, begin, evaluations";
+        let sql = format!("SELECT {columns} FROM runs ORDER BY id DESC LIMIT 1");
+        self.connection.query_row(&sql, [], run_row).optional()
+    }
+
+    /// Number of points.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn count(&self) -> rusqlite::Result<usize> {
+        self.connection.query_row("SELECT count(*) FROM points", [], |row| size(row, 0))
+    }
+
+    /// Enters a run that begins; its number.
+    pub(super) fn begin(&self, run: &RunRow) -> rusqlite::Result<i64> {
+        self.connection.execute(
+            "INSERT INTO runs (begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
+             max_evaluations, begin, evaluations, reused) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0)",
+            params![
+                run.begun,
+                RunState::Running.name(),
+                run.mops,
+                run.command,
+                run.home,
+                json!(run.settings).to_string(),
+                run.name,
+                run.task,
+                run.text,
+                run.identity,
+                run.seed.cast_signed(),
+                run.solver,
+                integer(run.max_evaluations),
+                run.begin.as_deref().map(bytes::of_numbers),
+            ],
+        )?;
+        Ok(self.connection.last_insert_rowid())
+    }
+
+    /// Writes how a run ended.
+    pub(super) fn end(&self, run: i64, state: RunState, reused: usize) -> rusqlite::Result<()> {
+        let sql = "UPDATE runs SET ended = ?, state = ?, reused = ? WHERE id = ?";
+        self.connection.execute(sql, params![now(), state.name(), integer(reused), run])?;
+        // One file, which can be read where nothing can be written; while somebody reads it stays as it is.
+        let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
+        Ok(())
+    }
+
+    /// Writes points and derivatives, and how many points the run has, all or nothing.
+    pub(super) fn write(
+        &mut self,
+        run: i64,
+        rows: usize,
+        points: &[PointRow],
+        slopes: &[(Vec<u64>, f64, Option<RowSlopes>)],
+        evaluations: usize,
+    ) -> rusqlite::Result<()> {
+        let transaction = self.connection.transaction()?;
+        {
+            let mut insert = transaction.prepare(
+                "INSERT INTO points (run, tuners, criteria, notes, failures, residuals) VALUES (?, ?, ?, ?, ?, ?) \
+                 ON CONFLICT (tuners) DO UPDATE SET criteria = excluded.criteria, notes = excluded.notes, \
+                 failures = excluded.failures, residuals = coalesce(excluded.residuals, residuals)",
+            )?;
+            for PointRow { tuners, known } in points {
+                let (criteria, notes, failures, residuals) = columns(known, rows);
+                insert.execute(params![run, bytes::of_key(tuners), criteria, notes, failures, residuals])?;
+            }
+            let mut insert =
+                transaction.prepare("INSERT OR REPLACE INTO slopes (tuners, reach, slopes) VALUES (?, ?, ?)")?;
+            for (tuners, reach, slopes) in slopes {
+                insert.execute(params![bytes::of_key(tuners), reach, slopes.as_ref().map(bytes::of_slopes)])?;
+            }
+            let mut update = transaction.prepare("UPDATE runs SET evaluations = ? WHERE id = ?")?;
+            update.execute(params![integer(evaluations), run])?;
+        }
+        transaction.commit()
+    }
+
+    /// All points, for a study with the same jobs and rows.
+    pub(super) fn points(
+        &self,
+        study: &Study,
+        intern: &mut dyn FnMut(&str) -> &'static str,
+    ) -> rusqlite::Result<Points> {
+        let mut statement =
+            self.connection.prepare("SELECT tuners, criteria, notes, failures, residuals FROM points ORDER BY id")?;
+        let mut rows = statement.query([])?;
+        let mut points = Points::new();
+        while let Some(row) = rows.next()? {
+            let key = bytes::numbers(row.get_ref(0)?.as_blob()?);
+            points.insert(bytes::key(&key), known(row, study, intern)?);
+        }
+        Ok(points)
+    }
+
+    /// All derivatives.
+    pub(super) fn slopes(&self) -> rusqlite::Result<Slopes> {
+        let mut statement = self.connection.prepare("SELECT tuners, reach, slopes FROM slopes")?;
+        let mut rows = statement.query([])?;
+        let mut slopes = Slopes::new();
+        while let Some(row) = rows.next()? {
+            let key = bytes::key(&bytes::numbers(row.get_ref(0)?.as_blob()?));
+            let found = row.get_ref(2)?.as_blob_or_null()?.map(bytes::slopes);
+            // What is cut short is not known.
+            match found {
+                None => slopes.insert((key, row.get::<_, f64>(1)?.to_bits()), None),
+                Some(Some(found)) => slopes.insert((key, row.get::<_, f64>(1)?.to_bits()), Some(found)),
+                Some(None) => None,
+            };
+        }
+        Ok(slopes)
+    }
+
+    /// Bytes that residuals and derivatives take.
+    pub(super) fn room_taken(&self) -> rusqlite::Result<usize> {
+        let sql = "SELECT (SELECT coalesce(sum(length(residuals)), 0) FROM points) + \
+                   (SELECT coalesce(sum(length(slopes)), 0) FROM slopes)";
+        self.connection.query_row(sql, [], |row| size(row, 0))
+    }
+}
+
+/// Seconds since 1970-01-01 UTC.
+pub(super) fn now() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    i64::try_from(since).unwrap_or(i64::MAX)
+}
+
+fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
+    Ok(RunRow {
+        begun: row.get(0)?,
+        state: RunState::of(&row.get::<_, String>(1)?),
+        mops: row.get(2)?,
+        command: row.get(3)?,
+        home: row.get(4)?,
+        settings: serde_json::from_str(&row.get::<_, String>(5)?).unwrap_or_default(),
+        name: row.get(6)?,
+        task: row.get(7)?,
+        text: row.get(8)?,
+        identity: row.get(9)?,
+        seed: row.get::<_, i64>(10)?.cast_unsigned(),
+        solver: row.get(11)?,
+        max_evaluations: size(row, 12)?,
+        begin: row.get_ref(13)?.as_blob_or_null()?.map(bytes::numbers),
+        evaluations: size(row, 14)?,
+    })
+}
+
+fn size(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
+    Ok(usize::try_from(row.get::<_, i64>(column)?).unwrap_or(0))
+}
+
+fn integer(size: usize) -> i64 {
+    i64::try_from(size).unwrap_or(i64::MAX)
+}
+
+type Columns = (Vec<u8>, Option<String>, Option<String>, Option<Vec<u8>>);
+
+/// What is known of a point, as columns: criteria, notes, failures, residuals.
+fn columns(known: &Known, rows: usize) -> Columns {
+    let mut criteria = vec![f64::NAN; rows];
+    let mut notes = serde_json::Map::new();
+    let mut failures = Vec::new();
+    let mut residuals: Vec<(usize, &[f64])> = Vec::new();
+    for (job, values) in &known.jobs {
+        match values {
+            Err(failure) => {
+                let (kind, at, why) = match failure {
+                    Failure::Diverged(t) => ("diverged", Some(t), None),
+                    Failure::StepLimit(t) => ("step-limit", Some(t), None),
+                    Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
+                    Failure::Undefined(why) => ("undefined", None, Some(why)),
+                    Failure::Criterion(why) => ("criterion", None, Some(why)),
+                };
+                // As text, which keeps every bit and what is no number.
+                failures.push(json!({ "job": job, "kind": kind, "at": at.map(f64::to_string), "why": why }));
+            }
+            Ok(values) => {
+                for (row, value) in values {
+                    match value {
+                        Err(why) => failures.push(json!({ "row": row, "why": why })),
+                        Ok(value) => {
+                            criteria[*row] = value.number;
+                            if let Some(note) = value.note {
+                                notes.insert(row.to_string(), json!(note));
+                            }
+                            if !value.residuals.is_empty() {
+                                residuals.push((*row, &value.residuals));
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let text = |value: serde_json::Value| value.to_string();
+    (
+        bytes::of_numbers(&criteria),
+        (!notes.is_empty()).then(|| text(notes.into())),
+        (!failures.is_empty()).then(|| text(failures.into())),
+        (!residuals.is_empty()).then(|| bytes::of_lists(residuals.into_iter())),
+    )
+}
+
+/// What the columns of a point say; a job is known if it failed, or each of its rows has a value or none for a reason.
+fn known(row: &Row<'_>, study: &Study, intern: &mut dyn FnMut(&str) -> &'static str) -> rusqlite::Result<Known> {
+    let criteria = bytes::numbers(row.get_ref(1)?.as_blob()?);
+    let json = |column: usize| -> rusqlite::Result<serde_json::Value> {
+        let text = row.get_ref(column)?.as_str_or_null()?;
+        Ok(text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default())
+    };
+    let (notes, failures) = (json(2)?, json(3)?);
+    let lists = row.get_ref(4)?.as_blob_or_null()?.and_then(bytes::lists).unwrap_or_default();
+    let mut residuals: HashMap<usize, Vec<f64>> = lists.into_iter().collect();
+    let failures = failures.as_array().cloned().unwrap_or_default();
+    let of = |key: &str, index: usize| failures.iter().find(|failure| failure[key].as_u64() == Some(index as u64));
+
+    let mut known = Known::default();
+    for job in 0..study.jobs.len() {
+        if let Some(failure) = of("job", job) {
+            known.jobs.push((job, Err(failure_of(failure))));
+            continue;
+        }
+        let mut value = |index: usize| -> Option<Result<Value, String>> {
+            if let Some(why) = of("row", index) {
+                return Some(Err(why["why"].as_str().unwrap_or_default().to_owned()));
+            }
+            let number = *criteria.get(index).filter(|number| number.is_finite())?;
+            let note = notes[index.to_string()].as_str().map(&mut *intern);
+            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note }))
+        };
+        let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
+        let values: Option<Vec<_>> = rows.map(|index| Some((index, value(index)?))).collect();
+        if let Some(values) = values {
+            known.jobs.push((job, JobValues::Ok(values)));
+        }
+    }
+    Ok(known)
+}
+
+fn failure_of(written: &serde_json::Value) -> Failure {
+    let at = written["at"].as_str().and_then(|at| at.parse().ok()).unwrap_or(f64::NAN);
+    let why = written["why"].as_str().unwrap_or_default().to_owned();
+    match written["kind"].as_str() {
+        Some("diverged") => Failure::Diverged(at),
+        Some("step-limit") => Failure::StepLimit(at),
+        Some("step-too-small") => Failure::StepTooSmall(at),
+        Some("criterion") => Failure::Criterion(why),
+        _ => Failure::Undefined(why),
+    }
+}

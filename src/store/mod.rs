@@ -1,0 +1,33 @@
+//! The evaluations of a run, kept as they come in `evaluations.sqlite` in its folder: a run that was killed goes on where it
+//! was, and a study that asks for something else simulates no known point again. `docs/store.md` has the tables.
+
+mod bytes;
+mod database;
+mod identity;
+mod keeper;
+mod lock;
+mod memory;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+use std::path::{Path, PathBuf};
+
+use database::Database;
+pub(crate) use database::{RunRow, RunState};
+pub(crate) use identity::Identity;
+pub(crate) use keeper::{Keeper, Opened, Refusal, Start, row};
+
+/// The run that last wrote in a folder, and whether it goes on; `None` where there is none, or it cannot be read.
+pub(crate) fn last_run(folder: &Path) -> Option<(RunRow, bool)> {
+    let run = Database::open(&file(folder), false).ok()??.last_run().ok()??;
+    Some((run, lock::Lock::is_held(folder)))
+}
+
+/// Name of the database in the folder of a run.
+pub(crate) const FILE: &str = "evaluations.sqlite";
+
+/// The database in the folder of a run.
+pub(crate) fn file(folder: &Path) -> PathBuf {
+    folder.join(FILE)
+}

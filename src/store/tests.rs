@@ -1,0 +1,171 @@
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use mops_core::file::{Files, StudyFile};
+use mops_core::{Failure, Known, Problem, RowSlopes, RowValue, Study, Value};
+
+use super::database::{Database, PointRow};
+use super::{Identity, bytes, row};
+
+struct Nothing;
+
+impl Files for Nothing {
+    fn read(&self, _: &str) -> std::io::Result<Vec<u8>> {
+        Err(std::io::ErrorKind::NotFound.into())
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+/// A shipped study with settings.
+fn file(name: &str, settings: &[&str]) -> StudyFile {
+    let catalogue = crate::catalogue();
+    let shipped = catalogue.studies.iter().find(|study| study.name == name).unwrap();
+    let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    mops_core::file::read(&catalogue, name, text, &settings, &Nothing).unwrap()
+}
+
+/// A database in memory with these points and derivatives of a study.
+fn written(study: &Study, points: &[PointRow], slopes: &[(Vec<u64>, f64, Option<RowSlopes>)]) -> Database {
+    let file = file("pid-design", &[]);
+    let mut database = Database::create(std::path::Path::new(":memory:")).unwrap();
+    let run = database.begin(&row(&Identity::of(&file, &file.study, "auto"))).unwrap();
+    database.write(run, study.rows.len(), points, slopes, points.len()).unwrap();
+    database
+}
+
+fn read(database: &Database, study: &Study) -> super::database::Points {
+    database.points(study, &mut |note| note.to_owned().leak()).unwrap()
+}
+
+#[test]
+fn what_is_written_of_a_point_is_read_bit_by_bit() {
+    let study = file("pid-design-multi-case", &[]).study;
+    let all = &study.rows;
+    let rows_of = |job: usize| (0..all.len()).filter(move |&row| all[row].job == job);
+    let odd = [0.1 + 0.2, -0.0, f64::MIN_POSITIVE / 3.0, 1e308];
+    let value = |(i, row): (usize, usize)| -> RowValue {
+        let note = (i == 0).then_some("not settled at the end");
+        (row, Ok(Value { number: odd[i % 4], residuals: if i == 1 { odd.to_vec() } else { Vec::new() }, note }))
+    };
+    let failures = [
+        Failure::Diverged(1.0 / 3.0),
+        Failure::StepLimit(f64::INFINITY),
+        Failure::StepTooSmall(0.1),
+        Failure::Undefined("a \"word\"".into()),
+        Failure::Criterion("none".into()),
+    ];
+    let mut values: Vec<RowValue> = rows_of(1).enumerate().map(value).collect();
+    values.push((rows_of(2).next().unwrap(), Err("never reached 90 %".into())));
+    let (last, with_values) = (values.pop().unwrap(), values);
+    assert!(with_values.len() >= 2);
+    let without: Vec<RowValue> = rows_of(2).map(|row| (row, last.1.clone())).collect();
+    // Of every point the first job failed in another way; jobs that were not run are not known.
+    let points: Vec<PointRow> = (failures.iter().enumerate())
+        .map(|(i, failure)| PointRow {
+            tuners: bytes::key(&[i as f64, -0.0, 1.0 / 3.0]),
+            known: Known {
+                jobs: [(0, Err(failure.clone())), (1, Ok(with_values.clone())), (2, Ok(without.clone()))][..1 + i % 3]
+                    .to_vec(),
+            },
+        })
+        .collect();
+    let found = read(&written(&study, &points, &[]), &study);
+    assert_eq!(found.len(), points.len());
+    for (i, point) in points.iter().enumerate() {
+        assert_eq!(found[&bytes::key(&[i as f64, 0.0, 1.0 / 3.0])], point.known);
+    }
+}
+
+#[test]
+fn derivatives_are_read_as_they_were_written_and_so_is_that_there_are_none() {
+    let study = file("pid-design", &[]).study;
+    let slope = |number: f64, residuals: &[f64]| Value { number, residuals: residuals.to_vec(), note: None };
+    let rows: RowSlopes = vec![
+        (0, vec![slope(0.1 + 0.2, &[1.0, -0.0]), slope(-3.0, &[0.5, 1e-300])]),
+        (1, vec![slope(1.0, &[]), slope(2.0, &[])]),
+    ];
+    let key = bytes::key(&[1.0, 2.0]);
+    let slopes = [(key.clone(), 1e-3, Some(rows.clone())), (key.clone(), 1e-4, None)];
+    let found = written(&study, &[], &slopes).slopes().unwrap();
+    assert_eq!(found[&(key.clone(), 1e-3_f64.to_bits())], Some(rows));
+    assert_eq!(found[&(key, 1e-4_f64.to_bits())], None);
+    // A list that is cut short is none.
+    let whole = bytes::of_lists([(3, &[1.0, 2.0][..])].into_iter());
+    assert_eq!(bytes::lists(&whole), Some(vec![(3, vec![1.0, 2.0])]));
+    assert!((1..whole.len()).all(|end| bytes::lists(&whole[..end]).is_none()));
+    assert_eq!(bytes::lists(&[0xff; 16]), None);
+}
+
+/// Everything that a file of study.toml says either may change, or must not.
+#[test]
+fn demands_bounds_and_solvers_may_change_and_what_is_simulated_may_not() {
+    let identity = |settings: &[&str]| {
+        let file = file("pid-design", settings);
+        let solver = file.solver.kind;
+        Identity::of(&file, &file.study, solver)
+    };
+    let plain = identity(&[]);
+    assert_eq!((plain.refuses_to_continue(&plain), plain.refuses_to_reuse(&plain)), (None, None));
+    for way in [
+        "criteria.settling.demand=\"9 s\"",
+        "criteria.settling.weight=2.0",
+        "criteria.settling.usage=\"inequality\"",
+        "tuners.k.start=3.0",
+        "tuners.k.max=60.0",
+        "tuners.k.scale=\"linear\"",
+        "tuners.k.active=false",
+        "study.seed=7",
+        "study.name=\"other\"",
+        "solver.genetic.population=50",
+    ] {
+        let other = identity(&[way]);
+        assert_eq!(plain.refuses_to_reuse(&other), None, "{way}");
+        let key = way.split('=').next().unwrap();
+        let told = plain.refuses_to_continue(&other).unwrap_or_default();
+        assert!(told.contains(key) || told.contains("solver"), "{way}: {told}");
+    }
+    for values in [
+        "cases.nominal.b=-4.5",
+        "models.loop.pid-loop.horizon=\"50 s\"",
+        "models.loop.pid-loop.plant.gain=2.0",
+        "criteria.settling.settling-time.band=0.02",
+        "tuners.Ti.unit=\"ms\"",
+        "cases.more={ a = 0.0, b = -3.0, c = -1.0 }",
+        "criteria.more={ overshoot = { signal = \"y\" }, usage = \"monitor\" }",
+    ] {
+        let other = identity(&[values]);
+        assert!(plain.refuses_to_reuse(&other).is_some(), "{values}");
+        assert!(plain.refuses_to_continue(&other).is_some(), "{values}");
+    }
+    // How long a run may be is no other run; a word for the numbers is the same number.
+    assert_eq!(plain.refuses_to_continue(&identity(&["solver.max-evaluations=7"])), None);
+    assert_eq!(plain.refuses_to_continue(&identity(&["tuners.k.start=4.00"])), None);
+}
+
+#[test]
+fn what_is_known_makes_the_evaluation_a_simulation_makes_under_any_demand() {
+    let problem = |settings: &[&str]| Problem::new(Arc::new(file("pid-design-multi-case", settings).study));
+    let (plain, asking) = (problem(&[]), problem(&["criteria.overshoot.demand=0.3"]));
+    for place in [0.1, 0.35, 0.5, 0.8] {
+        let point = vec![place; plain.active().len()];
+        let first = plain.evaluate_keeping(&point, None);
+        let known = first.learned.expect("all of it is new");
+        for problem in [&plain, &asking] {
+            let again = problem.evaluate_keeping(&point, Some(known.clone()));
+            assert!(again.learned.is_none());
+            assert_eq!(format!("{:?}", again.evaluation), format!("{:?}", problem.evaluate(&point)));
+        }
+        // Of what is half known the other half is simulated.
+        let half = Known { jobs: known.jobs.iter().step_by(2).cloned().collect() };
+        let again = asking.evaluate_keeping(&point, Some(half.clone()));
+        let missing: HashSet<usize> = again.learned.unwrap().jobs.iter().map(|(job, _)| *job).collect();
+        assert!(
+            missing.len() + half.jobs.len() == known.jobs.len() && half.jobs.iter().all(|(j, _)| !missing.contains(j))
+        );
+        assert_eq!(format!("{:?}", again.evaluation), format!("{:?}", asking.evaluate(&point)));
+    }
+}

@@ -1,0 +1,172 @@
+//! `task = "sensitivity"` with `method = "morris"` or `"sobol"`: effects of the uncertain parameters over their whole ranges.
+
+use std::sync::Arc;
+
+use mops_core::statistics::{MOST_DIMENSIONS, elementary_effects, radial, trajectories, variance_shares};
+use mops_core::{
+    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Stop, Study,
+    Subject, Watch, stream, uncertain_reports,
+};
+
+use super::batches::{Stage, each};
+use crate::report::significant;
+use crate::solve::Solved;
+
+/// Trajectories of Morris, and samples of Sobol, where nothing is said.
+const TRAJECTORIES: usize = 20;
+const SAMPLES: usize = 512;
+
+/// Confidence of the intervals, and the bootstrap samples they rest on.
+const LEVEL: f64 = 0.95;
+const REPLICATES: usize = 500;
+
+/// The effects at the design that was found; the points of a sample stay together.
+pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
+    let task = solved.problem.study().tasks.sensitivity;
+    let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
+    let problem = Problem::new(Arc::clone(&over));
+    let inputs = over.tasks.uncertain.len();
+    let first = over.tuners.len() - inputs;
+    let mut random = stream(over.seed, "global-sensitivity");
+    let (points, samples) = match task.method {
+        SensitivityMethod::Morris => {
+            let samples = task.samples.unwrap_or(TRAJECTORIES);
+            (trajectories(samples, inputs, &mut random), samples)
+        }
+        _ => {
+            let samples = task.samples.unwrap_or(SAMPLES);
+            (radial(samples, inputs, &mut random), samples)
+        }
+    };
+    let evaluate = |u: &Vec<f64>| -> Vec<Option<f64>> {
+        let mut tuners = over.start();
+        for ((value, uncertain), &u) in tuners[first..].iter_mut().zip(&over.tasks.uncertain).zip(u) {
+            *value = uncertain.quantile(u);
+        }
+        problem.evaluate_at(&tuners).readings.iter().map(|reading| reading.map(|r| r.value)).collect()
+    };
+    let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
+    let answers = each(&points, stage, watch, |of_sample| of_sample.iter().map(evaluate).collect::<Vec<_>>());
+    if answers.len() < points.len() {
+        solved.outcome.stop = Stop::Interrupted;
+    }
+    let nominal = problem.evaluate_at(&over.start());
+    let simulations = (answers.iter().map(Vec::len).sum::<usize>() + 1) * over.jobs.len();
+    solved.outcome.simulations += simulations;
+    let sound = |row: usize| {
+        let whole = points.iter().zip(&answers).filter(move |(_, a)| a.iter().all(|values| values[row].is_some()));
+        whole.map(move |(p, a)| {
+            (p.clone(), a.iter().map(|values| values[row].expect("just seen")).collect::<Vec<f64>>())
+        })
+    };
+    let criteria = over.rows.iter().enumerate().map(|(i, row)| {
+        let (points, values): (Vec<_>, Vec<_>) = sound(i).unzip();
+        let of = Subject::of(&over, row, nominal.readings[i].map_or(f64::NAN, |r| r.value));
+        EffectsReport { of, effects: effects(&over, (i, row), task.method, &points, &values) }
+    });
+    let criteria: Vec<EffectsReport> = criteria.collect();
+    let failed = answers.iter().filter(|a| a.iter().flatten().any(Option::is_none)).count();
+    let mut report = GlobalSensitivityReport {
+        words: Vec::new(),
+        method: task.method,
+        parameters: uncertain_reports(&over),
+        samples: answers.len(),
+        failed,
+        simulations,
+        level: LEVEL,
+        criteria,
+    };
+    report.words = words(&report, 2 * inputs > MOST_DIMENSIONS, samples);
+    solved.outcome.found.global_sensitivity = Some(report);
+}
+
+fn effects(
+    study: &Study,
+    (index, row): (usize, &Row),
+    method: SensitivityMethod,
+    points: &[Vec<Vec<f64>>],
+    values: &[Vec<f64>],
+) -> Vec<EffectReport> {
+    let empty = |parameter: &str| EffectReport {
+        parameter: parameter.to_owned(),
+        mean: None,
+        magnitude: None,
+        deviation: None,
+        first: None,
+        total: None,
+    };
+    let names = study.tasks.uncertain.iter().map(|uncertain| empty(&uncertain.name));
+    if values.len() < 3 {
+        return Vec::new();
+    }
+    if method == SensitivityMethod::Morris {
+        let found = elementary_effects(points, values);
+        let one = |(report, e): (EffectReport, mops_core::statistics::ElementaryEffect)| EffectReport {
+            mean: Some(e.mean),
+            magnitude: Some(e.magnitude),
+            deviation: Some(e.deviation),
+            ..report
+        };
+        return names.zip(found).map(one).collect();
+    }
+    let mut random = stream(study.seed, &format!("bootstrap {index} {}", row.name));
+    let found = variance_shares(values, LEVEL, REPLICATES, &mut random).unwrap_or_default();
+    let one = |(report, shares): (EffectReport, mops_core::statistics::VarianceShares)| EffectReport {
+        first: Some(Estimated { value: shares.first, interval: shares.first_interval }),
+        total: Some(Estimated { value: shares.total, interval: shares.total_interval }),
+        ..report
+    };
+    names.zip(found).map(one).collect()
+}
+
+/// The effects in sentences.
+fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<String> {
+    let mut words = Vec::new();
+    for found in &report.criteria {
+        let place = format!("`{}` in case `{}`", found.of.criterion, found.of.case);
+        let size = |e: &EffectReport| e.magnitude.or(e.total.map(|t| t.value)).unwrap_or(0.0);
+        let mut sorted: Vec<&EffectReport> = found.effects.iter().collect();
+        sorted.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        let Some(strongest) = sorted.first().filter(|e| size(e) > 0.0) else {
+            words.push(format!("{place} does not vary with the uncertain parameters, or has too few values."));
+            continue;
+        };
+        let unit = if found.of.unit == "1" { String::new() } else { format!(" {}", found.of.unit) };
+        words.push(match strongest.total {
+            Some(Estimated { value: total, .. }) => {
+                let first: f64 = found.effects.iter().filter_map(|e| e.first).map(|f| f.value).sum();
+                let together = 1.0 - first;
+                let rest = if together > 0.05 {
+                    format!("; {} of it come about by several parameters together", percent(together))
+                } else {
+                    String::new()
+                };
+                format!("`{}` takes part in {} of the variance of {place}{rest}.", strongest.parameter, percent(total))
+            }
+            None => format!(
+                "`{}` moves {place} most, by {}{unit} over its range in the mean.",
+                strongest.parameter,
+                significant(size(strongest), 3)
+            ),
+        });
+        let weak: Vec<String> = sorted
+            .iter()
+            .filter(|e| size(e) < 0.01 * if e.total.is_some() { 1.0 } else { size(strongest) })
+            .map(|e| format!("`{}`", e.parameter))
+            .collect();
+        if !weak.is_empty() {
+            words.push(format!("Hardly any effect on {place}: {}.", weak.join(", ")));
+        }
+    }
+    if report.failed > 0 {
+        words.push(format!("{} of {asked} samples were left out: a simulation or a criterion failed.", report.failed));
+    }
+    if random && report.method == SensitivityMethod::Sobol {
+        words.push("The Sobol sequence has too few dimensions: the samples were drawn at random.".to_owned());
+    }
+    words
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share, 3))
+}

@@ -1,0 +1,155 @@
+//! `task = "monte-carlo"`: how the criteria are distributed where parameters are uncertain.
+
+use std::sync::Arc;
+
+use mops_core::statistics::{Sampling, Summary, draw, quantile, quantile_interval, share_interval};
+use mops_core::{
+    Demand, DistributionReport, Evaluation, FEASIBLE, MonteCarloReport, MonteCarloTask, Problem, QuantileReport, Row,
+    ShareReport, Stop, Study, Subject, Usage, Watch, stream, uncertain_reports,
+};
+
+use super::at;
+use super::batches::{Stage, each};
+use crate::report::significant;
+use crate::solve::{Options, Solved, Unsuitable};
+
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let task = study.tasks.monte_carlo.clone();
+    let mut solved = at(task.at, study, options, watch)?;
+    let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
+    let problem = Problem::new(Arc::clone(&over));
+    let uncertain = &over.tasks.uncertain;
+    let first = over.tuners.len() - uncertain.len();
+    let mut random = stream(over.seed, "monte-carlo");
+    let samples: Vec<Vec<f64>> = draw(task.method, task.samples, uncertain.len(), &mut random)
+        .into_iter()
+        .map(|u| uncertain.iter().zip(u).map(|(uncertain, u)| uncertain.quantile(u)).collect())
+        .collect();
+    let evaluate = |values: &Vec<f64>| {
+        let mut tuners = over.start();
+        tuners[first..].copy_from_slice(values);
+        problem.evaluate_at(&tuners)
+    };
+    let nominal = evaluate(&over.tuners[first..].iter().map(|tuner| tuner.start).collect());
+    let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
+    let answers = each(&samples, stage, watch, evaluate);
+    if answers.len() < samples.len() {
+        solved.outcome.stop = Stop::Interrupted;
+    }
+    if answers.is_empty() {
+        return Ok(solved);
+    }
+    solved.outcome.simulations += (answers.len() + 1) * over.jobs.len();
+    let rows = over.rows.iter().enumerate();
+    let criteria: Vec<DistributionReport> =
+        rows.map(|(i, row)| distribution(&over, (i, row), &nominal, &answers, &task)).collect();
+    let demanded = |row: &Row| row.usage != Usage::Monitor && row.demand != Demand::None;
+    let all_met = |e: &&Evaluation| over.rows.iter().enumerate().all(|(i, row)| !demanded(row) || met(row, e, i));
+    let all = over
+        .rows
+        .iter()
+        .any(demanded)
+        .then(|| share(answers.iter().filter(all_met).count(), answers.len(), task.level));
+    let value = |e: &Evaluation, i: usize| e.readings[i].map_or(f64::NAN, |r| r.value);
+    let table = samples
+        .iter()
+        .zip(&answers)
+        .map(|(sample, e)| (sample.clone(), (0..over.rows.len()).map(|i| value(e, i)).collect()));
+    let report = MonteCarloReport {
+        words: words(&criteria, all, &task, answers.len()),
+        parameters: uncertain_reports(&over),
+        samples: answers.len(),
+        method: task.method,
+        level: task.level,
+        failed: answers.iter().filter(|e| e.readings.iter().any(Option::is_none)).count(),
+        criteria,
+        all,
+        table: table.collect(),
+    };
+    solved.outcome.found.monte_carlo = Some(report);
+    Ok(solved)
+}
+
+/// Whether a sample meets the demand of a row; one without a value does not.
+fn met(row: &Row, at: &Evaluation, index: usize) -> bool {
+    at.readings[index].is_some_and(|reading| match row.usage {
+        Usage::Equality => (reading.scaled - 1.0).abs() <= FEASIBLE,
+        _ => reading.scaled <= 1.0 + FEASIBLE,
+    })
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn share(count: usize, of: usize, level: f64) -> ShareReport {
+    ShareReport { count, of, share: count as f64 / of as f64, interval: share_interval(count, of, level) }
+}
+
+fn distribution(
+    study: &Study,
+    (index, row): (usize, &Row),
+    nominal: &Evaluation,
+    answers: &[Evaluation],
+    task: &MonteCarloTask,
+) -> DistributionReport {
+    let mut values: Vec<f64> = answers.iter().filter_map(|e| e.readings[index].map(|r| r.value)).collect();
+    values.sort_by(f64::total_cmp);
+    let Summary { mean, deviation, min, max } = Summary::of(&values);
+    let one = |&share: &f64| QuantileReport {
+        share,
+        value: if values.is_empty() { f64::NAN } else { quantile(&values, share) },
+        interval: quantile_interval(&values, share, task.level),
+    };
+    DistributionReport {
+        of: Subject::of(study, row, nominal.readings[index].map_or(f64::NAN, |r| r.value)),
+        mean,
+        deviation,
+        min,
+        max,
+        quantiles: task.quantiles.iter().map(one).collect(),
+        met: (row.demand != Demand::None)
+            .then(|| share(answers.iter().filter(|e| met(row, e, index)).count(), answers.len(), task.level)),
+        failed: answers.len() - values.len(),
+    }
+}
+
+/// The distributions in sentences.
+fn words(
+    criteria: &[DistributionReport],
+    all: Option<ShareReport>,
+    task: &MonteCarloTask,
+    samples: usize,
+) -> Vec<String> {
+    let percent = |share: f64| format!("{} %", significant(100.0 * share, 4));
+    let told = |share: &ShareReport| {
+        let [low, high] = share.interval;
+        format!(
+            "{} of {samples} samples ({}; with {} confidence {} to {})",
+            share.count,
+            percent(share.share),
+            percent(task.level),
+            percent(low),
+            percent(high)
+        )
+    };
+    let mut words: Vec<String> = all.iter().map(|all| format!("Every demand is met in {}.", told(all))).collect();
+    for found in criteria {
+        let DistributionReport { of, mean, deviation, met, failed, .. } = found;
+        let unit = if of.unit == "1" { String::new() } else { format!(" {}", of.unit) };
+        let demand = met.as_ref().map_or_else(String::new, |met| format!(" Its demand is met in {}.", told(met)));
+        let failed =
+            if *failed > 0 { format!(" {failed} samples have no value, and count as not met.") } else { String::new() };
+        words.push(format!(
+            "`{}` in case `{}` is {}{unit} in the mean, with a standard deviation of {}{unit}.{demand}{failed}",
+            of.criterion,
+            of.case,
+            significant(*mean, 4),
+            significant(*deviation, 3)
+        ));
+    }
+    if task.method != Sampling::Random {
+        words.push(
+            "The samples are spread evenly, not drawn independently: means and shares are more accurate than their intervals say."
+                .to_owned(),
+        );
+    }
+    words
+}

@@ -1,0 +1,268 @@
+//! A design with `[robust]`: against the worst cases of a box, which are searched and added until none is worse.
+
+use std::sync::Arc;
+
+use mops_core::{
+    AddedReport, Budget, Ending, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask, RoundReport, Run,
+    RunState, Scenario, Stop, Study, Usage, Watch, conclude, uncertain_reports,
+};
+
+use super::batches::Stage;
+use super::worst_case::{NO_GUARANTEE, Question, Region, Worst, sentence};
+use crate::report::significant;
+use crate::solve::{Options, Solved, Unsuitable, search};
+
+/// Outer approximation: solve for the cases at hand, search the box for worse ones, add them, and so on. The worst over the
+/// cases at hand is what no design can do better in, as far as the solver finds the optimum; the worst that is found in the
+/// box is what this design does.
+///
+/// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
+/// N.B.: there the worst case is found exactly; here it is searched, so that a promise is left out.
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    let task = study.tasks.robust.clone().expect("the study asks for it");
+    let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
+    let mut left = options.max_evaluations;
+    let (mut stop, mut archive, mut simulations) = (Stop::Stalled, Vec::new(), 0);
+    let mut last: Option<Solved>;
+    loop {
+        let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len() };
+        let solved = search(rounds.to_solve(), &Options { max_evaluations: left, ..options.clone() }, &designing)?;
+        left = left.saturating_sub(solved.outcome.evaluations);
+        simulations += solved.outcome.simulations;
+        archive.extend(solved.archive.iter().cloned());
+        let interrupted = solved.outcome.stop == Stop::Interrupted || watch.wants_stop();
+        let more = !interrupted && solved.best.scaled.is_some() && rounds.search(&solved, watch);
+        simulations += rounds.done.last().map_or(0, |round| round.simulations);
+        last = Some(solved);
+        if interrupted || watch.wants_stop() {
+            stop = Stop::Interrupted;
+            break;
+        }
+        if !more {
+            stop = last.as_ref().map_or(stop, |solved| solved.outcome.stop);
+            break;
+        }
+        if rounds.done.len() == rounds.task.rounds {
+            break;
+        }
+        if left == 0 {
+            stop = Stop::Budget;
+            break;
+        }
+    }
+    let last = last.expect("there is a first round");
+    let mut solved = rounds.conclude(last, options, stop);
+    (solved.outcome.evaluations, solved.outcome.simulations) = (archive.len(), simulations);
+    // Cases are added at the end: what a round did not know has no value.
+    let rows = solved.problem.study().rows.len();
+    archive.iter_mut().for_each(|record: &mut Record| record.values.resize(rows, f64::NAN));
+    solved.archive = archive;
+    Ok(solved)
+}
+
+/// Shows a round's search for a design as a stage: its points are no share of the whole.
+struct Designing<'a> {
+    watch: &'a dyn Watch,
+    round: usize,
+    cases: usize,
+}
+
+impl Watch for Designing<'_> {
+    fn wants_stop(&self) -> bool {
+        self.watch.wants_stop()
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn evaluated(&self, state: &RunState) {
+        let what = format!(
+            "round {}: designing with {} worst cases, best {}",
+            self.round,
+            self.cases,
+            significant(state.best.objective, 5)
+        );
+        self.watch.stage(&what, state.evaluations as f64 / state.budget as f64);
+    }
+}
+
+/// What was done so far.
+struct Rounds {
+    study: Study,
+    task: RobustTask,
+    /// Worst cases that were added.
+    scenarios: Vec<Scenario>,
+    done: Vec<RoundReport>,
+    /// Of every round, what was found in the box.
+    worst: Vec<Vec<Worst>>,
+}
+
+impl Rounds {
+    /// The study with all cases, from the design of the round before.
+    fn to_solve(&self) -> Study {
+        let mut study = self.study.with_scenarios(&self.scenarios);
+        if let Some(before) = self.done.last() {
+            for (tuner, &value) in study.tuners.iter_mut().zip(&before.tuners).filter(|(t, _)| t.active) {
+                tuner.start = value;
+            }
+        }
+        study
+    }
+
+    /// Searches the box around a design, and adds what is worse than the cases at hand; whether there is any.
+    fn search(&mut self, solved: &Solved, watch: &dyn Watch) -> bool {
+        let question = Question { samples: self.task.samples, starts: self.task.starts };
+        let counts = |row: &mops_core::Row| row.usage != Usage::Monitor;
+        let region = Region::new(&self.study, &solved.best.tuners, counts, question);
+        let what = format!("round {}: searching the worst cases", self.done.len() + 1);
+        let (worst, simulations) = region.search(watch, Stage { what: &what, from: 0.0, to: 1.0 });
+        let merit = solved.best.merit;
+        let constrained = |worst: &Worst| worst.subject.usage != Usage::Minimise;
+        let largest = |list: &mut dyn Iterator<Item = f64>| list.reduce(f64::max);
+        let violated = largest(&mut worst.iter().filter(|w| constrained(w)).map(|w| violation(w).max(0.0)));
+        let found = largest(&mut worst.iter().filter(|w| !constrained(w)).map(|w| w.weight * w.scaled));
+        let cases = solved.problem.study().cases.len();
+        let mut added = Vec::new();
+        for worst in &worst {
+            let excess = match constrained(worst) {
+                true => violation(worst) - merit.violation.max(0.0),
+                false => worst.weight * worst.scaled - merit.objective,
+            };
+            let failed = worst.report.failure.as_ref().map(|f| f.at.iter().map(|c| c.value).collect::<Vec<f64>>());
+            let values = match failed {
+                // Where a criterion has no value the design does not hold at all.
+                Some(at) => at,
+                None if excess > self.task.tolerance => worst.at.clone(),
+                None => continue,
+            };
+            let at = region.coordinates(&values);
+            let scenario = Scenario { name: self.name(&worst.subject.criterion), case: worst.case, values };
+            let known =
+                self.scenarios.iter().any(|known| (known.case, &known.values) == (scenario.case, &scenario.values));
+            if !known {
+                added.push(AddedReport {
+                    name: scenario.name.clone(),
+                    criterion: worst.subject.criterion.clone(),
+                    scaled: worst.scaled,
+                    at,
+                });
+                self.scenarios.push(scenario);
+            }
+        }
+        let any = !added.is_empty();
+        self.done.push(RoundReport {
+            cases,
+            tuners: solved.best.tuners.clone(),
+            for_cases: solved.outcome.worst_scaled,
+            violation_for_cases: merit.violation,
+            found: found.unwrap_or(f64::NAN),
+            violation_found: violated.unwrap_or(0.0),
+            evaluations: solved.outcome.evaluations,
+            simulations,
+            added,
+        });
+        self.worst.push(worst);
+        any
+    }
+
+    /// A name that no case has.
+    fn name(&self, criterion: &str) -> String {
+        let taken = |name: &String| {
+            self.study.cases.iter().any(|c| c.name == *name) || self.scenarios.iter().any(|s| s.name == *name)
+        };
+        (1..)
+            .map(|i| format!("worst-{criterion}-{i}"))
+            .find(|name| !taken(name))
+            .expect("there is always a next number")
+    }
+
+    /// The round whose design has the best worst case.
+    fn chosen(&self) -> Option<usize> {
+        let tolerance = self.task.tolerance;
+        let worth = |i: usize| {
+            let RoundReport { violation_found: violation, found, .. } = self.done[i];
+            // A search that was ended knows nothing.
+            let known = !self.worst[i].is_empty();
+            if known { (if violation > tolerance { violation } else { 0.0 }, found) } else { (f64::INFINITY, found) }
+        };
+        let failing = |i: usize| self.worst[i].iter().any(|w| w.report.failed > 0 || w.at.is_empty());
+        (0..self.done.len()).min_by(|&i, &j| {
+            let (a, b) = (worth(i), worth(j));
+            failing(i).cmp(&failing(j)).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1))
+        })
+    }
+
+    /// The outcome of the chosen design over all cases, those found last included.
+    fn conclude(self, last: Solved, options: &Options, stop: Stop) -> Solved {
+        let Some(chosen) = self.chosen() else { return Solved { archive: Vec::new(), ..last } };
+        let settled = self.done.last().is_some_and(|round| round.added.is_empty());
+        let design = &self.done[chosen].tuners;
+        let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios)));
+        let mut run = Run::new(&problem, Budget { evaluations: 1 }, &());
+        run.evaluate(&[problem.point_of(design)]).expect("a budget of one point suffices for one");
+        let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
+        let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, pareto, seconds: 0.0 });
+        drop(run);
+        outcome.failures = last.outcome.failures;
+        let question = Question { samples: 1, starts: 1 };
+        let region = Region::new(&self.study, design, |_| true, question);
+        let mut report = RobustReport {
+            words: Vec::new(),
+            parameters: uncertain_reports(region.study()),
+            criteria: self.worst[chosen].iter().map(|worst| worst.report.clone()).collect(),
+            rounds: self.done,
+            chosen,
+            settled,
+            tolerance: self.task.tolerance,
+            guaranteed: false,
+        };
+        report.words = words(&report, stop);
+        outcome.found.robust = Some(report);
+        Solved { outcome, problem, best, archive: Vec::new(), diagnosis: None }
+    }
+}
+
+/// By how much a constraint is violated at its worst.
+fn violation(worst: &Worst) -> f64 {
+    if worst.subject.usage == Usage::Equality { worst.severity() } else { worst.scaled - 1.0 }
+}
+
+fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
+    let round = &report.rounds[report.chosen];
+    let added: usize = report.rounds.iter().map(|round| round.added.len()).sum();
+    let number = |value: f64| significant(value, 4);
+    let rounds = report.rounds.len();
+    let end = match (report.settled, stop) {
+        (true, _) => format!(
+            "after {rounds} rounds the search found nothing worse than the cases at hand by more than {}",
+            number(report.tolerance)
+        ),
+        (false, Stop::Interrupted) => "interrupted before the search found nothing worse".to_owned(),
+        (false, Stop::Budget) => "the budget was spent before the search found nothing worse".to_owned(),
+        (false, _) => format!("the search still found worse cases after {rounds} rounds"),
+    };
+    let mut words = vec![format!("{added} worst cases were added; {end}.")];
+    let violated = if round.violation_found > FEASIBLE {
+        format!(", and a constraint is violated there by {} of its demand", number(round.violation_found))
+    } else {
+        String::new()
+    };
+    if round.found.is_finite() {
+        words.push(format!(
+            "The design is that of round {}: its worst scaled value that was found in the box is {}{violated}; over the cases \
+             that it was made for it is {}.",
+            report.chosen + 1,
+            number(round.found),
+            number(round.for_cases)
+        ));
+    }
+    let best = report.rounds.iter().map(|round| round.for_cases).filter(|v| v.is_finite()).fold(f64::NAN, f64::max);
+    if best.is_finite() && round.found.is_finite() {
+        words.push(format!(
+            "No design can do better than {} in these cases, if the solver found the optimum for them; the gap is {}.",
+            number(best),
+            number((round.found - best).max(0.0))
+        ));
+    }
+    words.extend(report.criteria.iter().map(sentence));
+    words.push(NO_GUARANTEE.to_owned());
+    words
+}

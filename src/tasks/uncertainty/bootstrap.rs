@@ -1,0 +1,126 @@
+//! The bootstrap of a calibration: residuals drawn anew in blocks, everything estimated again.
+
+use mops_core::statistics::{Summary, moving_blocks, quantile};
+use mops_core::{BootstrapParameter, BootstrapReport, Role, Stream, Study, UncertaintyTask, Watch, stream};
+
+use super::{Calibrated, held_at, refit};
+use crate::tasks::batches::{Stage, each};
+
+/// A measured channel of calibration data.
+struct Measured {
+    case: usize,
+    channel: usize,
+    /// What the calibrated model says.
+    fitted: Vec<f64>,
+    /// Measured less fitted, from their mean.
+    residuals: Vec<f64>,
+    /// Length of a block.
+    block: usize,
+}
+
+/// Estimates over replicates, and the simulations that they took: `y* = fitted + e*`, with `e*` made of blocks of the
+/// residuals that begin anywhere. The channels of an experiment that have as many samples as its first draw the same blocks,
+/// so that what they have in common stays.
+///
+/// Source: H. R. Kuensch, Annals of Statistics 17 (1989) 1217-1241 (moving blocks); B. Efron, R. J. Tibshirani, An
+/// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals).
+///
+/// # Errors
+/// What cannot be drawn anew, in a sentence.
+pub(super) fn bootstrap(
+    calibrated: &Calibrated<'_>,
+    task: &UncertaintyTask,
+    watch: &dyn Watch,
+) -> Result<(BootstrapReport, usize), String> {
+    let problem = calibrated.problem;
+    let study = problem.study();
+    let measured = measured(calibrated, task)?;
+    let numbers: Vec<usize> = (0..task.bootstrap).collect();
+    let stage = Stage { what: "bootstrap replicates", from: 0.0, to: 1.0 };
+    let found = each(&numbers, stage, watch, |number| {
+        let mut random = stream(study.seed, &format!("bootstrap {number}"));
+        let mut replicate = held_at(problem, &calibrated.best.tuners, None);
+        draw_anew(&mut replicate, &measured, &mut random);
+        refit(replicate, watch)
+    });
+    let simulations = found.iter().map(|(_, cost)| cost).sum();
+    let estimates: Vec<&Vec<f64>> = found.iter().filter_map(|(found, _)| found.as_ref()).map(|e| &e.tuners).collect();
+    if estimates.len() < 2 {
+        return Err(
+            "the bootstrap has no result: its replicates could not be estimated, or it was interrupted".to_owned()
+        );
+    }
+    let tail = 0.5 * (1.0 - calibrated.level);
+    let one = |&index: &usize| {
+        let draws: Vec<f64> = estimates.iter().map(|tuners| tuners[index]).collect();
+        let mut sorted = draws.clone();
+        sorted.sort_by(f64::total_cmp);
+        let Summary { mean, deviation, .. } = Summary::of(&draws);
+        let (tuner, value) = (&study.tuners[index], calibrated.best.tuners[index]);
+        BootstrapParameter {
+            parameter: tuner.name.clone(),
+            unit: tuner.unit.to_string(),
+            value,
+            bias: mean - value,
+            std_error: deviation,
+            interval: [quantile(&sorted, tail), quantile(&sorted, 1.0 - tail)],
+            draws,
+        }
+    };
+    let report = BootstrapReport {
+        replicates: estimates.len(),
+        failed: found.len() - estimates.len(),
+        blocks: measured.iter().map(|m| m.block).collect(),
+        parameters: problem.active().iter().map(one).collect(),
+    };
+    Ok((report, simulations))
+}
+
+#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<Measured>, String> {
+    let problem = calibrated.problem;
+    let study = problem.study();
+    let mut all = Vec::new();
+    for (job, plan) in study.jobs.iter().enumerate() {
+        let case = &study.cases[plan.case];
+        let Some(experiment) = case.experiment.as_ref().filter(|e| e.role == Role::Calibration) else { continue };
+        if !experiment.responses.is_empty() {
+            return Err(format!(
+                "no bootstrap: `{}` measures a frequency response, whose errors have no blocks",
+                case.name
+            ));
+        }
+        let Ok(analysis) = problem.analyse_all(job, &calibrated.best.tuners, None) else { continue };
+        for (index, channel) in experiment.channels.iter().enumerate() {
+            let of_channel = |m: &Measured| m.case == plan.case && m.channel == index;
+            let trace = analysis.response().and_then(|response| response.trace(&channel.signal));
+            let Some(trace) = trace.filter(|_| !all.iter().any(of_channel)) else { continue };
+            let fitted = trace.sample(&channel.times);
+            let raw: Vec<f64> = channel.values.iter().zip(&fitted).map(|(y, f)| y - f).collect();
+            let mean = raw.iter().sum::<f64>() / raw.len() as f64;
+            let usual = (raw.len() as f64).cbrt().ceil() as usize;
+            let block = task.block.unwrap_or(usual).clamp(1, raw.len());
+            let residuals = raw.into_iter().map(|e| e - mean).collect();
+            all.push(Measured { case: plan.case, channel: index, fitted, residuals, block });
+        }
+    }
+    Ok(all)
+}
+
+/// Puts fitted values with residuals from elsewhere into the experiments.
+fn draw_anew(study: &mut Study, measured: &[Measured], random: &mut Stream) {
+    let mut order: Vec<usize> = Vec::new();
+    let mut before: Option<(usize, usize, usize)> = None;
+    for of in measured {
+        let n = of.residuals.len();
+        let drawn = (of.case, n, of.block);
+        if before != Some(drawn) {
+            order = moving_blocks(n, of.block, random);
+            before = Some(drawn);
+        }
+        let errors = order.iter().map(|&i| of.residuals[i]);
+        let values = of.fitted.iter().zip(errors).map(|(fitted, error)| fitted + error).collect();
+        let experiment = study.cases[of.case].experiment.as_mut().expect("it was measured there");
+        experiment.channels[of.channel].values = values;
+    }
+}

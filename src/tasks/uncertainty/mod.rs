@@ -1,0 +1,144 @@
+//! What a calibration tells of the uncertainty of its estimates besides standard errors: `[uncertainty]`.
+
+mod bands;
+mod bootstrap;
+mod profile;
+
+use mops_core::identification::Covariance;
+use mops_core::statistics::t_quantile;
+use mops_core::{Budget, Evaluation, Oracle, Problem, Run, Stop, Study, UncertaintyReport, Watch};
+use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
+
+use profile::Profiles;
+
+use super::batches::Quiet;
+use crate::report::significant;
+use crate::solve::Solved;
+
+/// What all three rest on.
+struct Calibrated<'a> {
+    problem: &'a Problem,
+    best: &'a Evaluation,
+    covariance: Covariance,
+    /// Confidence of the intervals, and the t quantile that belongs to it.
+    level: f64,
+    limit: f64,
+}
+
+/// Adds what the study asks for.
+pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
+    let Some(task) = solved.problem.study().tasks.uncertainty.clone() else { return };
+    if solved.outcome.stop == Stop::Interrupted {
+        return;
+    }
+    let problem = &solved.problem;
+    // N.B.: the residuals of the calibration data alone.
+    let best = problem.evaluate(&problem.point_of(&solved.best.tuners));
+    let least_squares =
+        problem.shape().residuals > 0 && LevenbergMarquardtOptions::default().local().accepts(problem.shape()).is_ok();
+    let covariance = Covariance::at(problem, &best.tuners).filter(|_| least_squares && best.scaled.is_some());
+    let Some(covariance) = covariance else {
+        let why = "the uncertainty of the estimates cannot be told: the objective is no sum of squares, a simulation \
+                   failed, or the samples are too few";
+        solved.outcome.warnings.push(why.to_owned());
+        return;
+    };
+    let limit = t_quantile(0.5 + 0.5 * task.level, covariance.freedom);
+    let calibrated = Calibrated { problem, best: &best, covariance, level: task.level, limit };
+    let mut report = UncertaintyReport {
+        words: Vec::new(),
+        level: task.level,
+        profiles: Vec::new(),
+        bootstrap: None,
+        bands: Vec::new(),
+    };
+    let Profiles { profiles, mut simulations, better } = profile::profiles(&calibrated, &task.profile, watch);
+    report.profiles = profiles;
+    if let Some(better) = better {
+        solved.outcome.warnings.push(format!(
+            "a better fit was met while profiling, with an objective of {} instead of {}: solve again with more starts",
+            significant(better, 5),
+            significant(best.merit.objective, 5)
+        ));
+    }
+    if task.bootstrap > 0 {
+        match bootstrap::bootstrap(&calibrated, &task, watch) {
+            Ok((found, cost)) => {
+                report.bootstrap = Some(found);
+                simulations += cost;
+            }
+            Err(why) => solved.outcome.warnings.push(why),
+        }
+    }
+    if task.bands {
+        report.bands = bands::bands(&calibrated, &solved.best.tuners);
+    }
+    report.words = words(&report, &calibrated);
+    if watch.wants_stop() {
+        solved.outcome.stop = Stop::Interrupted;
+    }
+    solved.outcome.simulations += simulations;
+    solved.outcome.found.uncertainty = Some(report);
+}
+
+/// Estimates the active tuners of a study again, from where they stand; with the number of simulations it took.
+fn refit(study: Study, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
+    let problem = Problem::new(std::sync::Arc::new(study));
+    let start = problem.start();
+    if problem.active().is_empty() {
+        let at = problem.evaluate(&start);
+        return (Some(at).filter(|e| e.scaled.is_some()), problem.simulations());
+    }
+    let quiet = Quiet(watch);
+    let mut run = Run::new(&problem, Budget { evaluations: 100 * (problem.active().len() + 1) }, &quiet);
+    run.solve(LevenbergMarquardtOptions::default().local().as_mut(), &start);
+    let simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
+    (run.best().filter(|best| best.scaled.is_some()).cloned(), simulations)
+}
+
+/// The study with its tuners at given values, and one of them held there.
+fn held_at(problem: &Problem, tuners: &[f64], held: Option<usize>) -> Study {
+    let mut study = Study::clone(problem.study());
+    for (i, tuner) in study.tuners.iter_mut().enumerate() {
+        tuner.start = tuners[i];
+        tuner.active &= Some(i) != held && problem.active().contains(&i);
+    }
+    study
+}
+
+/// The findings in sentences.
+fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String> {
+    let mut words = Vec::new();
+    let percent = format!("{} %", significant(100.0 * report.level, 4));
+    let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
+    for found in &report.profiles {
+        let [low, high] =
+            found.interval.map(|end| if end.is_finite() { significant(end, 5) } else { "nowhere".into() });
+        let [below, above] = [0, 1].map(|i| (found.interval[i] - found.value).abs());
+        let skewed = below.is_finite() && above.is_finite() && (below > 1.2 * above || above > 1.2 * below);
+        let remark = match found.ends {
+            ["data", "data"] if skewed => ", which is lopsided: the standard error tells less than half of it",
+            ["data", "data"] => "",
+            ends if ends.contains(&"bound") => ": a bound of the tuner ends it, not the data",
+            _ => ": the data set no limit on one side",
+        };
+        words.push(format!(
+            "`{}`: the {percent} interval of the likelihood goes from {low} to {high}{}{remark}.",
+            found.parameter,
+            unit(&found.unit)
+        ));
+    }
+    if let Some(found) = &report.bootstrap {
+        let failed =
+            if found.failed > 0 { format!("; {} could not be estimated", found.failed) } else { String::new() };
+        words.push(format!("{} bootstrap replicates{failed}.", found.replicates));
+    }
+    if calibrated.covariance.undetermined > 0 && !report.bands.is_empty() {
+        words.push(format!(
+            "The bands leave out {} directions of the tuners that the data do not determine: predictions far from these data \
+             may be worse.",
+            calibrated.covariance.undetermined
+        ));
+    }
+    words
+}

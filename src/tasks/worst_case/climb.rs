@@ -1,0 +1,108 @@
+//! One search for the worst of one criterion: a solver at the usual seam, with the sign of the criterion reversed.
+
+use std::sync::Arc;
+
+use mops_core::{Budget, Demand, Evaluation, Oracle, Problem, Run, Solver, SolverOptions, Study, Usage, Watch};
+use mops_solvers::cma_es::CmaEsOptions;
+use mops_solvers::pattern_search::PatternSearchOptions;
+use mops_solvers::sqp::SqpOptions;
+
+use crate::tasks::batches::Quiet;
+
+/// What a search of a criterion in one direction is: upwards, or downwards for the other side of an equality.
+pub(super) struct Goal {
+    pub row: usize,
+    pub problem: Problem,
+    pub upwards: bool,
+}
+
+impl Goal {
+    /// The row of a study over its uncertain parameters, upwards or downwards.
+    pub(super) fn new(study: &Study, row: usize, upwards: bool) -> Self {
+        let mut only = study.rows[row].clone();
+        (only.usage, only.weight) = (Usage::Minimise, 1.0);
+        if upwards {
+            only.demand = reversed(only.demand);
+        }
+        let study = Study { rows: vec![only], ..study.clone() };
+        Self { row, problem: Problem::new(Arc::new(study)), upwards }
+    }
+
+    /// Searches for the worst of all rows: every one upwards, equalities downwards too.
+    pub(super) fn all(study: &Study) -> Vec<Self> {
+        let rows = study.rows.iter().enumerate();
+        rows.flat_map(|(i, row)| {
+            let down = (row.usage == Usage::Equality).then(|| Self::new(study, i, false));
+            std::iter::once(Self::new(study, i, true)).chain(down)
+        })
+        .collect()
+    }
+}
+
+/// Where a search ended.
+pub(super) struct End {
+    pub evaluation: Option<Evaluation>,
+    pub simulations: usize,
+    pub failed: Vec<(String, Vec<f64>)>,
+}
+
+/// The demand by which the scaled value is that of another with its sign reversed.
+fn reversed(demand: Demand) -> Demand {
+    let (good, bad) = match demand {
+        Demand::Value(demand) => (0.0, demand),
+        Demand::Pair { good, bad } => (good, bad),
+        Demand::None => (0.0, 1.0),
+    };
+    Demand::Pair { good, bad: 2.0 * good - bad }
+}
+
+/// From one start: along slopes, then without them, since the worst case may lie on a jump.
+pub(super) fn local(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
+    let n = start.len();
+    let steps: [(_, usize); 2] = [
+        (SqpOptions { radius: 0.25, ..SqpOptions::default() }.build(), 40 * (n + 1)),
+        (PatternSearchOptions { size: 0.02, tolerance: 1e-6, ..PatternSearchOptions::default() }.build(), 60 * (n + 1)),
+    ];
+    let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
+    for (mut solver, evaluations) in steps {
+        let from = end.evaluation.as_ref().map_or_else(|| start.to_vec(), |e| e.point.clone());
+        search_once(goal, solver.as_mut(), &from, evaluations, watch, &mut end);
+    }
+    end
+}
+
+/// Over the whole box by CMA-ES, then locally.
+pub(super) fn whole(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
+    let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
+    let mut solver = CmaEsOptions { restarts: 0, tolerance: 1e-6, ..CmaEsOptions::default() }.build();
+    search_once(goal, solver.as_mut(), start, 80 * (start.len() + 1), watch, &mut end);
+    let from = end.evaluation.as_ref().map_or_else(|| start.to_vec(), |e| e.point.clone());
+    let polished = local(goal, &from, watch);
+    end.simulations += polished.simulations;
+    end.failed.extend(polished.failed);
+    End { evaluation: polished.evaluation, ..end }
+}
+
+fn search_once(
+    goal: &Goal,
+    solver: &mut dyn Solver,
+    from: &[f64],
+    evaluations: usize,
+    watch: &dyn Watch,
+    end: &mut End,
+) {
+    let quiet = Quiet(watch);
+    let mut run = Run::new(&goal.problem, Budget { evaluations }, &quiet);
+    run.solve(solver, from);
+    end.simulations += (run.archive().len() + run.linearisations()) * goal.problem.simulations();
+    let why = run.failures().first().map_or_else(String::new, |failure| failure.first.to_string());
+    let failed = run.archive().iter().filter(|record| record.merit.objective.is_infinite());
+    end.failed.extend(failed.map(|record| (why.clone(), record.tuners.clone())));
+    let found = run.best().filter(|best| best.scaled.is_some());
+    if let Some(found) = found {
+        let better = end.evaluation.as_ref().is_none_or(|known| found.merit.is_better_than(&known.merit));
+        if better {
+            end.evaluation = Some(found.clone());
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The search of a box of uncertain parameters for the worst of every criterion.
+//!
+//! Nothing but solvers at the usual seam: the uncertain parameters are the tuners, and the only row is the criterion with
+//! its sign reversed.
+
+use std::sync::Arc;
+
+use mops_core::statistics::{Sampling, draw};
+use mops_core::{
+    CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Role, Row, Study, Subject, Usage, Watch,
+    WorstReport, stream,
+};
+
+use super::climb::{End, Goal, local, whole};
+use crate::tasks::batches::{Stage, each};
+
+/// Corners of the box are all looked at up to this dimension.
+const MOST_CORNERS: usize = 8;
+
+/// Starts lie at least this far apart in the unit box, where there are enough of them.
+const APART: f64 = 0.2;
+
+/// Searches that end this close, in the unit box and in scaled values, ended at the same place.
+const SAME_PLACE: f64 = 0.02;
+const SAME_VALUE: f64 = 1e-3;
+
+/// How a box is searched.
+#[derive(Clone, Copy)]
+pub(in crate::tasks) struct Question {
+    /// Points at which all criteria are looked at first.
+    pub samples: usize,
+    /// Local searches per criterion.
+    pub starts: usize,
+}
+
+/// A design, and the box around it.
+pub(in crate::tasks) struct Region {
+    /// The study over its uncertain parameters, with the rows that are searched.
+    study: Study,
+    /// Number of tuners that are not uncertain parameters.
+    fixed: usize,
+    question: Question,
+}
+
+/// The worst of a row.
+#[derive(Debug, Clone)]
+pub(in crate::tasks) struct Worst {
+    /// The criterion, as the study has it.
+    pub subject: Subject,
+    /// Its row, by index into those of the study over its uncertain parameters.
+    pub row: usize,
+    /// The case, by index.
+    pub case: usize,
+    /// Weight in the objective.
+    pub weight: f64,
+    /// Its value by its demand.
+    pub scaled: f64,
+    /// Values of the uncertain parameters; empty where every simulation failed.
+    pub at: Vec<f64>,
+    /// What the search tells of itself.
+    pub report: WorstReport,
+}
+
+impl Worst {
+    /// How bad it is: the scaled value, of an equality its distance from 1.
+    pub fn severity(&self) -> f64 {
+        severity(self.subject.usage, self.scaled)
+    }
+}
+
+fn severity(usage: Usage, scaled: f64) -> f64 {
+    if usage == Usage::Equality { (scaled - 1.0).abs() } else { scaled }
+}
+
+impl Region {
+    /// The box around a design, and the rows that `wanted` picks.
+    pub fn new(study: &Study, design: &[f64], wanted: impl Fn(&Row) -> bool, question: Question) -> Self {
+        let mut over = study.over_uncertain(design);
+        let counts = |row: &Row, study: &Study| study.case_of(row).role() == Role::Calibration;
+        let keep: Vec<bool> = over.rows.iter().map(|row| wanted(row) && counts(row, &over)).collect();
+        let mut keep = keep.into_iter();
+        over.rows.retain(|_| keep.next().expect("one for every row"));
+        Self { fixed: over.tuners.len() - over.tasks.uncertain.len(), study: over, question }
+    }
+
+    /// The study over its uncertain parameters.
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
+    /// Values of the uncertain parameters among those of all tuners.
+    fn uncertain<'v>(&self, tuners: &'v [f64]) -> &'v [f64] {
+        &tuners[self.fixed..]
+    }
+
+    /// Points that stand for the whole box: its nominal point, its corners, and a Sobol sequence.
+    fn points(&self, problem: &Problem) -> Vec<Vec<f64>> {
+        let n = problem.active().len();
+        let mut points = vec![problem.start()];
+        if n <= MOST_CORNERS {
+            points.extend((0..1usize << n).map(|corner| (0..n).map(|j| f64::from((corner >> j & 1) as u8)).collect()));
+        }
+        let mut random = stream(self.study.seed, "worst-case");
+        points.extend(draw(Sampling::Sobol, self.question.samples, n, &mut random));
+        points
+    }
+
+    /// The worst of every row, in their order; none where the user ends the search. Also the simulations it took.
+    pub fn search(&self, watch: &dyn Watch, stage: Stage<'_>) -> (Vec<Worst>, usize) {
+        let every = self.every();
+        let points = self.points(&every);
+        let middle = stage.from + 0.2 * (stage.to - stage.from);
+        let seen = each(&points, Stage { to: middle, ..stage }, watch, |point| every.evaluate(point));
+        let shared = seen.len() * every.simulations();
+        if seen.len() < points.len() {
+            return (Vec::new(), shared);
+        }
+        let goals = Goal::all(&self.study);
+        // The first search for each goal goes over the whole box, from the worst point seen.
+        let searches: Vec<(usize, bool, Vec<f64>)> = goals
+            .iter()
+            .enumerate()
+            .flat_map(|(g, goal)| {
+                let starts = self.starts(goal, &seen);
+                let first = starts.first().map(|start| (g, true, start.clone()));
+                first.into_iter().chain(starts.into_iter().map(move |start| (g, false, start)))
+            })
+            .collect();
+        let ends = each(&searches, Stage { from: middle, ..stage }, watch, |(g, everywhere, start)| {
+            if *everywhere { whole(&goals[*g], start, watch) } else { local(&goals[*g], start, watch) }
+        });
+        let simulations = shared + ends.iter().map(|end| end.simulations).sum::<usize>();
+        if ends.len() < searches.len() {
+            return (Vec::new(), simulations);
+        }
+        let worst = |row: usize| {
+            let of_row = searches.iter().zip(&ends).filter(|((g, ..), _)| goals[*g].row == row);
+            self.worst(row, &seen, &of_row.map(|(_, end)| end).collect::<Vec<_>>())
+        };
+        ((0..self.study.rows.len()).map(worst).collect(), simulations)
+    }
+
+    /// The problem in which every row counts and has a scaled value.
+    fn every(&self) -> Problem {
+        let mut study = self.study.clone();
+        for row in &mut study.rows {
+            row.usage = Usage::Minimise;
+            if row.demand == Demand::None {
+                row.demand = Demand::Value(1.0);
+            }
+        }
+        Problem::new(Arc::new(study))
+    }
+
+    /// The worst points that were seen, apart from each other where there are enough.
+    fn starts(&self, goal: &Goal, seen: &[Evaluation]) -> Vec<Vec<f64>> {
+        let sign = if goal.upwards { 1.0 } else { -1.0 };
+        let mut known: Vec<(f64, &Vec<f64>)> =
+            seen.iter().filter_map(|e| Some((sign * e.readings[goal.row]?.scaled, &e.point))).collect();
+        known.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut starts: Vec<&Vec<f64>> = Vec::new();
+        for apart in [APART, 0.0] {
+            for (_, point) in &known {
+                if starts.len() < self.question.starts && starts.iter().all(|start| distance(start, point) > apart) {
+                    starts.push(point);
+                }
+            }
+        }
+        starts.into_iter().cloned().collect()
+    }
+
+    /// The worst of a row, of all that was seen and of the ends of its searches.
+    fn worst(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Worst {
+        let row = &self.study.rows[index];
+        let nominal = seen[0].readings[index].map_or(f64::NAN, |r| r.value);
+        let mut reached: Vec<(f64, f64, &Evaluation)> = Vec::new();
+        for evaluation in ends.iter().filter_map(|end| end.evaluation.as_ref()) {
+            if let Some(reading) = evaluation.readings[0] {
+                reached.push((reading.value, scale(row, reading.value), evaluation));
+            }
+        }
+        let looked = seen.iter().filter_map(|e| e.readings[index].map(|r| (r.value, scale(row, r.value), e)));
+        let worst = looked.chain(reached.iter().copied()).reduce(|worst, next| {
+            if severity(row.usage, next.1) > severity(row.usage, worst.1) { next } else { worst }
+        });
+        let ended = |(_, scaled, place): (f64, f64, &Evaluation)| {
+            let alike = |other: f64| (scaled - other).abs() <= SAME_VALUE * scaled.abs().max(1.0);
+            let near = |end: &Evaluation| distance(&place.point, &end.point) <= SAME_PLACE;
+            reached.iter().filter(|(_, other, end)| alike(*other) && near(end)).count()
+        };
+        let demanded = row.demand != Demand::None;
+        let (value, scaled) = worst.as_ref().map_or((f64::NAN, f64::NAN), |w| (w.0, w.1));
+        let failed = self.failed(index, seen, ends);
+        let at: Vec<f64> = worst.as_ref().map_or_else(Vec::new, |w| self.uncertain(&w.2.tuners).to_vec());
+        let subject = Subject::of(&self.study, row, nominal);
+        let report = WorstReport {
+            of: subject.clone(),
+            value,
+            scaled: if demanded { scaled } else { f64::NAN },
+            met: !demanded
+                || severity(row.usage, scaled) <= if row.usage == Usage::Equality { FEASIBLE } else { 1.0 + FEASIBLE },
+            at: self.coordinates(&at),
+            starts: ends.len(),
+            ended_here: worst.map_or(0, ended),
+            simulations: ends.iter().map(|end| end.simulations).sum(),
+            failed: failed.len(),
+            failure: failed.first().map(|(why, at)| FailedAt { why: why.clone(), at: self.coordinates(at) }),
+            slices: Vec::new(),
+        };
+        Worst { subject, row: index, case: self.study.jobs[row.job].case, weight: row.weight, scaled, at, report }
+    }
+
+    /// Why simulations failed that would have given a row its value, and where.
+    fn failed(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Vec<(String, Vec<f64>)> {
+        let job = self.study.rows[index].job;
+        let why = |e: &Evaluation| {
+            let of_job = e.failures.iter().find(|(of, _)| *of == job);
+            of_job.map_or_else(String::new, |(_, failure)| failure.to_string())
+        };
+        let looked = seen.iter().filter(|e| e.readings[index].is_none()).map(|e| (why(e), &e.tuners));
+        let searched = ends.iter().flat_map(|end| &end.failed).map(|(why, tuners)| (why.clone(), tuners));
+        looked.chain(searched).map(|(why, tuners)| (why, self.uncertain(tuners).to_vec())).collect()
+    }
+
+    /// Values of the uncertain parameters, with what a reader wants to know of each.
+    pub fn coordinates(&self, at: &[f64]) -> Vec<CoordinateReport> {
+        let of = |(tuner, &value): (&mops_core::Tuner, &f64)| CoordinateReport {
+            name: tuner.name.clone(),
+            value,
+            unit: tuner.unit.to_string(),
+            at_bound: tuner.at_bound(value),
+        };
+        self.study.tuners[self.fixed..].iter().zip(at).map(of).collect()
+    }
+}
+
+/// The scaled value; the value itself where nothing is demanded.
+fn scale(row: &Row, value: f64) -> f64 {
+    if row.demand == Demand::None { value } else { row.demand.scale(value) }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}

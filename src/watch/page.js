@@ -1,0 +1,166 @@
+// Shows the newest state of the run. States come as server-sent events; each is whole, so that one may be missed.
+"use strict";
+
+const at = (id) => document.getElementById(id);
+const text = (id, value) => { if (at(id).textContent !== value) at(id).textContent = value; };
+
+/** A number to so many significant digits, without trailing zeros. */
+function number(value, digits = 5) {
+  if (value === null || value === undefined) return "n/a";
+  return String(Number(value.toPrecision(digits)));
+}
+
+/** A time in s, min or h. */
+function time(seconds) {
+  if (seconds === null || seconds === undefined) return "not known yet";
+  if (seconds < 120) return `${number(seconds, seconds < 10 ? 2 : 3)} s`;
+  return seconds < 7200 ? `${number(seconds / 60, 3)} min` : `${number(seconds / 3600, 3)} h`;
+}
+
+/** An element with attributes and children; texts are never read as markup. */
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+function bar(criterion) {
+  const share = Math.min(Math.max(criterion.scaled ?? 0, 0), 2) * 50;
+  const tone = criterion.met ? "met" : criterion.constraint ? "missed" : "above";
+  const filled = element("span");
+  filled.style.width = `${share}%`;
+  return element("span", { class: "scaled" },
+    element("span", { class: "number" }, number(criterion.scaled, 4)),
+    element("span", { class: `bar ${tone}`, "aria-hidden": "true" }, filled));
+}
+
+function criterionRow(criterion) {
+  const asked = criterion.demand !== null;
+  const demand = asked ? `${criterion.at_least ? "at least " : ""}${number(criterion.demand)}` : "none";
+  const tone = criterion.met ? "met" : criterion.constraint ? "missed" : "above";
+  return element("tr", {},
+    element("th", { scope: "row" }, criterion.name),
+    element("td", {}, criterion.case),
+    element("td", { class: "number" }, demand),
+    element("td", { class: "number" }, element("strong", {}, number(criterion.value))),
+    element("td", {}, criterion.unit),
+    element("td", {}, asked ? bar(criterion) : ""),
+    element("td", {}, asked ? element("span", { class: tone }, criterion.met ? "met" : "not met") : ""));
+}
+
+function tunerRow(tuner) {
+  const cell = element("td");
+  if (tuner.position !== null) {
+    const mark = element("span", { class: "at" });
+    mark.style.left = `${100 * tuner.position}%`;
+    cell.append(element("span", { class: "range", "aria-hidden": "true" }, mark));
+  } else {
+    cell.append("kept");
+  }
+  return element("tr", {},
+    element("th", { scope: "row" }, tuner.name),
+    element("td", { class: "number" }, element("strong", {}, number(tuner.value))),
+    element("td", {}, tuner.unit), cell);
+}
+
+/** Round steps between two ends, about `count` of them. */
+function ticks(low, high, count) {
+  const rough = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough);
+  const found = [];
+  for (let i = Math.ceil(low / step); i * step <= high + 1e-9 * step; i++) found.push(Number((i * step).toPrecision(12)));
+  return found;
+}
+
+const NS = "http://www.w3.org/2000/svg";
+
+/** A part of the drawing. */
+function drawn(name, attributes, content = "") {
+  const made = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.textContent = content;
+  return made;
+}
+
+/** The curve of the best objective: steps, in another colour while a constraint is violated. */
+function curve(state) {
+  const points = state.curve.filter((p) => p[1] !== null);
+  const svg = at("curve");
+  if (points.length === 0) return svg.replaceChildren();
+  const [left, right, top, bottom] = [64, 626, 12, 262];
+  const end = Math.max(state.evaluations, 2);
+  const values = points.map((p) => p[1]);
+  let [low, high] = [Math.min(...values), Math.max(...values)];
+  const log = low > 0 && high / low > 20;
+  const f = log ? Math.log10 : (v) => v;
+  const room = (f(high) - f(low)) * 0.06 || Math.abs(f(high)) * 0.1 || 1;
+  const [from, to] = [f(low) - room, f(high) + room];
+  const x = (n) => left + (right - left) * (n - 1) / (end - 1);
+  const y = (v) => bottom - (bottom - top) * (f(v) - from) / (to - from);
+  const parts = [];
+  for (const tick of ticks(from, to, 5)) {
+    const value = log ? 10 ** tick : tick;
+    parts.push(drawn("path", { class: "grid", d: `M${left} ${y(value)}H${right}` }));
+    parts.push(drawn("text", { class: "faint", x: left - 6, y: y(value) + 4, "text-anchor": "end" }, number(value, 3)));
+  }
+  for (const tick of ticks(1, end, 5)) {
+    parts.push(drawn("text", { class: "faint", x: x(tick), y: bottom + 18, "text-anchor": "middle" }, String(tick)));
+  }
+  parts.push(drawn("text", { class: "faint", x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, "evaluations"));
+  points.forEach((point, i) => {
+    const until = i + 1 < points.length ? points[i + 1] : [end, point[1]];
+    const d = `M${x(point[0])} ${y(point[1])}H${x(until[0])}V${y(until[1])}`;
+    parts.push(drawn("path", { class: point[3] ? "result" : "measured", d }));
+  });
+  const last = points[points.length - 1];
+  parts.push(drawn("circle", { cx: x(end), cy: y(last[1]), r: 4 }));
+  svg.replaceChildren(...parts);
+}
+
+function verdict(state) {
+  const best = state.best;
+  const [tone, sentence] = !best || best.objective === null
+    ? ["mixed", "No point has a value yet"]
+    : best.feasible
+      ? [best.objective <= 1 || state.task !== "design" ? "good" : "mixed", `Best objective ${number(best.objective, 6)}`]
+      : ["bad", `Best objective ${number(best.objective, 6)}, a constraint violated by ${number(best.violation, 3)}`];
+  const where = state.over !== null ? `. The run is over; its result and report.html are in ${state.over}` : "";
+  const stage = state.stage ? ` (${state.stage})` : "";
+  at("verdict").className = `verdict ${tone}`;
+  text("verdict", sentence + stage + where);
+}
+
+function show(state) {
+  document.title = `${state.study}: ${state.over !== null ? "over" : `${Math.round(100 * state.share)} %`}`;
+  text("study", state.study);
+  text("task", state.task);
+  text("solver", state.solver);
+  text("evaluations", `${state.evaluations} of ${state.budget}`);
+  text("failed", String(state.failed));
+  text("seconds", time(state.seconds));
+  text("left", state.over !== null ? "none" : time(state.left));
+  at("share").value = state.over !== null ? 1 : state.share;
+  verdict(state);
+  if (state.criteria) at("criteria").replaceChildren(...state.criteria.map(criterionRow));
+  if (state.tuners) at("tuners").replaceChildren(...state.tuners.map(tunerRow));
+  curve(state);
+  document.body.dataset.shown = String(state.evaluations);
+}
+
+show(JSON.parse(at("now").textContent));
+const events = new EventSource("events");
+events.onmessage = (event) => show(JSON.parse(event.data));
+events.addEventListener("over", (event) => { show(JSON.parse(event.data)); events.close(); });
+events.onerror = () => {
+  // A run that was killed says nothing any more: after a while the page says so.
+  if (events.readyState === EventSource.CLOSED) return;
+  clearTimeout(window.silence);
+  window.silence = setTimeout(() => {
+    if (events.readyState !== EventSource.OPEN) {
+      at("verdict").className = "verdict mixed";
+      text("verdict", "The run cannot be reached: it is over or was ended");
+    }
+  }, 4000);
+};

@@ -1,0 +1,95 @@
+//! What a browser may ask for: three files and a stream of states, by GET, at this machine's own name.
+
+/// What is answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// The page.
+    Page,
+    /// Its style sheet.
+    Style,
+    /// Its script.
+    Script,
+    /// States, as they come.
+    Events,
+    /// Status and reason.
+    Refused(u16, &'static str),
+    /// The head is not complete yet.
+    More,
+}
+
+/// Bytes of the head of a request, at most.
+pub(super) const LONGEST: usize = 8192;
+
+/// The answer to the head of a request; `port` and `token` are those of the page.
+pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
+    let mut headers = [httparse::EMPTY_HEADER; 64];
+    let mut request = httparse::Request::new(&mut headers);
+    match request.parse(head) {
+        Ok(httparse::Status::Partial) if head.len() >= LONGEST => {
+            return Answer::Refused(431, "Request Header Fields Too Large");
+        }
+        Ok(httparse::Status::Partial) => return Answer::More,
+        Err(_) => return Answer::Refused(400, "Bad Request"),
+        Ok(httparse::Status::Complete(_)) => {}
+    }
+    let mut hosts = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case("host"));
+    // A page of another name that leads here (DNS rebinding) says its own name.
+    let ours = ["127.0.0.1", "localhost"].map(|host| format!("{host}:{port}"));
+    let is_ours = |host: &httparse::Header<'_>| ours.iter().any(|our| host.value.eq_ignore_ascii_case(our.as_bytes()));
+    if !(hosts.next().is_some_and(is_ours) && hosts.next().is_none()) {
+        return Answer::Refused(403, "Forbidden");
+    }
+    if request.method != Some("GET") {
+        return Answer::Refused(405, "Method Not Allowed");
+    }
+    let path = request.path.unwrap_or_default();
+    let below = path.strip_prefix('/').and_then(|path| path.split_once('/')).filter(|(first, _)| same(first, token));
+    match below.map(|(_, rest)| rest) {
+        Some("") => Answer::Page,
+        Some("style.css") => Answer::Style,
+        Some("page.js") => Answer::Script,
+        Some("events") => Answer::Events,
+        _ => Answer::Refused(404, "Not Found"),
+    }
+}
+
+/// Whether two texts are the same, in a time that does not tell how far they agree.
+fn same(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(head: &str) -> Answer {
+        answer(head.as_bytes(), 4711, "secret")
+    }
+
+    #[test]
+    fn only_the_token_at_this_machine_by_get_is_answered() {
+        let get = |path: &str, host: &str| asked(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n"));
+        assert_eq!(get("/secret/", "127.0.0.1:4711"), Answer::Page);
+        assert_eq!(get("/secret/events", "localhost:4711"), Answer::Events);
+        for path in ["/", "/secret", "/secret/x", "/secreT/", "/secret/../secret/", "//secret/", "/wrong_/"] {
+            assert_eq!(get(path, "127.0.0.1:4711"), Answer::Refused(404, "Not Found"), "{path}");
+        }
+        for host in ["example.org", "example.org:4711", "127.0.0.1", "127.0.0.1:80", "localhost.example.org:4711", ""] {
+            assert_eq!(get("/secret/", host), Answer::Refused(403, "Forbidden"), "{host}");
+        }
+        let two = "GET /secret/ HTTP/1.1\r\nHost: localhost:4711\r\nHost: example.org\r\n\r\n";
+        assert_eq!(asked(two), Answer::Refused(403, "Forbidden"));
+        for method in ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"] {
+            let refused = asked(&format!("{method} /secret/ HTTP/1.1\r\nHost: localhost:4711\r\n\r\n"));
+            assert_eq!(refused, Answer::Refused(405, "Method Not Allowed"), "{method}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_request_is_refused_and_half_of_one_waited_for() {
+        assert_eq!(asked("GET /secret/ HTTP/1.1\r\nHo"), Answer::More);
+        assert_eq!(asked("\u{1}\u{2}\u{3}\r\n\r\n"), Answer::Refused(400, "Bad Request"));
+        let long = format!("GET /secret/ HTTP/1.1\r\nX: {}", "x".repeat(LONGEST));
+        assert!(matches!(asked(&long), Answer::Refused(431, _)));
+    }
+}

@@ -1,0 +1,191 @@
+//! Connections to the live page: each has a thread, a few seconds to say what it wants and to take what it gets, and there
+//! are only so many.
+
+use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::request::{Answer, LONGEST, answer};
+use super::state::Live;
+
+/// Connections at once, at most.
+const CONNECTIONS: usize = 32;
+
+/// Time for a request, and for the viewer to take a part of the answer.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// States are at least so far apart.
+const PACE: Duration = Duration::from_millis(250);
+
+/// A stream says something at least so often, so that a viewer that left is noticed.
+const PULSE: Duration = Duration::from_secs(2);
+
+const PAGE: &str = include_str!("page.html");
+const SCRIPT: &str = include_str!("page.js");
+const OWN_STYLE: &str = include_str!("page.css");
+
+/// The server of a page.
+pub(super) struct Server {
+    port: u16,
+    token: String,
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    live: Arc<Live>,
+    connections: AtomicUsize,
+    closed: AtomicBool,
+}
+
+impl Server {
+    /// Begins to listen.
+    pub fn open(live: Arc<Live>) -> io::Result<Self> {
+        let listener = TcpListener::bind(SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0))?;
+        let port = listener.local_addr()?.port();
+        let mut random = [0; 16];
+        getrandom::fill(&mut random).map_err(io::Error::other)?;
+        let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        let shared = Arc::new(Shared { live, connections: AtomicUsize::new(0), closed: AtomicBool::new(false) });
+        let (of_thread, token_of_thread) = (Arc::clone(&shared), token.clone());
+        thread::Builder::new()
+            .name("watch".into())
+            .spawn(move || listen(&listener, port, &token_of_thread, &of_thread))?;
+        Ok(Self { port, token, shared })
+    }
+
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/{}/", self.port, self.token)
+    }
+
+    /// Ends it; viewers have a moment to take the last state.
+    pub fn close(self) {
+        let until = Instant::now() + Duration::from_secs(1);
+        while self.shared.connections.load(Ordering::Relaxed) > 0 && Instant::now() < until {
+            thread::sleep(Duration::from_millis(10));
+        }
+        self.shared.closed.store(true, Ordering::Relaxed);
+        // Wakes who listens.
+        let _ = TcpStream::connect(SocketAddrV4::new(Ipv4Addr::LOCALHOST, self.port));
+    }
+}
+
+fn listen(listener: &TcpListener, port: u16, token: &str, shared: &Arc<Shared>) {
+    for stream in listener.incoming() {
+        if shared.closed.load(Ordering::Relaxed) {
+            return;
+        }
+        let Ok(stream) = stream else {
+            // Too many open files, say: it may pass.
+            thread::sleep(Duration::from_millis(100));
+            continue;
+        };
+        let place = Place::take(shared);
+        let token = token.to_owned();
+        // N.B.: without a thread or a place the connection is dropped, and the viewer comes again.
+        if let Some(place) = place {
+            let _ = thread::Builder::new().name("viewer".into()).spawn(move || {
+                let _ = serve(stream, port, &token, &place.0);
+            });
+        }
+    }
+}
+
+/// One of so many connections.
+struct Place(Arc<Shared>);
+
+impl Place {
+    fn take(shared: &Arc<Shared>) -> Option<Self> {
+        if shared.connections.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS {
+            shared.connections.fetch_sub(1, Ordering::Relaxed);
+            return None;
+        }
+        Some(Self(Arc::clone(shared)))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.connections.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+fn serve(mut stream: TcpStream, port: u16, token: &str, shared: &Shared) -> io::Result<()> {
+    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    let wanted = read(&mut stream, port, token)?;
+    let style = || [crate::report::STYLE, OWN_STYLE].concat();
+    match wanted {
+        Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
+        Answer::Style => whole(&mut stream, "200 OK", "text/css; charset=utf-8", &style()),
+        Answer::Script => whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", SCRIPT),
+        Answer::Events => events(&mut stream, shared),
+        Answer::Refused(status, reason) => {
+            whole(&mut stream, &format!("{status} {reason}"), "text/plain; charset=utf-8", reason)
+        }
+        Answer::More => Ok(()),
+    }
+}
+
+/// The page with the state of this moment in it.
+fn page(shared: &Shared) -> String {
+    let (_, _, state) = shared.live.after(0, Duration::ZERO);
+    // In a page, `<` could end the block that the state is in.
+    PAGE.replace("{{state}}", &state.replace('<', "\\u003c"))
+}
+
+/// Reads the head of a request: all of it within [`PATIENCE`], however slowly it comes.
+fn read(stream: &mut TcpStream, port: u16, token: &str) -> io::Result<Answer> {
+    let until = Instant::now() + PATIENCE;
+    let mut head = Vec::new();
+    let mut part = [0; 1024];
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Answer::Refused(408, "Request Timeout"));
+        }
+        stream.set_read_timeout(Some(left))?;
+        let count = match stream.read(&mut part) {
+            Ok(0) => return Ok(Answer::More),
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => continue,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        head.extend(&part[..count.min(LONGEST - head.len().min(LONGEST))]);
+        match answer(&head, port, token) {
+            Answer::More => {}
+            other => return Ok(other),
+        }
+    }
+}
+
+/// What every answer says: nobody keeps it, and the page loads nothing from elsewhere.
+const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
+    Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; \
+    img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\nConnection: close\r\n";
+
+fn whole(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> io::Result<()> {
+    let length = body.len();
+    let head = format!("HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{HEADERS}\r\n");
+    stream.write_all([head.as_bytes(), body.as_bytes()].concat().as_slice())
+}
+
+/// Server-sent events. Source: HTML Living Standard, section 9.2.
+fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
+    let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\n");
+    stream.write_all(head.as_bytes())?;
+    let mut seen = 0;
+    loop {
+        let (version, over, state) = shared.live.after(seen, PULSE);
+        let name = if over { "event: over\n" } else { "" };
+        stream.write_all(format!("{name}data: {state}\n\n").as_bytes())?;
+        if over || shared.closed.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        seen = version;
+        thread::sleep(PACE);
+    }
+}

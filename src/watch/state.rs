@@ -1,0 +1,150 @@
+//! The newest state of a run, as the page shows it.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use mops_core::{Evaluation, Merit, RunState, Study, Usage, criterion_reports};
+use serde_json::{Value, json};
+
+/// Points of the curve, at most: of more, every second one goes.
+const CURVE: usize = 600;
+
+/// The newest state; what nobody took is gone when a newer one comes.
+pub(super) struct Live {
+    study: Study,
+    solver: String,
+    begun: Instant,
+    state: Mutex<Newest>,
+    changed: Condvar,
+}
+
+struct Newest {
+    /// Counts the changes, from 1.
+    version: u64,
+    run: RunState,
+    stage: Option<(String, f64)>,
+    best: Option<Evaluation>,
+    /// Evaluations, objective and violation where the best point changed.
+    curve: Vec<(usize, Merit)>,
+    /// Seconds, and where the result is, once the run is over.
+    over: Option<(f64, String)>,
+}
+
+impl Live {
+    pub fn new(study: Study, solver: &str, budget: usize) -> Self {
+        let run = RunState { evaluations: 0, budget, failed: 0, best: Merit::FAILED };
+        let state = Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), over: None };
+        Self {
+            study,
+            solver: solver.to_owned(),
+            begun: Instant::now(),
+            state: Mutex::new(state),
+            changed: Condvar::new(),
+        }
+    }
+
+    // A viewer that panicked leaves a state that is as good as any.
+    fn newest(&self) -> MutexGuard<'_, Newest> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Newest)) {
+        let mut newest = self.newest();
+        change(&mut newest);
+        newest.version += 1;
+        drop(newest);
+        self.changed.notify_all();
+    }
+
+    pub fn evaluated(&self, run: &RunState) {
+        self.change(|newest| {
+            let moved = newest.curve.last().is_none_or(|(_, merit)| run.best.is_better_than(merit));
+            if moved && run.best.objective.is_finite() {
+                if newest.curve.len() >= CURVE {
+                    let mut index = 0;
+                    newest.curve.retain(|_| {
+                        index += 1;
+                        index % 2 == 1
+                    });
+                }
+                newest.curve.push((run.evaluations, run.best));
+            }
+            newest.run = *run;
+        });
+    }
+
+    pub fn improved(&self, best: &Evaluation) {
+        let best = Evaluation { residuals: Vec::new(), ..best.clone() };
+        self.change(|newest| newest.best = Some(best));
+    }
+
+    pub fn stage(&self, what: &str, done: f64) {
+        self.change(|newest| newest.stage = Some((what.to_owned(), done)));
+    }
+
+    pub fn finish(&self, folder: &str) {
+        let seconds = self.begun.elapsed().as_secs_f64();
+        self.change(|newest| newest.over = Some((seconds, folder.to_owned())));
+    }
+
+    /// The state as JSON once it is newer than `seen`, or after `patience`; its version, and whether the run is over.
+    pub fn after(&self, seen: u64, patience: Duration) -> (u64, bool, String) {
+        let newest = self.newest();
+        let waits = |newest: &mut Newest| newest.version <= seen;
+        let waited = self.changed.wait_timeout_while(newest, patience, waits);
+        let (newest, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        (newest.version, newest.over.is_some(), self.told(&newest).to_string())
+    }
+
+    fn told(&self, newest: &Newest) -> Value {
+        let run = newest.run;
+        let seconds = newest.over.as_ref().map_or_else(|| self.begun.elapsed().as_secs_f64(), |(seconds, _)| *seconds);
+        let share = match &newest.stage {
+            Some((_, done)) => *done,
+            #[allow(clippy::cast_precision_loss)]
+            None => run.evaluations as f64 / run.budget.max(1) as f64,
+        };
+        // At the speed so far; a solver that converges ends earlier.
+        let left = (share > 0.0).then(|| (seconds * (1.0 / share - 1.0)).max(0.0));
+        let curve: Vec<Value> = (newest.curve.iter())
+            .map(|(at, merit)| json!([at, merit.objective, merit.violation, merit.is_feasible()]))
+            .collect();
+        json!({
+            "study": self.study.name, "task": self.study.task, "solver": self.solver,
+            "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
+            "seconds": seconds, "left": left, "share": share,
+            "stage": newest.stage.as_ref().map(|(what, _)| what),
+            "over": newest.over.as_ref().map(|(_, folder)| folder),
+            "best": newest.best.as_ref().map(|best| json!({
+                "objective": best.merit.objective, "violation": best.merit.violation, "feasible": best.merit.is_feasible(),
+            })),
+            "criteria": newest.best.as_ref().map(|best| self.criteria(best)),
+            "tuners": newest.best.as_ref().map(|best| self.tuners(best)),
+            "curve": curve,
+        })
+    }
+
+    fn criteria(&self, best: &Evaluation) -> Vec<Value> {
+        let reports = criterion_reports(&self.study, best);
+        let told = reports.into_iter().map(|criterion| {
+            json!({
+                "name": criterion.name, "case": criterion.case, "usage": criterion.usage, "unit": criterion.unit,
+                "demand": criterion.demand.or(criterion.bad), "at_least": criterion.good > criterion.bad,
+                "value": criterion.value, "scaled": criterion.scaled, "met": criterion.met,
+                "constraint": matches!(criterion.usage, Usage::Inequality | Usage::Equality),
+            })
+        });
+        told.collect()
+    }
+
+    fn tuners(&self, best: &Evaluation) -> Vec<Value> {
+        let tuners = self.study.tuners.iter().zip(&best.tuners);
+        let told = |(tuner, value): (&mops_core::Tuner, &f64)| {
+            json!({
+                "name": tuner.name, "value": value, "unit": tuner.unit.to_string(), "active": tuner.active,
+                "position": tuner.active.then(|| tuner.position_of(*value)),
+            })
+        };
+        tuners.map(told).collect()
+    }
+}

@@ -1,0 +1,236 @@
+//! Runs that last: what is killed goes on, what is known is not simulated again.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Stdio};
+use std::time::Duration;
+
+use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+fn mops(arguments: &[&str]) -> Command {
+    let mut command = cargo_bin_cmd!("mops");
+    command.args(arguments);
+    command
+}
+
+/// Runs a study into a folder; what is said on the terminal.
+fn run(study: &str, out: &Path, more: &[&str]) -> String {
+    let arguments = [&["run", study, "--out", out.to_str().unwrap()], more].concat();
+    let output = mops(&arguments).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{error}");
+    String::from_utf8(output.stdout).unwrap() + &error
+}
+
+/// The result of a run, without what depends on the clock.
+fn result(out: &Path) -> Value {
+    let mut result: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+    result.as_object_mut().unwrap().remove("seconds");
+    result
+}
+
+/// Of `known` points, those met again, and those simulated, as the terminal tells.
+fn counts(said: &str) -> [usize; 3] {
+    let line = said.lines().find(|line| line.contains("known points")).unwrap_or_else(|| panic!("{said}"));
+    let numbers: Vec<usize> = line.split(|c: char| !c.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect();
+    numbers.try_into().unwrap()
+}
+
+/// A folder with the study `pid-design` in which every `from` is a `to`.
+fn changed(folder: &Path, from: &str, to: &str) -> PathBuf {
+    let text = std::fs::read_to_string("studies/pid-design/study.toml").unwrap();
+    assert!(text.contains(from), "{text}");
+    let path = folder.join("changed.toml");
+    std::fs::write(&path, text.replace(from, to)).unwrap();
+    path
+}
+
+const SEARCH: [&str; 4] = ["--solver", "genetic", "--max-evaluations", "600"];
+
+#[test]
+fn a_run_that_is_resumed_after_its_end_simulates_nothing_and_has_the_same_result() {
+    let folder = tempfile::tempdir().unwrap();
+    for (study, more) in [
+        ("pid-design", &SEARCH[..]),
+        ("pid-design", &[]),
+        // Residuals and slopes of a least-squares solver.
+        ("furuta-calibration", &["--max-evaluations", "40"]),
+    ] {
+        let out = folder.path().join(format!("{study}{}", more.len()));
+        run(study, &out, more);
+        let first = result(&out);
+        std::fs::remove_file(out.join("result.json")).unwrap();
+        let said = run(study, &out, &[more, &["--resume"]].concat());
+        let [known, met, simulated] = counts(&said);
+        assert!(known > 0 && met > 0, "{said}");
+        assert_eq!(simulated, 0, "{study}: {said}");
+        assert_eq!(result(&out), first, "{study}");
+    }
+}
+
+/// Kills a run again and again at moments that a seeded generator draws, and continues it each time.
+fn killed_again_and_again(kills: usize, seed: u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, torn) = (folder.path().join("whole"), folder.path().join("torn"));
+    let search = ["--solver", "genetic", "--max-evaluations", "2500", "--jobs", "2"];
+    run("pid-design-multi-case", &whole, &search);
+    let mut state = seed;
+    let (mut died, mut most) = (0, 0);
+    while died < kills {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let program = assert_cmd::cargo::cargo_bin!("mops");
+        let mut process = Process::new(program)
+            .args(["run", "pid-design-multi-case", "--out", torn.to_str().unwrap(), "--resume"])
+            .args(search)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(50 + (state >> 33) % 900));
+        process.kill().unwrap();
+        if process.wait().unwrap().code().is_some() {
+            // It came to its end first: the next one begins anew.
+            assert_eq!(result(&torn), result(&whole));
+            std::fs::remove_dir_all(&torn).unwrap();
+            most = 0;
+            continue;
+        }
+        died += 1;
+        let points = points(&torn);
+        assert!(points >= most, "what was written stays: {points} after {most}");
+        most = points;
+    }
+    let said = run("pid-design-multi-case", &torn, &[&search[..], &["--resume"]].concat());
+    assert_eq!(result(&torn), result(&whole));
+    if most > 0 {
+        let [known, met, simulated] = counts(&said);
+        assert_eq!(known, most);
+        assert!(met + simulated >= 2500 && simulated <= 2600 - known.min(2500), "{said}");
+    }
+}
+
+/// Points in the database of a folder.
+fn points(folder: &Path) -> usize {
+    let path = folder.join("evaluations.sqlite");
+    if !path.exists() {
+        return 0;
+    }
+    let connection = rusqlite::Connection::open(path).unwrap();
+    connection.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).map_or(0, |n| n as usize)
+}
+
+/// Five kills; `MOPS_KILLS` asks for more.
+#[test]
+fn a_run_that_is_killed_at_random_moments_has_the_result_of_one_that_was_not() {
+    let kills = std::env::var("MOPS_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(5);
+    killed_again_and_again(kills, 1);
+}
+
+#[test]
+fn a_changed_demand_simulates_no_known_point_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, second) = (folder.path().join("first"), folder.path().join("second"));
+    run("pid-design", &first, &["--solver", "genetic", "--max-evaluations", "5000"]);
+    let known = points(&first);
+    assert!(known >= 5000);
+
+    // The best of 5000 points under the new demand, by hand.
+    let study = changed(folder.path(), "demand = \"15 s\"", "demand = \"9 s\"");
+    let table = std::fs::read_to_string(first.join("evaluations.csv")).unwrap();
+    let demand = |text: &str| text.parse::<f64>().ok();
+    let best = table.lines().skip(1).filter_map(|line| {
+        let numbers: Vec<Option<f64>> = line.split(',').map(demand).collect();
+        let [overshoot, settling] = [numbers[3]?, numbers[4]?];
+        (!overshoot.is_nan() && !settling.is_nan()).then(|| (overshoot / 0.1).max(settling / 9.0))
+    });
+    let best = best.fold(f64::INFINITY, f64::min);
+
+    // With a budget of one evaluation the run looks at its start alone: the best known point.
+    let reuse = ["--reuse", first.to_str().unwrap()];
+    let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "1"]].concat());
+    assert_eq!(counts(&said)[0], known);
+    let found = result(&second);
+    assert_eq!((found["evaluations"].as_u64(), found["reused"].as_u64()), (Some(1), Some(1)));
+    assert_eq!(found["worst_scaled"].as_f64(), Some(best));
+
+    // A whole search: what it meets again is not simulated, and no point is written twice.
+    let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "200"]].concat());
+    let [_, met, simulated] = counts(&said);
+    let found = result(&second);
+    assert!(met >= 1 && simulated >= 1, "{said}");
+    // Points that are met twice (by the search, then by the certificate) are written once.
+    assert!(points(&second) <= met + simulated && points(&second) > simulated, "every point once: {said}");
+    assert_eq!(found["reused"].as_u64().map(|reused| 200 - reused as usize <= simulated), Some(true), "{said}");
+    assert!(found["worst_scaled"].as_f64().unwrap() <= best);
+}
+
+#[test]
+fn a_run_that_uses_its_own_folder_again_keeps_what_it_learns_with_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run("pid-design", &out, &SEARCH);
+    let solver = [&SEARCH[..], &["--reuse", out.to_str().unwrap()]].concat();
+    let before = points(&out);
+    let said = run("pid-design", &out, &solver);
+    let [known, _, simulated] = counts(&said);
+    assert_eq!((known, points(&out)), (before, before + simulated));
+}
+
+/// What is said of a run that is refused.
+fn refusal(arguments: &[&str]) -> String {
+    let output = mops(arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stdout));
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[test]
+fn what_another_study_left_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let place = out.to_str().unwrap();
+    run("pid-design", &out, &SEARCH);
+    let base = [&["run", "pid-design", "--out", place], &SEARCH[..]].concat();
+    let with = |more: &[&'static str]| refusal(&[&base[..], more].concat());
+    let said = with(&["--resume", "--seed", "2"]);
+    assert!(said.contains("`seed` was 1 and is 2") && said.contains("--reuse DIR"), "{said}");
+    let said = with(&["--resume", "--set", "criteria.settling.demand=\"9 s\""]);
+    assert!(said.contains("`criteria.settling.demand` was \"15 s\" and is \"9 s\""), "{said}");
+    let said = with(&["--resume", "--set", "solver.genetic.population=50"]);
+    assert!(said.contains("population"), "{said}");
+
+    let reuse = ["run", "pid-design", "--out", place, "--reuse", place, "--set"];
+    let said = refusal(&[&reuse[..], &["cases.nominal.b=-4.5"]].concat());
+    assert!(said.contains("`cases.nominal.b` was") && said.contains("-4.5"), "{said}");
+    let nowhere = folder.path().join("nowhere");
+    let said = refusal(&["run", "pid-design", "--out", place, "--reuse", nowhere.to_str().unwrap()]);
+    assert!(said.contains("holds no evaluations.sqlite"), "{said}");
+    std::fs::write(out.join("evaluations.sqlite"), "not a database").unwrap();
+    let output = mops(&["run", "pid-design", "--out", place, "--resume"]).output().unwrap();
+    assert!(matches!(output.status.code(), Some(2 | 3)), "{output:?}");
+}
+
+#[test]
+fn a_budget_that_grows_makes_a_run_longer() {
+    let folder = tempfile::tempdir().unwrap();
+    let (short, long) = (folder.path().join("short"), folder.path().join("long"));
+    run("pid-design", &short, &["--solver", "genetic", "--max-evaluations", "300"]);
+    let said = run("pid-design", &short, &[&SEARCH[..], &["--resume"]].concat());
+    run("pid-design", &long, &SEARCH);
+    assert!(counts(&said)[1] >= 300, "{said}");
+    assert_eq!(result(&short), result(&long));
+}
+
+#[test]
+fn a_new_run_keeps_the_points_of_one_that_came_to_no_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run("pid-design", &out, &SEARCH);
+    rusqlite::Connection::open(out.join("evaluations.sqlite"))
+        .unwrap()
+        .execute("UPDATE runs SET state = 'running', ended = NULL", [])
+        .unwrap();
+    let said = run("pid-design", &out, &SEARCH);
+    assert!(said.contains("evaluations of an unfinished run are now in"), "{said}");
+    assert!(out.join("evaluations.previous.sqlite").exists());
+}

@@ -1,0 +1,183 @@
+//! The live page of a run: what a browser sees, what everybody else does, and that nobody holds up the run.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use assert_cmd::cargo::cargo_bin;
+use serde_json::Value;
+
+/// A run that goes, and the address of its page; it ends with this.
+struct Watched {
+    process: Child,
+    port: u16,
+    token: String,
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Begins a run with `--watch`.
+fn watched(out: &Path, more: &[&str]) -> Watched {
+    let mut process = Command::new(cargo_bin!("mops"))
+        .args(["run", "pid-design", "--quiet", "--watch", "--out", out.to_str().unwrap()])
+        .args(more)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(process.stderr.take().unwrap());
+    let mut line = String::new();
+    said.read_line(&mut line).unwrap();
+    // What else it says must find a reader.
+    std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
+    let address = line.trim().rsplit(' ').next().unwrap().to_owned();
+    let rest = address.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("{line}"));
+    let (port, token) = rest.trim_end_matches('/').split_once('/').unwrap();
+    Watched { process, port: port.parse().unwrap(), token: token.to_owned() }
+}
+
+/// A search that goes on for a while: each simulation takes a long time.
+const LONG: [&str; 6] =
+    ["--solver", "genetic", "--max-evaluations", "100000", "--set", "models.loop.pid-loop.horizon=\"20000 s\""];
+
+impl Watched {
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream
+    }
+
+    /// The whole answer to a request with this head.
+    fn ask(&self, head: &str) -> String {
+        let mut stream = self.connect();
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        let _ = stream.read_to_string(&mut answer);
+        answer
+    }
+
+    /// The first state with a best point that comes.
+    fn first_state(&self) -> Value {
+        let mut stream = self.connect();
+        let head = format!("GET /{}/events HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", self.token, self.port);
+        stream.write_all(head.as_bytes()).unwrap();
+        let lines = BufReader::new(stream).lines().map(Result::unwrap);
+        let mut states = lines.filter_map(|line| serde_json::from_str::<Value>(line.strip_prefix("data: ")?).ok());
+        states.find(|state| !state["best"].is_null()).unwrap()
+    }
+
+    fn get(&self, path: &str, host: &str) -> String {
+        self.ask(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n"))
+    }
+}
+
+#[test]
+fn the_page_is_there_for_who_knows_its_address_and_for_nobody_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = watched(&folder.path().join("out"), &LONG);
+    let (host, token) = (format!("127.0.0.1:{}", run.port), run.token.clone());
+    assert!(token.len() >= 32 && token.chars().all(|c| c.is_ascii_hexdigit()), "{token}");
+
+    let page = run.get(&format!("/{token}/"), &host);
+    assert!(page.starts_with("HTTP/1.1 200 OK") && page.contains("<h1 id=\"study\">"), "{page}");
+    assert!(page.contains("Content-Security-Policy: default-src 'none'"), "{page}");
+    for file in ["style.css", "page.js"] {
+        assert!(run.get(&format!("/{token}/{file}"), &host).starts_with("HTTP/1.1 200 OK"), "{file}");
+    }
+    let localhost = format!("localhost:{}", run.port);
+    assert!(run.get(&format!("/{token}/"), &localhost).starts_with("HTTP/1.1 200 OK"));
+
+    let status = |answer: String| answer.split(' ').nth(1).unwrap_or_default().to_owned();
+    assert_eq!(status(run.get("/", &host)), "404");
+    assert_eq!(status(run.get(&format!("/{}/", "0".repeat(32)), &host)), "404");
+    assert_eq!(status(run.get(&format!("/{token}/../result.json"), &host)), "404");
+    assert_eq!(status(run.get(&format!("/{token}/"), "rebound.example")), "403");
+    assert_eq!(
+        status(run.ask(&format!("POST /{token}/ HTTP/1.1\r\nHost: {host}\r\nContent-Length: 0\r\n\r\n"))),
+        "405"
+    );
+    assert_eq!(status(run.ask("nonsense\r\n\r\n")), "400");
+    assert_eq!(status(run.ask(&format!("GET /{token}/ HTTP/1.1\r\n\r\n"))), "403");
+}
+
+#[test]
+fn states_come_as_events_and_count_only_what_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let run = watched(&out, &LONG);
+    let state = run.first_state();
+    assert_eq!((state["study"].as_str(), state["budget"].as_u64()), (Some("pid-design"), Some(100_000)));
+    let told = state["evaluations"].as_i64().unwrap();
+    assert!(told > 0 && !state["curve"].as_array().unwrap().is_empty(), "{state}");
+    let criteria: Vec<&str> =
+        state["criteria"].as_array().unwrap().iter().map(|criterion| criterion["name"].as_str().unwrap()).collect();
+    assert_eq!(criteria, ["overshoot", "settling"]);
+    let database = rusqlite::Connection::open(out.join("evaluations.sqlite")).unwrap();
+    let written: i64 = database.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap();
+    assert!(written >= told, "{told} were told of, {written} are written");
+}
+
+#[test]
+fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let (alone, crowded) = (folder.path().join("alone"), folder.path().join("crowded"));
+    let search = ["--solver", "genetic", "--max-evaluations", "20000"];
+    let result = |out: &Path| {
+        let mut result: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+        result.as_object_mut().unwrap().remove("seconds");
+        result
+    };
+    let mut run = watched(&alone, &search);
+    assert!(run.process.wait().unwrap().success());
+    let mut run = watched(&crowded, &search);
+    let head = format!("GET /{}/events HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", run.token, run.port);
+    let mut viewers: Vec<TcpStream> = Vec::new();
+    for i in 0..60 {
+        // Some say nothing, some half of it, some never read; a run that is over takes no more.
+        let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
+        let _ = viewer.write_all(&head.as_bytes()[..[0, head.len() / 2, head.len()][i % 3]]);
+        viewers.push(viewer);
+    }
+    assert!(run.process.wait().unwrap().success());
+    assert_eq!(result(&crowded), result(&alone));
+}
+
+/// Where a browser is that draws without a screen.
+fn browser() -> Option<&'static str> {
+    let runs =
+        |name: &&str| Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+    ["chromium", "chromium-browser", "google-chrome"].into_iter().find(runs)
+}
+
+#[test]
+fn a_browser_shows_criteria_convergence_and_tuners_while_the_run_goes() {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: no chromium on this machine");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let run = watched(&folder.path().join("out"), &LONG);
+    run.first_state();
+    let profile = format!("--user-data-dir={}", folder.path().join("profile").display());
+    let flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
+    let quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--timeout=4000"];
+    let output = Command::new(browser)
+        .args(flags)
+        .args(quiet)
+        .args([&profile, "--dump-dom", &format!("http://127.0.0.1:{}/{}/", run.port, run.token)])
+        .output()
+        .unwrap();
+    let page = String::from_utf8_lossy(&output.stdout);
+    assert!(page.contains("<h1 id=\"study\">pid-design</h1>"), "{page}");
+    assert!(page.contains("of 100000</dd>") && page.contains("Best objective"), "{page}");
+    for text in [">overshoot</th>", ">settling</th>", ">Td</th>", "class=\"result\"", "<circle"] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+}
