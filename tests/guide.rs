@@ -37,13 +37,28 @@ fn plain(line: &str) -> String {
     line.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// The words of a command, as a shell takes them: what stands in double quotes is one.
+fn arguments(command: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quoted = false;
+    for c in command.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ' ' if !quoted => words.push(String::new()),
+            _ => words.last_mut().expect("there is one").push(c),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
 /// Runs a command as it stands after `$ `; `shown` is what the page shows of its output: `? 2` is its exit status, `...` stands
 /// for any lines, and a line may go on.
 fn run(command: &str, shown: &[String], folder: &Path) {
-    let mut arguments = command.split_whitespace();
-    assert_eq!(arguments.next(), Some("mops"), "{command}");
+    let words = arguments(command);
+    assert_eq!(words[0], "mops", "{command}");
     let output = Command::new(env!("CARGO_BIN_EXE_mops"))
-        .args(arguments)
+        .args(&words[1..])
         .current_dir(folder)
         .output()
         .expect("mops can be started");
