@@ -169,7 +169,10 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         print(&introduction(&file.study, &options));
     }
     let home = home(catalogue, &arguments.study);
-    let keeper = keep::open((&folder, &start), (&file, &arguments.study), &home, &options)?;
+    let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
+    // What the command sets is part of what was said: a report that is written again needs it.
+    let said = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
+    let keeper = keep::open((&folder, &start), (&file, &said), &home, &options)?;
     if let Some(note) = keeper.as_ref().and_then(|keeper| keeper.note.as_ref()).filter(|_| talks) {
         let _ = writeln!(std::io::stderr(), "note: {note}");
     }
@@ -196,7 +199,6 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(trouble) = opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop))) {
         let _ = writeln!(std::io::stderr(), "warning: not every evaluation could be kept: {trouble}");
     }
-    let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
     let plain = without_settings(&file.source.text, &settings);
     if let Some(diagnosis) = &solved.diagnosis {
         let (settings, study) = (&arguments.study.settings, solved.problem.study());
