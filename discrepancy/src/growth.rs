@@ -32,45 +32,35 @@ impl<'a> Search<'a> {
     /// The user ended it.
     #[allow(clippy::cast_precision_loss)]
     pub fn grow(&self, declared: &Trial<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
-        let begun = Growth { last: declared.clone(), rounds: Vec::new(), p_value: 1.0 };
-        let mut growth = self.onward(begun, options, watch)?;
-        if growth.last.added.is_empty() || options.max_effects < 2 || self.explains(&growth.last) {
+        let begun = |last| Growth { last, rounds: Vec::new(), p_value: 1.0 };
+        let mut growth = self.onward(begun(declared.clone()), options, watch)?;
+        if growth.last.added.is_empty() || options.max_effects < 2 {
+            return Ok(growth);
+        }
+        let explains = |whole: &Trial<'_>| whole.fitted.normalised() <= UNEXPLAINED;
+        let mut best = self.whole(&growth.last);
+        if best.as_ref().is_some_and(explains) {
             return Ok(growth);
         }
         // Where the best first step led nowhere, another may lead on.
-        let mut ways = self.other_ways(declared, &growth);
-        let count = ways.len();
-        while let Some(way) = ways.pop() {
-            watch.stage("other ways, as something is left", 0.8 - 0.05 * ways.len() as f64 / count as f64);
-            let begun = Growth { last: self.over_or_in_windows(&way), rounds: Vec::new(), p_value: 1.0 };
-            let other = self.onward(begun, options, watch)?.last;
-            if self.is_better(&other, &growth.last) {
-                growth.last = other;
-                if self.explains(&growth.last) {
+        let ways = self.other_ways(declared, &growth);
+        for (tried, way) in ways.iter().enumerate() {
+            watch.stage("other ways, as something is left", 0.75 + 0.05 * (tried + 1) as f64 / ways.len() as f64);
+            let other = self.onward(begun(self.over_or_in_windows(way)), options, watch)?.last;
+            let Some(other) = self.whole(&other) else { continue };
+            let of = Dispersion::of(&other);
+            if best.as_ref().is_none_or(|best| criterion(&other, &of) < criterion(best, &of) - CLEARLY) {
+                growth.last = other.clone();
+                if explains(&other) {
                     break;
                 }
+                best = Some(other);
             }
         }
         Ok(growth)
     }
 
-    /// Whether a model leaves no more than the noise of whole records.
-    fn explains(&self, trial: &Trial<'a>) -> bool {
-        self.whole(trial).is_some_and(|whole| whole.fitted.normalised() <= UNEXPLAINED)
-    }
-
-    /// Whether a model is clearly better than another, over whole records.
-    fn is_better(&self, other: &Trial<'a>, last: &Trial<'a>) -> bool {
-        match (self.whole(other), self.whole(last)) {
-            (Some(other), Some(last)) => {
-                let of = Dispersion::of(&other);
-                criterion(&other, &of) < criterion(&last, &of) - CLEARLY
-            }
-            (other, last) => other.is_some() && last.is_none(),
-        }
-    }
-
-    /// Single effects to begin with again, the best last: runners-up of the first round, and what a fit that begins where the
+    /// Single effects to begin with again, best first: runners-up of the first round, and what a fit that begins where the
     /// study does finds.
     fn other_ways(&self, declared: &Trial<'a>, growth: &Growth<'a>) -> Vec<Trial<'a>> {
         const WAYS: usize = 4;
@@ -86,7 +76,6 @@ impl<'a> Search<'a> {
                 chosen.push(way);
             }
         }
-        chosen.reverse();
         chosen
     }
 
@@ -130,13 +119,7 @@ impl<'a> Search<'a> {
             (growth.last, ahead) = next;
             growth.rounds.push(round);
             // What one effect stood in for may have its place once the next is in.
-            for _ in 0..EXCHANGES {
-                let last = &growth.last;
-                if last.added.len() < 2 || last.windows > 1 || last.fitted.normalised() <= UNEXPLAINED {
-                    break;
-                }
-                watch.stage("each effect against its rivals", 0.5);
-                let Some(better) = self.exchanged(last).0 else { break };
+            if let Some(better) = self.exchanges(&growth.last, watch) {
                 (growth.last, ahead) = (better, None);
             }
         }
@@ -158,12 +141,11 @@ impl<'a> Search<'a> {
     /// The same over whole records, without what is superfluous, each effect held against its rivals.
     pub fn settle(&self, growth: Growth<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
         watch.stage("what can be left out", 0.82);
-        let Growth { last, rounds, p_value } = growth;
+        let Growth { last, mut rounds, p_value } = growth;
         let mut last = self.over_whole(&last).unwrap_or(last);
         if last.added.len() > 1 {
             last = self.pruned(last, options.level);
         }
-        let mut rounds = rounds;
         while last.added.len() > 1 && last.windows == 1 {
             let Some((one, round)) = self.merged(&last) else { break };
             last = one;
@@ -199,12 +181,27 @@ impl<'a> Search<'a> {
         None
     }
 
+    /// The model after effects were exchanged, one after the other, as long as something is left; `None` where none was.
+    fn exchanges(&self, last: &Trial<'a>, watch: &dyn Watch) -> Option<Trial<'a>> {
+        let mut better: Option<Trial<'a>> = None;
+        for _ in 0..EXCHANGES {
+            let last = better.as_ref().unwrap_or(last);
+            if last.added.len() < 2 || last.windows > 1 || last.fitted.normalised() <= UNEXPLAINED {
+                break;
+            }
+            watch.stage("each effect against its rivals", 0.5);
+            let Some(next) = self.exchanged(last).0 else { break };
+            better = Some(next);
+        }
+        better
+    }
+
     /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
     /// held against its rivals.
     fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Round<'a>>) {
         let rounds: Vec<Round<'a>> = (0..last.added.len()).filter_map(|index| self.rivals(last, index)).collect();
         let of = Dispersion::of(last);
-        let better = rounds.iter().filter_map(|round| round.trials.first()).filter(|t| t.windows == 1);
+        let better = rounds.iter().filter_map(|round| round.trials.first());
         let better = better.min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
         let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - CLEARLY).cloned();
         (exchanged, rounds)
