@@ -49,6 +49,9 @@ fn points(result: &Value) -> Vec<[f64; 2]> {
 fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
     let folder = tempfile::tempdir().unwrap();
     let result = pareto(folder.path(), &["pid-pareto"]);
+    let history = cargo_bin_cmd!("mops").args(["history", "--json", folder.path().to_str().unwrap()]).output().unwrap();
+    let history: Value = serde_json::from_slice(&history.stdout).unwrap();
+    assert_eq!(history[0]["evaluations"], result["evaluations"], "certificates included");
     assert_eq!((&result["stop"], &result["task"]), (&"converged".into(), &"pareto".into()));
     let front = points(&result);
     assert!((30..=34).contains(&front.len()), "{}", front.len());

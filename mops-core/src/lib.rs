@@ -76,7 +76,7 @@ pub use robustness::{
     GlobalSensitivityReport, MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject,
     UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
 };
-pub use run::{Budget, FailureCount, Record, Run, State as RunState, Watch};
+pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{

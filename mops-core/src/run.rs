@@ -43,6 +43,15 @@ pub trait Watch: Sync {
 /// Nobody looks on.
 impl Watch for () {}
 
+/// Hears the wish to stop, and shows nothing: searches inside a task are no run of their own.
+pub struct Quiet<'a>(pub &'a dyn Watch);
+
+impl Watch for Quiet<'_> {
+    fn wants_stop(&self) -> bool {
+        self.0.wants_stop()
+    }
+}
+
 /// Where a run stands.
 #[derive(Debug, Clone, Copy)]
 pub struct State {

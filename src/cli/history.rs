@@ -83,7 +83,7 @@ fn json_of(past: &Past) -> Value {
         "folder": past.folder.display().to_string(), "date": date(past.date),
         "study": or("study", run.map(|run| json!(run.name))), "task": or("task", run.map(|run| json!(run.task))),
         "state": past.state(), "worst_scaled": of("worst_scaled"), "feasible": of("feasible"),
-        "evaluations": run.map_or_else(|| of("evaluations"), |run| json!(run.evaluations)),
+        "evaluations": past.ended().map_or_else(|| json!(run.map(|run| run.evaluations)), |_| of("evaluations")),
         "seconds": of("seconds"), "mops": or("mops", run.map(|run| json!(run.mops))),
         "seed": or("seed", run.map(|run| json!(run.seed))), "solver": or("solver", run.map(|run| json!(run.solver))),
         "command": run.map(|run| &run.command), "reused": of("reused"),

@@ -34,12 +34,3 @@ pub(super) fn each<T: Sync, R: Send>(
     }
     done
 }
-
-/// Hears the wish to stop, and shows nothing: searches inside a task are no run of their own.
-pub(super) struct Quiet<'a>(pub &'a dyn Watch);
-
-impl Watch for Quiet<'_> {
-    fn wants_stop(&self) -> bool {
-        self.0.wants_stop()
-    }
-}

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Run, Stop, Study, TradeOffs, Watch};
+use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Stop, Study, TradeOffs, Watch};
 use mops_solvers::certificate;
 
 use crate::report::significant;
@@ -12,7 +12,9 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let begun = Instant::now();
     let mut solved = search(study, options, watch)?;
     let problem = &solved.problem;
-    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, watch);
+    // Certificates ask for points of their own, which are no part of the search that is looked at.
+    let quiet = Quiet(watch);
+    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &quiet);
     let interrupted = solved.outcome.stop == Stop::Interrupted;
     let certified = |point: &serde_json::Value| {
         let at = problem.evaluate_at(&tuners(problem, point));

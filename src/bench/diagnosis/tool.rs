@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use mops_core::file::{self, Files};
-use mops_core::{Catalogue, Study, Watch};
+use mops_core::{Catalogue, Quiet, Study, Watch};
 use mops_discrepancy::{Diagnosis, Verdict, brute_force};
 
 use crate::solve::{Options, solve};
@@ -17,15 +17,6 @@ pub(crate) struct Tools<'a> {
     pub watch: &'a dyn Watch,
     /// Seed of the tools' own random numbers.
     pub seed: u64,
-}
-
-/// Ends what it watches, and shows nothing: many cases run at once.
-struct Silent<'a>(&'a dyn Watch);
-
-impl Watch for Silent<'_> {
-    fn wants_stop(&self) -> bool {
-        self.0.wants_stop()
-    }
 }
 
 /// Data files that are already read.
@@ -61,7 +52,7 @@ impl Tools<'_> {
     pub fn diagnose(&self, study: Study) -> Result<(Diagnosis, f64), String> {
         let options = Options { effects: self.catalogue.effects.clone(), jobs: Some(1), ..Options::default() };
         let begun = Instant::now();
-        let solved = solve(study, &options, &Silent(self.watch)).map_err(|why| why.to_string())?;
+        let solved = solve(study, &options, &Quiet(self.watch)).map_err(|why| why.to_string())?;
         Ok((solved.diagnosis.expect("that was the task"), begun.elapsed().as_secs_f64()))
     }
 }

@@ -6,12 +6,11 @@ mod profile;
 
 use mops_core::identification::Covariance;
 use mops_core::statistics::t_quantile;
-use mops_core::{Budget, Evaluation, Oracle, Problem, Run, Stop, Study, UncertaintyReport, Watch};
+use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Stop, Study, UncertaintyReport, Watch};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use profile::Profiles;
 
-use super::batches::Quiet;
 use crate::report::significant;
 use crate::solve::Solved;
 

@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use mops_core::{Budget, Demand, Evaluation, Oracle, Problem, Run, Solver, SolverOptions, Study, Usage, Watch};
+use mops_core::{Budget, Demand, Evaluation, Oracle, Problem, Quiet, Run, Solver, SolverOptions, Study, Usage, Watch};
 use mops_solvers::cma_es::CmaEsOptions;
 use mops_solvers::pattern_search::PatternSearchOptions;
 use mops_solvers::sqp::SqpOptions;
-
-use crate::tasks::batches::Quiet;
 
 /// What a search of a criterion in one direction is: upwards, or downwards for the other side of an equality.
 pub(super) struct Goal {
