@@ -41,6 +41,7 @@ use mops_discrepancy::Diagnosis;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
 pub(crate) use numbers::{FileNames, file_name, significant};
+pub(crate) use page::document;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;

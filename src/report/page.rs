@@ -23,10 +23,8 @@ pub(super) struct Pictures {
     pub(super) uncertainty: Option<Group>,
 }
 
-/// The whole page.
-pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
-    let outcome = report.outcome;
-    let warnings = verdict::warnings(report);
+/// The frame that all pages have: one file, light and dark.
+pub(crate) fn document(title: &str, body: Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -34,69 +32,77 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                meta name="generator" content={ "mops " (outcome.mops) };
-                title { (outcome.study) ": " (task(outcome.task)) }
+                meta name="generator" content={ "mops " (env!("CARGO_PKG_VERSION")) };
+                title { (title) }
                 style { (PreEscaped(super::STYLE)) }
             }
-            body {
-                (header(report))
-                main {
-                    @if !warnings.is_empty() {
-                        (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
-                    }
-                    @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
-                        (diagnosis::sections(found, pictures))
-                    }
-                    @for one in &pictures.robustness {
-                        (section(one.title, html! { (one.content) (figures(&one.group)) }))
-                    }
-                    @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &pictures.front) {
-                        (section("Front", html! { (figures(group)) (front::table(report, found)) }))
-                    }
-                    @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
-                    @if let Some(found) = &outcome.found.sensitivity {
-                        (section(sensitivity::title(found), sensitivity::section(found)))
-                    }
-                    @if let Some(found) = &outcome.found.excitation {
-                        (section("Excitation", html! {
-                            (excitation::section(found))
-                            @if let Some(group) = &pictures.excitation { (figures(group)) }
-                        }))
-                    }
-                    @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
-                    @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
-                    @if !pictures.responses.is_empty() {
-                        (section("Responses", html! {
-                            @if let Some(text) = &pictures.left_out { p { (text) } }
-                            @for group in &pictures.responses { (figures(group)) }
-                        }))
-                    }
-                    @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
-                    @if let Some(results) = &outcome.calibration {
-                        (section("Calibration", calibration::section(results)))
-                        @if let Some(found) = &outcome.found.uncertainty {
-                            (section(uncertainty::TITLE, html! {
-                                (uncertainty::section(found))
-                                @if let Some(group) = &pictures.uncertainty { (figures(group)) }
-                            }))
-                        }
-                        @if results.sensitivity.is_some() || !results.excitation.is_empty() {
-                            (section("What the data can tell", told(results, pictures)))
-                        }
-                    }
-                    @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
-                    (section("Study", html! {
-                        details {
-                            summary { "The study file this page belongs to" }
-                            pre tabindex="0" { code { (report.text) } }
-                        }
-                    }))
-                }
-                footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
-                @if pictures.front.is_some() { script { (PreEscaped(front::SCRIPT)) } }
-            }
+            body { (body) }
         }
     }
+}
+
+/// The whole page.
+pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
+    let outcome = report.outcome;
+    let warnings = verdict::warnings(report);
+    let body = html! {
+        (header(report))
+        main {
+            @if !warnings.is_empty() {
+                (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
+            }
+            @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
+                (diagnosis::sections(found, pictures))
+            }
+            @for one in &pictures.robustness {
+                (section(one.title, html! { (one.content) (figures(&one.group)) }))
+            }
+            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &pictures.front) {
+                (section("Front", html! { (figures(group)) (front::table(report, found)) }))
+            }
+            @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
+            @if let Some(found) = &outcome.found.sensitivity {
+                (section(sensitivity::title(found), sensitivity::section(found)))
+            }
+            @if let Some(found) = &outcome.found.excitation {
+                (section("Excitation", html! {
+                    (excitation::section(found))
+                    @if let Some(group) = &pictures.excitation { (figures(group)) }
+                }))
+            }
+            @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
+            @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
+            @if !pictures.responses.is_empty() {
+                (section("Responses", html! {
+                    @if let Some(text) = &pictures.left_out { p { (text) } }
+                    @for group in &pictures.responses { (figures(group)) }
+                }))
+            }
+            @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
+            @if let Some(results) = &outcome.calibration {
+                (section("Calibration", calibration::section(results)))
+                @if let Some(found) = &outcome.found.uncertainty {
+                    (section(uncertainty::TITLE, html! {
+                        (uncertainty::section(found))
+                        @if let Some(group) = &pictures.uncertainty { (figures(group)) }
+                    }))
+                }
+                @if results.sensitivity.is_some() || !results.excitation.is_empty() {
+                    (section("What the data can tell", told(results, pictures)))
+                }
+            }
+            @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
+            (section("Study", html! {
+                details {
+                    summary { "The study file this page belongs to" }
+                    pre tabindex="0" { code { (report.text) } }
+                }
+            }))
+        }
+        footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
+        @if pictures.front.is_some() { script { (PreEscaped(front::SCRIPT)) } }
+    };
+    document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
 }
 
 /// What the data of a calibration tell of its tuners, and how rich its inputs are.

@@ -1,9 +1,10 @@
 //! The page of a comparison: the responses of several runs over each other.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{PreEscaped, html};
 use mops_core::{Analysis, Problem};
 
 use super::numbers::labelled;
+use super::page::document;
 use super::plot::{Curve, Ink, Plot};
 use super::sampling;
 
@@ -20,32 +21,20 @@ pub(crate) struct Responses {
 /// The page: tables as text, responses as pictures, sentences on what is not shown.
 pub(crate) fn comparison_page(tables: &str, runs: &[Responses], silent: &[String]) -> String {
     let plots = plots(runs);
-    let page: Markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "Comparison of runs" }
-                style { (PreEscaped(super::STYLE)) }
-            }
-            body {
-                header { p class="task" { "comparison" } h1 { "Runs side by side" } }
-                main {
-                    section { h2 { "Results" } pre tabindex="0" { (tables) } }
-                    section {
-                        h2 { "Responses" }
-                        @for sentence in silent { p { (sentence) } }
-                        @if plots.is_empty() { p { "There is no signal over time to draw." } }
-                        div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
-                    }
-                }
-                footer { "Written by mops " (env!("CARGO_PKG_VERSION")) "." }
+    let body = html! {
+        header { p class="task" { "comparison" } h1 { "Runs side by side" } }
+        main {
+            section { h2 { "Results" } pre tabindex="0" { (tables) } }
+            section {
+                h2 { "Responses" }
+                @for sentence in silent { p { (sentence) } }
+                @if plots.is_empty() { p { "There is no signal over time to draw." } }
+                div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
             }
         }
+        footer { "Written by mops " (env!("CARGO_PKG_VERSION")) "." }
     };
-    page.into_string()
+    document("Comparison of runs", body).into_string()
 }
 
 /// A curve, with the plot it belongs to: case, model, signal, and its label.

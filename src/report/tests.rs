@@ -170,16 +170,19 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
 /// Writes the report into a folder that lives as long as the answer.
 fn written(name: &str, start: f64, usage: Usage) -> (tempfile::TempDir, String) {
     let (problem, best, outcome, archive) = study(name, start, usage);
+    page_of(&problem, &best, &outcome, &archive, "a < b")
+}
+
+/// The folder of a report, and its page.
+fn page_of(
+    problem: &Problem,
+    best: &Evaluation,
+    outcome: &Outcome,
+    archive: &[Record],
+    text: &str,
+) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
-    let report = Report {
-        outcome: &outcome,
-        problem: &problem,
-        best: &best,
-        archive: &archive,
-        front: &[],
-        diagnosis: None,
-        text: "a < b",
-    };
+    let report = Report { outcome, problem, best, archive, front: &[], diagnosis: None, text };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     (folder, page)
@@ -220,18 +223,7 @@ fn a_run_without_a_single_value_still_has_a_page() {
     let best = problem.evaluate_at(&[15.0]);
     (outcome.objective, outcome.violation, outcome.feasible) = (f64::INFINITY, f64::INFINITY, false);
     outcome.criteria = criteria(&problem, &best);
-    let folder = tempfile::tempdir().unwrap();
-    let report = Report {
-        outcome: &outcome,
-        problem: &problem,
-        best: &best,
-        archive: &archive,
-        front: &[],
-        diagnosis: None,
-        text: "",
-    };
-    report.write(folder.path()).unwrap();
-    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
     assert!(page.contains("Failed. No point could be evaluated") && page.contains("nothing to show"));
 }
 
