@@ -1,19 +1,12 @@
 //! The report of a front in a browser: what is chosen in one place is chosen in all.
 
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+#[path = "common/headless.rs"]
+mod headless;
 
-use assert_cmd::Command;
+use std::path::Path;
+
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
-
-/// A browser of the Chromium family on the path.
-fn browser() -> Option<PathBuf> {
-    let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-    let path = std::env::var_os("PATH")?;
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file())
-}
 
 /// What the page answers to the script, which ends with `tell(...)`.
 fn answer(browser: &Path, folder: &Path, page: &str, script: &str) -> Value {
@@ -21,22 +14,7 @@ fn answer(browser: &Path, folder: &Path, page: &str, script: &str) -> Value {
                 pre.textContent = JSON.stringify(value); document.body.append(pre); };";
     let file = folder.join("tested.html");
     std::fs::write(&file, page.replace("</body>", &format!("<script>{tell}\n{script}</script></body>"))).unwrap();
-    let profile = format!("--user-data-dir={}", folder.join("profile").display());
-    let arguments = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--window-size=1100,1600",
-        &profile,
-        "--dump-dom",
-        &format!("file://{}", file.display()),
-    ];
-    let output = Command::new(browser).args(arguments).timeout(Duration::from_secs(120)).output().unwrap();
+    let output = headless::dump(browser, folder, &format!("file://{}", file.display()), &["--window-size=1100,1600"]);
     let dom = String::from_utf8_lossy(&output.stdout);
     let told = dom.split_once("<pre id=\"told\">").and_then(|(_, rest)| rest.split_once("</pre>"));
     let (told, _) = told.unwrap_or_else(|| panic!("no answer: {}", String::from_utf8_lossy(&output.stderr)));
@@ -86,8 +64,8 @@ tell(told);
 
 #[test]
 fn what_is_chosen_in_one_picture_is_chosen_in_all_and_in_the_table() {
-    let Some(browser) = browser() else {
-        eprintln!("skipped: no browser of the Chromium family is on the path");
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
         return;
     };
     let folder = tempfile::tempdir().unwrap();

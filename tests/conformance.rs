@@ -1,56 +1,16 @@
 //! What every solver of the catalogue must do, whatever its method.
 
+#[path = "common/function.rs"]
+mod function;
+
 use std::sync::Arc;
 
 use mops::{
-    Analysis, Budget, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Interface, Job, Mistake, Model,
-    Objective, Oracle, Parameter, Problem, Response, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value,
-    Variable, Watch,
+    Analysis, Budget, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Interface, Mistake, Objective, Oracle,
+    Problem, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value, Watch,
 };
 
-/// A function of the tuners, dressed as a model: signal `i` is constant at `f(x)[i]`.
-struct Function {
-    interface: Interface,
-    f: fn(&[f64]) -> Option<Vec<f64>>,
-}
-
-impl Model for Function {
-    fn interface(&self) -> &Interface {
-        &self.interface
-    }
-
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let values = (self.f)(job.parameters).ok_or(Failure::Diverged(0.5))?;
-        let traces = job.signals.iter().map(|&i| {
-            let mut trace = mops::Trace::starting_at(0.0, 1);
-            trace.push(1.0, [values[i]; 5]);
-            (self.interface.signals[i].name.clone(), trace)
-        });
-        Ok(Analysis::Time(Response { traces: traces.collect(), ..Response::default() }))
-    }
-}
-
-/// The end value of a signal.
-#[derive(Clone)]
-struct End(String);
-
-impl CriterionSpec for End {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        Ok(Box::new(self.clone()))
-    }
-}
-
-impl Criterion for End {
-    fn unit(&self) -> Unit {
-        Unit::one()
-    }
-    fn signals(&self) -> Vec<String> {
-        vec![self.0.clone()]
-    }
-    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
-        Ok(analysis.trace(&self.0).last().into())
-    }
-}
+use function::{End, Function};
 
 /// A study of `f` over the box [-2, 2]^n, starting at 1.5, with a usage for every value.
 fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
@@ -64,16 +24,12 @@ fn problems(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> [P
 
 fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
     let name = |prefix: &str, i: usize| format!("{prefix}{i}");
-    let interface = Interface {
-        signals: (0..usages.len()).map(|i| Variable::new(name("f", i), "1", "value")).collect(),
-        parameters: (0..n).map(|j| Parameter::new(name("x", j), "1", "coordinate")).collect(),
-        horizon: Some(1.0),
-        ..Interface::default()
-    };
+    let parameters: Vec<String> = (0..n).map(|j| name("x", j)).collect();
+    let function = Function::new(&parameters.iter().map(String::as_str).collect::<Vec<_>>(), usages.len(), f);
     Draft {
         name: "function".into(),
         objective: Some(objective),
-        models: vec![("function".into(), Function { interface, f }.into())],
+        models: vec![("function".into(), function.into())],
         tuners: (0..n).map(|j| (name("x", j), TunerDraft::new(1.5, -2.0, 2.0))).collect(),
         criteria: usages
             .iter()
@@ -115,16 +71,10 @@ impl Criterion for Line {
 
 /// A least-squares problem in two tuners, whose simulations fail where `f` says.
 fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
-    let interface = Interface {
-        signals: ["f0", "f1"].map(|name| Variable::new(name, "1", "coordinate")).to_vec(),
-        parameters: ["x0", "x1"].map(|name| Parameter::new(name, "1", "coordinate")).to_vec(),
-        horizon: Some(1.0),
-        ..Interface::default()
-    };
     let study = Draft {
         name: "line".into(),
         task: mops::Task::Calibration,
-        models: vec![("function".into(), Function { interface, f }.into())],
+        models: vec![("function".into(), Function::new(&["x0", "x1"], 2, f).into())],
         tuners: ["x0", "x1"].map(|name| (name.into(), TunerDraft::new(-1.5, -2.0, 2.0))).into(),
         criteria: vec![("line".into(), CriterionDraft::minimise(Line, 1.0))],
         ..Draft::default()

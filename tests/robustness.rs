@@ -1,72 +1,21 @@
 //! How far a design or an estimate can be trusted: worst cases, distributions, effects and intervals against closed forms.
 
+#[path = "common/function.rs"]
+mod function;
+
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::criteria::normalised_error::NormalisedError;
 use mops::{
-    Analysis, Case, CaseDraft, ChannelDraft, Chosen, Criterion, CriterionDraft, CriterionSpec, DistributionDraft,
-    Draft, Failure, Interface, Job, Measured, Mistake, Model, MonteCarloTask, Options, Outcome, Parameter, Place,
-    Response, RobustTask, SensitivityMethod, SensitivityTask, Task, TasksDraft, Trace, TunerDraft, UncertainDraft,
-    UncertaintyTask, Unit, Usage, Value, Variable, WorstCaseTask, statistics::Sampling,
+    Analysis, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DistributionDraft, Draft, Failure, Interface, Job,
+    Measured, Model, MonteCarloTask, Options, Outcome, Parameter, Place, Response, RobustTask, SensitivityMethod,
+    SensitivityTask, Task, TasksDraft, Trace, TunerDraft, UncertainDraft, UncertaintyTask, Usage, Variable,
+    WorstCaseTask, statistics::Sampling,
 };
 use serde_json::Value as Json;
 
-/// Values of its parameters, as signals that stay where they are.
-struct Function {
-    interface: Interface,
-    f: fn(&[f64]) -> Option<Vec<f64>>,
-}
-
-impl Function {
-    fn new(parameters: &[&str], values: usize, f: fn(&[f64]) -> Option<Vec<f64>>) -> Self {
-        let interface = Interface {
-            signals: (0..values).map(|i| Variable::new(format!("f{i}"), "1", "value")).collect(),
-            parameters: parameters.iter().map(|name| Parameter::new(*name, "1", "coordinate")).collect(),
-            horizon: Some(1.0),
-            ..Interface::default()
-        };
-        Self { interface, f }
-    }
-}
-
-impl Model for Function {
-    fn interface(&self) -> &Interface {
-        &self.interface
-    }
-
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let values = (self.f)(job.parameters).ok_or(Failure::Diverged(0.5))?;
-        let trace = |&i: &usize| {
-            let mut trace = Trace::starting_at(0.0, 1);
-            trace.push(1.0, Trace::NODES.map(|_| values[i]));
-            (self.interface.signals[i].name.clone(), trace)
-        };
-        Ok(Analysis::Time(Response { traces: job.signals.iter().map(trace).collect(), ..Response::default() }))
-    }
-}
-
-/// The value of a signal at the end.
-#[derive(Clone)]
-struct End(String);
-
-impl CriterionSpec for End {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        Ok(Box::new(self.clone()))
-    }
-}
-
-impl Criterion for End {
-    fn unit(&self) -> Unit {
-        Unit::one()
-    }
-    fn signals(&self) -> Vec<String> {
-        vec![self.0.clone()]
-    }
-    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
-        Ok(analysis.trace(&self.0).last().into())
-    }
-}
+use function::{End, Function};
 
 fn end(i: usize, demand: f64, usage: Usage) -> (String, CriterionDraft) {
     (format!("c{i}"), CriterionDraft::minimise(End(format!("f{i}")), demand).used_as(usage))

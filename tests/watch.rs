@@ -1,5 +1,8 @@
 //! The live page of a run: what a browser sees, what everybody else does, and that nobody holds up the run.
 
+#[path = "common/headless.rs"]
+mod headless;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -149,31 +152,17 @@ fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
     assert_eq!(result(&crowded), result(&alone));
 }
 
-/// Where a browser is that draws without a screen.
-fn browser() -> Option<&'static str> {
-    let runs =
-        |name: &&str| Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
-    ["chromium", "chromium-browser", "google-chrome"].into_iter().find(runs)
-}
-
 #[test]
 fn a_browser_shows_criteria_convergence_and_tuners_while_the_run_goes() {
-    let Some(browser) = browser() else {
-        eprintln!("skipped: no chromium on this machine");
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
         return;
     };
     let folder = tempfile::tempdir().unwrap();
     let run = watched(&folder.path().join("out"), &LONG);
     run.first_state();
-    let profile = format!("--user-data-dir={}", folder.path().join("profile").display());
-    let flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
-    let quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--timeout=4000"];
-    let output = Command::new(browser)
-        .args(flags)
-        .args(quiet)
-        .args([&profile, "--dump-dom", &format!("http://127.0.0.1:{}/{}/", run.port, run.token)])
-        .output()
-        .unwrap();
+    let page = format!("http://127.0.0.1:{}/{}/", run.port, run.token);
+    let output = headless::dump(&browser, folder.path(), &page, &["--timeout=4000"]);
     let page = String::from_utf8_lossy(&output.stdout);
     assert!(page.contains("<h1 id=\"study\">pid-design</h1>"), "{page}");
     assert!(page.contains("of 100000</dd>") && page.contains("Best objective"), "{page}");

@@ -16,7 +16,7 @@ fn main() -> std::io::Result<()> {
     let seed = arguments.get(2).and_then(|s| s.parse().ok()).unwrap_or(1);
     match arguments.get(1).map(String::as_str) {
         Some("all") => all(seed),
-        Some("one") => one(folder, seed, &arguments[3..]),
+        Some("one") => one(folder, seed, arguments.get(3..).unwrap_or_default()),
         count => mix(folder, count.and_then(|c| c.parse().ok()).unwrap_or(40), seed),
     }
 }

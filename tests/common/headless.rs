@@ -1,0 +1,36 @@
+//! A browser without a screen, where there is one.
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use std::time::Duration;
+
+use assert_cmd::Command;
+
+/// What a test says that needs a browser where there is none.
+pub const SKIPPED: &str = "skipped: no browser of the Chromium family is on the path";
+
+/// A browser of the Chromium family on the path.
+pub fn browser() -> Option<PathBuf> {
+    let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+    let path = std::env::var_os("PATH")?;
+    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file())
+}
+
+/// The document that an address leads to once its scripts have run, with a profile of its own in the folder.
+pub fn dump(browser: &Path, folder: &Path, address: &str, more: &[&str]) -> Output {
+    let flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--dump-dom",
+    ];
+    let profile = format!("--user-data-dir={}", folder.join("profile").display());
+    let limit = Duration::from_secs(120);
+    Command::new(browser).args(flags).args(more).args([&profile, address]).timeout(limit).output().unwrap()
+}
