@@ -263,6 +263,10 @@ const SPEED: [usize; 2] = [3, 1];
 impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
     type State = [S; 4];
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        (signal < 4).then_some(signal)
+    }
+
     // At each of the six stages of a step: as calls they would cost a fifth of a simulation.
     #[inline(always)]
     fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {

@@ -165,6 +165,10 @@ struct Driven<'a, S> {
 impl<S: Scalar> Dynamics<S> for Driven<'_, S> {
     type State = [S; 4];
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        (signal < 4).then_some(signal)
+    }
+
     fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {
         let [arm, pendulum] = self.plant.linear(x, self.drive.at(t));
         *dx = [x[1], arm, x[3], pendulum];

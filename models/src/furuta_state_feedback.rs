@@ -164,6 +164,10 @@ impl<S: Scalar> Loop<S> {
 impl<S: Scalar> Dynamics<S> for Loop<S> {
     type State = [S; 5];
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        (signal < 5).then_some(signal)
+    }
+
     fn derivative(&self, _: f64, x: &[S; 5], dx: &mut [S; 5]) {
         let plant = [x[0], x[1], x[2], x[3]];
         let [arm, pendulum] = match self.equations {

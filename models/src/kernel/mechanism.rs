@@ -197,6 +197,10 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
 impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for Mechanism<S, B, N, M> {
     type State = [S; M];
 
+    fn shows(&self, signal: usize) -> Option<usize> {
+        (signal < M).then_some(signal)
+    }
+
     fn derivative(&self, t: f64, x: &[S; M], dx: &mut [S; M]) {
         let (acceleration, _) = self.balance(t, x);
         for i in 0..N {
