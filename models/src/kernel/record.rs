@@ -141,7 +141,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
         };
         let off = [quartic(&|k| k) - first, quartic(&|k| 4 - k) - last].map(f64::abs);
         let allowed = self.allowed(largest(values).max(first.abs()).max(last.abs()));
-        !(off[0] > allowed || off[1] > allowed)
+        off.iter().all(|off| off.is_nan() || *off <= allowed)
     }
 
     /// Whether the quartic of a step of this length must be compared with the signal: the step is longer than those that
@@ -151,7 +151,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
         let begin = slope(&|k| SLOPE[k]);
         let off = (begin - self.resolved[index].slope).abs() * length;
         self.resolved[index].slope = slope(&|k| -SLOPE[4 - k]);
-        length > LONGER * self.resolved[index].longest || !(off <= self.allowed(largest(values)))
+        length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(largest(values))
     }
 
     /// Adds the part `[from, to]` of a step to the traces of a signal, in halves where one quartic does not do.
