@@ -199,7 +199,15 @@ fn a_violated_constraint_is_status_1_and_still_a_result() {
 
 #[test]
 fn every_solver_improves_the_shipped_design() {
-    let others = ["cma-es", "differential-evolution", "genetic", "nelder-mead", "particle-swarm"];
+    let others = [
+        "cma-es",
+        "differential-evolution",
+        "genetic",
+        "l-bfgs",
+        "nelder-mead",
+        "particle-swarm",
+        "simulated-annealing",
+    ];
     for solver in ["auto", "sqp", "pattern-search"].into_iter().chain(others) {
         let folder = tempfile::tempdir().unwrap();
         let found = worst(&run("pid-design", folder.path(), &["--solver", solver, "--max-evaluations", "2500"]));

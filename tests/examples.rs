@@ -30,3 +30,13 @@ fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
     assert_eq!(keys, ["horizontal/phi", "horizontal/theta", "upright/phi", "upright/theta"]);
     assert_eq!(study.cases[1].role(), mops::Role::Validation);
 }
+
+#[path = "../examples/argmin_executor.rs"]
+mod argmin_executor;
+
+#[test]
+fn an_executor_of_argmin_drives_a_solver_to_the_least_of_many_basins() {
+    let (best, cost, evaluations) = argmin_executor::solve().unwrap();
+    assert!(cost <= 1e-8 && best.iter().all(|x| x.abs() < 1e-4), "{cost} {best:?}");
+    assert!(evaluations <= 20_000, "{evaluations}");
+}

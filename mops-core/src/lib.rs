@@ -48,6 +48,7 @@ pub use catalogue::{
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
+pub use differences::Differences;
 pub use effect::{
     Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
 };

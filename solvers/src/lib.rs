@@ -8,7 +8,9 @@ pub mod differential_evolution;
 mod directions;
 pub mod epigraph;
 pub mod evolution;
+pub mod for_argmin;
 pub mod genetic;
+pub mod l_bfgs;
 pub mod levenberg_marquardt;
 mod multistart;
 pub mod nelder_mead;
@@ -21,6 +23,7 @@ mod penalty;
 mod population;
 mod ranking;
 mod rows;
+pub mod simulated_annealing;
 pub mod sqp;
 mod start;
 mod variation;
@@ -45,5 +48,7 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),
         SolverKind::of::<nelder_mead::NelderMeadOptions>(),
         SolverKind::of::<particle_swarm::ParticleSwarmOptions>(),
+        SolverKind::of::<simulated_annealing::SimulatedAnnealingOptions>(),
+        SolverKind::of::<l_bfgs::LBfgsOptions>(),
     ]
 }

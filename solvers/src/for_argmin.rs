@@ -1,0 +1,281 @@
+//! Solvers of mops for argmin's executor.
+
+use std::collections::HashMap;
+
+use argmin::core::{CostFunction, Error, IterState, KV, Problem, State as _, TerminationReason};
+use mops_core::{
+    Differences, Evaluation, Halt, Linearisation, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream, Usage,
+    stream,
+};
+
+/// A solver of mops as argmin's `Solver`, for problems with a [`CostFunction`] of real numbers, over a box.
+///
+/// An iteration of the executor is a [`Solver::step`], which may take many points. Where the cost is not finite, the point
+/// has failed: it is worse than every other. No point is asked for twice. Slopes come from differences.
+///
+/// ```
+/// use argmin::core::{CostFunction, Error, Executor, State};
+/// use mops_solvers::cma_es::CmaEsOptions;
+/// use mops_solvers::for_argmin::Driven;
+///
+/// struct Rosenbrock;
+/// impl CostFunction for Rosenbrock {
+///     type Param = Vec<f64>;
+///     type Output = f64;
+///     fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+///         Ok((1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2))
+///     }
+/// }
+///
+/// let solver = Driven::new(&CmaEsOptions::default(), &[[-2.0, 2.0]; 2]).with_evaluations(3000);
+/// let done = Executor::new(Rosenbrock, solver).configure(|state| state.param(vec![-1.2, 1.0])).run()?;
+/// assert!(done.state().get_best_cost() < 1e-8);
+/// # Ok::<(), Error>(())
+/// ```
+pub struct Driven {
+    solver: Box<dyn Solver>,
+    kind: &'static str,
+    memory: Memory,
+}
+
+/// What is known of the problem.
+struct Memory {
+    bounds: Vec<[f64; 2]>,
+    shape: Shape,
+    seed: u64,
+    /// Points that may be evaluated.
+    evaluations: usize,
+    noise: f64,
+    best: Option<Evaluation>,
+    known: HashMap<Vec<u64>, f64>,
+    /// What the cost function complained of.
+    error: Option<Error>,
+}
+
+impl Driven {
+    /// A solver with its options, between a smallest and a largest value of every variable.
+    ///
+    /// # Panics
+    /// A bound that is not finite, or a smallest value above the largest.
+    pub fn new<S: SolverOptions>(options: &S, bounds: &[[f64; 2]]) -> Self {
+        let sound = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
+        assert!(bounds.iter().all(sound), "a box has finite bounds, the smallest value first");
+        let shape = Shape { spacing: vec![0.0; bounds.len()], rows: vec![(Usage::Minimise, 1.0)], ..Shape::default() };
+        let memory = Memory {
+            bounds: bounds.to_vec(),
+            shape,
+            seed: 1,
+            evaluations: usize::MAX,
+            noise: 1e-14,
+            best: None,
+            known: HashMap::new(),
+            error: None,
+        };
+        Self { solver: options.build(), kind: S::KIND, memory }
+    }
+
+    /// Under another seed than 1.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.memory.seed = seed;
+        self
+    }
+
+    /// Ends after so many evaluations of the cost.
+    #[must_use]
+    pub fn with_evaluations(mut self, evaluations: usize) -> Self {
+        self.memory.evaluations = evaluations;
+        self
+    }
+
+    /// For costs that are exact to `noise`, relative to their size; 1e-14 where nothing is said.
+    #[must_use]
+    pub fn with_noise(mut self, noise: f64) -> Self {
+        self.memory.noise = noise;
+        self
+    }
+
+    /// The state with the best point so far.
+    fn tell(&self, state: IterState<Vec<f64>, (), (), (), (), f64>) -> IterState<Vec<f64>, (), (), (), (), f64> {
+        match &self.memory.best {
+            Some(best) => state.param(best.tuners.clone()).cost(best.merit.objective),
+            None => state,
+        }
+    }
+
+    /// Why it is over: an error of the cost function's, or the budget.
+    fn halted(&mut self) -> Result<TerminationReason, Error> {
+        match self.memory.error.take() {
+            Some(error) => Err(error),
+            None => Ok(TerminationReason::SolverExit("all evaluations are spent".into())),
+        }
+    }
+}
+
+type State = IterState<Vec<f64>, (), (), (), (), f64>;
+
+impl<O: CostFunction<Param = Vec<f64>, Output = f64>> argmin::core::Solver<O, State> for Driven {
+    fn name(&self) -> &str {
+        self.kind
+    }
+
+    fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+        self.solver.accepts(&self.memory.shape).map_err(Error::msg)?;
+        let start = state.take_param().ok_or_else(|| Error::msg("a start is needed: `configure(|s| s.param(..))`"))?;
+        if start.len() != self.memory.bounds.len() {
+            return Err(Error::msg(format!("{} variables, but {} bounds", start.len(), self.memory.bounds.len())));
+        }
+        let start = self.memory.point_of(&start);
+        self.memory.best = None;
+        self.memory.known.clear();
+        let begun = self.solver.begin(&mut Asked { problem, memory: &mut self.memory }, &start);
+        let state = self.tell(state);
+        Ok(match begun {
+            Ok(()) => (state, None),
+            Err(_) => (state.terminate_with(self.halted()?), None),
+        })
+    }
+
+    fn next_iter(&mut self, problem: &mut Problem<O>, state: State) -> Result<(State, Option<KV>), Error> {
+        let progress = self.solver.step(&mut Asked { problem, memory: &mut self.memory });
+        let state = self.tell(state);
+        let state = match progress {
+            Ok(Progress::Continue) => state,
+            Ok(Progress::Converged) => state.terminate_with(TerminationReason::SolverConverged),
+            Ok(Progress::Stalled) => {
+                state.terminate_with(TerminationReason::SolverExit("no improvement any more".into()))
+            }
+            Err(_) => state.terminate_with(self.halted()?),
+        };
+        Ok((state, None))
+    }
+}
+
+impl Memory {
+    fn point_of(&self, x: &[f64]) -> Vec<f64> {
+        let position = |(x, [low, high]): (&f64, &[f64; 2])| {
+            if high > low { ((x - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 }
+        };
+        x.iter().zip(&self.bounds).map(position).collect()
+    }
+
+    fn values_at(&self, point: &[f64]) -> Vec<f64> {
+        let value = |(u, [low, high]): (&f64, &[f64; 2])| (low + u * (high - low)).clamp(*low, *high);
+        point.iter().zip(&self.bounds).map(value).collect()
+    }
+}
+
+/// An argmin problem that answers a solver of mops.
+struct Asked<'a, O> {
+    problem: &'a mut Problem<O>,
+    memory: &'a mut Memory,
+}
+
+impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Asked<'_, O> {
+    fn cost(&mut self, values: &Vec<f64>) -> Result<f64, Halt> {
+        // Minus zero is zero.
+        let key: Vec<u64> = values.iter().map(|x| (x + 0.0).to_bits()).collect();
+        if let Some(&cost) = self.memory.known.get(&key) {
+            return Ok(cost);
+        }
+        if self.memory.known.len() >= self.memory.evaluations {
+            return Err(Halt::Budget);
+        }
+        let cost = self.problem.cost(values).map_err(|error| {
+            self.memory.error = Some(error);
+            Halt::Interrupted
+        })?;
+        self.memory.known.insert(key, cost);
+        Ok(cost)
+    }
+}
+
+impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Oracle for Asked<'_, O> {
+    fn shape(&self) -> &Shape {
+        &self.memory.shape
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        let mut answers = Vec::with_capacity(points.len());
+        for point in points {
+            let tuners = self.memory.values_at(point);
+            let scaled = Some(vec![self.cost(&tuners)?]).filter(|scaled| scaled[0].is_finite());
+            let merit = scaled.as_ref().map_or(Merit::FAILED, |scaled| self.memory.shape.merit(scaled));
+            let (readings, residuals, failures) = (Vec::new(), Vec::new(), Vec::new());
+            let answer = Evaluation { point: point.clone(), tuners, readings, scaled, residuals, failures, merit };
+            if self.memory.best.as_ref().is_none_or(|best| merit.is_better_than(&best.merit)) {
+                self.memory.best = Some(answer.clone());
+            }
+            answers.push(answer);
+        }
+        Ok(answers)
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        Differences::of_noise(self.memory.noise).linearise(self, point, reach)
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.memory.best.as_ref()
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        stream(self.memory.seed, label)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use argmin::core::Executor;
+
+    use super::*;
+    use crate::nelder_mead::NelderMeadOptions;
+    use crate::pattern_search::PatternSearchOptions;
+    use crate::sqp::SqpOptions;
+
+    /// `(x - 1)^2 + 2 (y + 3)^2`: in the box `[-2, 5]^2` least at (1, -2), where it is 2. Not defined for `x > 3`.
+    struct Bowl;
+    impl CostFunction for Bowl {
+        type Param = Vec<f64>;
+        type Output = f64;
+
+        fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+            assert!(x.iter().all(|x| (-2.0..=5.0).contains(x)), "{x:?}");
+            Ok(if x[0] > 3.0 { f64::NAN } else { (x[0] - 1.0).powi(2) + 2.0 * (x[1] + 3.0).powi(2) })
+        }
+    }
+
+    fn least<S: SolverOptions>(options: &S) -> (Vec<f64>, u64) {
+        let solver = Driven::new(options, &[[-2.0, 5.0]; 2]).with_evaluations(2000);
+        let done =
+            Executor::new(Bowl, solver).configure(|state| state.param(vec![2.5, 4.0]).counting(true)).run().unwrap();
+        (done.state().best_param.clone().unwrap(), done.state().get_func_counts()["cost_count"])
+    }
+
+    #[test]
+    fn solvers_of_mops_end_at_the_bound_that_the_minimum_lies_at() {
+        for (x, count) in [
+            least(&SqpOptions::default()),
+            least(&PatternSearchOptions::default()),
+            least(&NelderMeadOptions::default()),
+        ] {
+            assert!((x[0] - 1.0).abs() < 1e-3 && (x[1] + 2.0).abs() < 1e-3 && count <= 2000, "{x:?} {count}");
+        }
+    }
+
+    #[test]
+    fn an_error_of_the_cost_function_is_that_of_the_run() {
+        struct Broken;
+        impl CostFunction for Broken {
+            type Param = Vec<f64>;
+            type Output = f64;
+
+            fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+                if x[0] < 0.5 { Err(Error::msg("no sensor")) } else { Ok(x[0]) }
+            }
+        }
+        let solver = Driven::new(&PatternSearchOptions::default(), &[[0.0, 1.0]]);
+        let run = Executor::new(Broken, solver).configure(|state| state.param(vec![0.9])).run();
+        assert!(run.err().is_some_and(|error| error.to_string().contains("no sensor")));
+    }
+}
