@@ -7,7 +7,7 @@ use crate::solver::{Halt, Linearisation, Oracle};
 ///
 /// A one-sided difference is best near the square root of the noise and then keeps half of its digits, a central one near
 /// the cube root and keeps two thirds at twice the price. One-sided ones are taken where half of the digits are plenty:
-/// values exact to 1e-14, and slopes that are to describe more than a thousandth of the box.
+/// values exact to 1e-14, and slopes that are to describe a hundred times more than their step.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +28,7 @@ impl Differences {
     }
 
     fn one_sided(self, reach: f64) -> bool {
-        self.noise <= 1e-14 && reach >= 1e-3
+        self.noise <= 1e-14 && reach >= 1e-6
     }
 
     /// Values and slopes at a point; central differences are one-sided at the bounds and where one side fails.

@@ -9,15 +9,20 @@ use crate::multistart::Multistart;
 use crate::nsga2::Nsga2Options;
 use crate::nsga3::Nsga3Options;
 use crate::pattern_search::PatternSearchOptions;
+use crate::quasi_newton::QuasiNewton;
+use crate::relay::Relay;
 use crate::sqp::SqpOptions;
+use crate::texture::{Texture, texture};
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp`; from several starts: the study's own, and the best points of a sample of the box. Where
-/// the objective is no sum of squares a pattern search follows from the best point found, because an optimum may lie on a
-/// jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the best point
-/// until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is `weighted-chebyshev` for up to
-/// three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria and `nsga3` for more.
+/// numbers or lists, else `sqp`. One criterion without constraints is looked at along two lines near the start: where it is
+/// noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`. Each begins at
+/// several starts: the study's own, and the best points of a sample of the box. Where the objective is no sum of squares a
+/// pattern search follows from the best point found, because an optimum may lie on a jump (of a settling time, say), where
+/// slopes lead no further; a sum of squares is started again around the best point until nothing changes. Where every
+/// criterion counts for itself (`objective = "each"`) it is `weighted-chebyshev` for up to three criteria and 50 tuners
+/// without whole numbers or lists, else `nsga2` for two criteria and `nsga3` for more.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -84,7 +89,8 @@ impl Solver for Auto {
             self.stage = Some(Stage::Front(front));
             return Ok(());
         }
-        let mut global = Multistart::new(choose(oracle.shape()), self.options.starts);
+        let local = choose(oracle, start)?;
+        let mut global = Multistart::new(local, self.options.starts);
         if oracle.shape().residuals > 0 {
             global = global.until_nothing_changes();
         }
@@ -185,10 +191,26 @@ fn front(shape: &Shape) -> Box<dyn Solver> {
     if objectives <= 2 { Nsga2Options::default().build() } else { Nsga3Options::default().build() }
 }
 
-fn choose(shape: &Shape) -> Box<dyn Solver> {
+/// The local solver of a problem.
+fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Box<dyn Solver>, Halt> {
+    let shape = oracle.shape().clone();
     // The starts are counted here, not in the chosen solver.
     let least_squares = LevenbergMarquardtOptions::default().local();
+    if least_squares.accepts(&shape).is_ok() {
+        return Ok(least_squares);
+    }
     let sqp = SqpOptions::default().build();
-    let choices = [least_squares, sqp, PatternSearchOptions::default().build()];
-    choices.into_iter().find(|solver| solver.accepts(shape).is_ok()).expect("pattern search accepts every problem")
+    if sqp.accepts(&shape).is_err() || start.is_empty() {
+        return Ok(PatternSearchOptions::default().build());
+    }
+    // Where there are several rows a kink is mostly one between them; they are not looked at.
+    let one = Box::new(QuasiNewton::default());
+    if one.accepts(&shape).is_err() {
+        return Ok(sqp);
+    }
+    Ok(match texture(oracle, start)? {
+        Texture::Noisy => PatternSearchOptions::default().build(),
+        Texture::Kinked => sqp,
+        Texture::Smooth => Box::new(Relay::new(one, sqp)),
+    })
 }

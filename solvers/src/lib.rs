@@ -21,11 +21,14 @@ pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
 mod population;
+mod quasi_newton;
 mod ranking;
+mod relay;
 mod rows;
 pub mod simulated_annealing;
 pub mod sqp;
 mod start;
+mod texture;
 mod variation;
 pub mod weighted_chebyshev;
 
