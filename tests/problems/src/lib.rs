@@ -48,6 +48,7 @@ pub fn suites() -> Vec<Suite> {
         bbob::SUITE,
         fronts::ZDT,
         fronts::DTLZ,
+        fronts::WFG,
         fronts::CONSTRAINED,
     ]
 }

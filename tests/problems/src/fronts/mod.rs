@@ -1,8 +1,9 @@
-//! Problems with a front: `zdt`, `dtlz` and `constrained-fronts`. Hypervolumes are computed here, from closed forms or from a
+//! Problems with a front: `zdt`, `dtlz`, `wfg` and `constrained-fronts`. Hypervolumes are computed here, from closed forms or from a
 //! front of many points.
 
 mod constrained;
 mod dtlz;
+mod wfg;
 mod zdt;
 
 use mops_core::Along;
@@ -12,6 +13,7 @@ use crate::{Answer, Functions, Problem, Sense};
 
 pub(crate) use constrained::SUITE as CONSTRAINED;
 pub(crate) use dtlz::SUITE as DTLZ;
+pub(crate) use wfg::SUITE as WFG;
 pub(crate) use zdt::SUITE as ZDT;
 
 /// A plain generic function, for each kind of number.
@@ -56,7 +58,7 @@ mod tests {
 
     #[test]
     fn no_point_of_a_front_dominates_another_and_all_lie_within_the_reference() {
-        for Suite { problems, .. } in [super::ZDT, super::DTLZ, super::CONSTRAINED] {
+        for Suite { problems, .. } in [super::ZDT, super::DTLZ, super::WFG, super::CONSTRAINED] {
             for problem in problems() {
                 let Answer::Front { reference, points, hypervolume: known } = &problem.answer else { panic!() };
                 let front = points(200);
@@ -77,7 +79,7 @@ mod tests {
     fn sampled_points_of_the_box_do_not_dominate_the_front() {
         use rand::Rng;
         let mut random = mops_core::stream(1, "fronts");
-        for Suite { problems, .. } in [super::ZDT, super::DTLZ, super::CONSTRAINED] {
+        for Suite { problems, .. } in [super::ZDT, super::DTLZ, super::WFG, super::CONSTRAINED] {
             for problem in problems() {
                 let Answer::Front { points, .. } = &problem.answer else { panic!() };
                 let front = points(300);
