@@ -3,7 +3,9 @@
 use mops_core::Stream;
 use rand::Rng;
 
-/// Simulated binary crossover and polynomial mutation, both within the bounds.
+/// Simulated binary crossover and polynomial mutation, the mutation within the bounds. N.B.: a density of the crossover that
+/// ends at the bounds (Deb, Agrawal 1999) never gives a child on them: of DTLZ6, whose front lies on ten of them, nothing was
+/// found within 250 generations.
 ///
 /// Source: K. Deb, R. B. Agrawal, Complex Systems 9 (1995) 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26
 /// (1996) 30-45; bounded as of K. Deb, S. Agrawal, A niched-penalty approach for constraint handling in genetic algorithms
@@ -40,13 +42,11 @@ impl Variation {
             let (low, high) = if *a < *b { (*a, *b) } else { (*b, *a) };
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
             let u: f64 = random.random();
-            // The spread factor, whose density ends where a child would leave the box.
-            let spread = |room: f64| {
-                let share = u * (2.0 - (1.0 + room / half).powf(-power));
-                if share <= 1.0 { share.powf(1.0 / power) } else { (2.0 - share).powf(-1.0 / power) }
-            };
-            let first = (middle - half * spread(low)).clamp(0.0, 1.0);
-            let second = (middle + half * spread(1.0 - high)).clamp(0.0, 1.0);
+            let share = 2.0 * u;
+            let spread = if share <= 1.0 { share.powf(1.0 / power) } else { (2.0 - share).powf(-1.0 / power) };
+            // Children that leave the box end on its face: a face is where an optimum often lies.
+            let first = (middle - half * spread).clamp(0.0, 1.0);
+            let second = (middle + half * spread).clamp(0.0, 1.0);
             (*a, *b) = if random.random::<bool>() { (first, second) } else { (second, first) };
         }
     }
