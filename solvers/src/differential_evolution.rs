@@ -6,7 +6,7 @@ use rand_distr::{Cauchy, Distribution, Normal};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Patience, Population, merits};
+use crate::population::{Generations, Next, Population, Renewal, merits};
 use crate::ranking::compare;
 
 /// Differential evolution with factors that adapt to what has succeeded (SHADE): a global search without slopes, strong
@@ -54,9 +54,7 @@ struct State {
     /// Members that were replaced by better ones.
     replaced: Vec<Vec<f64>>,
     memory: Memory,
-    patience: Patience,
-    begun: usize,
-    unit: f64,
+    generations: Generations,
 }
 
 impl Solver for DifferentialEvolution {
@@ -71,16 +69,9 @@ impl Solver for DifferentialEvolution {
         }
         let mut random = oracle.stream("differential-evolution");
         let population = Population::sampled(oracle, self.size(start.len()), Some(start), &mut random)?;
-        let unit = population.merits[0].objective.abs().min(1.0);
-        self.state = Some(State {
-            random,
-            population,
-            replaced: Vec::new(),
-            memory: Memory::new(),
-            patience: Patience::NEW,
-            begun: 1,
-            unit,
-        });
+        let DifferentialEvolutionOptions { tolerance, patience, restarts, .. } = self.options;
+        let generations = Generations::of(&population, Renewal { tolerance, patience, restarts });
+        self.state = Some(State { random, population, replaced: Vec::new(), memory: Memory::new(), generations });
         Ok(())
     }
 
@@ -89,20 +80,14 @@ impl Solver for DifferentialEvolution {
         let size = self.size(n);
         let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
         state.generation(oracle)?;
-        let best = state.population.merits[state.population.order()[0]];
-        let idle = state.patience.tell(best);
-        let collapsed = state.population.has_collapsed(self.options.tolerance, state.unit);
-        if !collapsed && idle < self.options.patience {
-            return Ok(Progress::Continue);
+        match state.generations.after(&state.population) {
+            Next::Generation => return Ok(Progress::Continue),
+            Next::End => return Ok(Progress::Stalled),
+            Next::Members => {}
         }
-        if state.begun > self.options.restarts {
-            return Ok(Progress::Stalled);
-        }
-        state.begun += 1;
         state.population = Population::sampled(oracle, size, None, &mut state.random)?;
         state.replaced.clear();
         state.memory = Memory::new();
-        state.patience = Patience::NEW;
         Ok(Progress::Continue)
     }
 }

@@ -5,7 +5,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Patience, Population, merits};
+use crate::population::{Generations, Next, Population, Renewal, merits};
 use crate::ranking::compare;
 use crate::variation::Variation;
 
@@ -67,9 +67,7 @@ struct State {
     random: Stream,
     population: Population,
     variation: Variation,
-    patience: Patience,
-    begun: usize,
-    unit: f64,
+    generations: Generations,
 }
 
 impl Solver for Genetic {
@@ -85,35 +83,31 @@ impl Solver for Genetic {
         let options = &self.options;
         let mut random = oracle.stream("genetic");
         let population = Population::sampled(oracle, options.population.max(4), Some(start), &mut random)?;
-        let unit = population.merits[0].objective.abs().min(1.0);
+        let GeneticOptions { tolerance, patience, restarts, .. } = *options;
+        let generations = Generations::of(&population, Renewal { tolerance, patience, restarts });
         let variation = Variation {
             crossover: options.crossover,
             crossover_index: options.crossover_index,
             mutation_index: options.mutation_index,
             ..Variation::usual(start.len())
         };
-        self.state = Some(State { random, population, variation, patience: Patience::NEW, begun: 1, unit });
+        self.state = Some(State { random, population, variation, generations });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
         state.generation(oracle)?;
-        let idle = state.patience.tell(state.population.merits[0]);
-        let collapsed = state.population.has_collapsed(self.options.tolerance, state.unit);
-        if !collapsed && idle < self.options.patience {
-            return Ok(Progress::Continue);
+        match state.generations.after(&state.population) {
+            Next::Generation => return Ok(Progress::Continue),
+            Next::End => return Ok(Progress::Stalled),
+            Next::Members => {}
         }
-        if state.begun > self.options.restarts {
-            return Ok(Progress::Stalled);
-        }
-        state.begun += 1;
         let best = state.population.points[0].clone();
         state.population = Population::sampled(oracle, state.population.len(), Some(&best), &mut state.random)?;
         // Finer steps around what is known.
         state.variation.mutation_index *= 1.5;
         state.variation.crossover_index *= 1.2;
-        state.patience = Patience::NEW;
         Ok(Progress::Continue)
     }
 }

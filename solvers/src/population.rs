@@ -46,7 +46,7 @@ impl Population {
     }
 
     /// Whether the members no longer differ: in what they are worth, relative to `unit`, or in where they are.
-    pub fn has_collapsed(&self, tolerance: f64, unit: f64) -> bool {
+    fn has_collapsed(&self, tolerance: f64, unit: f64) -> bool {
         let order = self.order();
         let (best, worst) = (self.merits[order[0]], self.merits[order[self.len() - 1]]);
         let flat = |a: f64, b: f64, unit: f64| (b - a).abs() <= tolerance * a.abs().max(unit);
@@ -67,23 +67,61 @@ pub fn merits(evaluations: &[Evaluation]) -> Vec<Merit> {
     evaluations.iter().map(|evaluation| evaluation.merit).collect()
 }
 
-/// Counts the generations since the best of a population got better.
+/// When the members of a population are drawn anew.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
-    best: Merit,
-    idle: usize,
+pub struct Renewal {
+    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    pub tolerance: f64,
+    /// Generations without a better point that are too many.
+    pub patience: usize,
+    /// Number of times that members may be drawn anew.
+    pub restarts: usize,
 }
 
-impl Patience {
-    /// Before the first generation.
-    pub const NEW: Self = Self { best: Merit::FAILED, idle: 0 };
+/// What comes after a generation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// Another one.
+    Generation,
+    /// New members.
+    Members,
+    /// Nothing.
+    End,
+}
 
-    /// Generations in a row without a better point, this one included.
-    pub fn tell(&mut self, best: Merit) -> usize {
+/// Watches a population from generation to generation.
+#[derive(Debug, Clone)]
+pub struct Generations {
+    rules: Renewal,
+    /// Size of an objective that counts as one.
+    unit: f64,
+    best: Merit,
+    idle: usize,
+    renewed: usize,
+}
+
+impl Generations {
+    /// From the first members on, the start in front.
+    pub fn of(members: &Population, rules: Renewal) -> Self {
+        let unit = members.merits[0].objective.abs().min(1.0);
+        Self { rules, unit, best: Merit::FAILED, idle: 0, renewed: 0 }
+    }
+
+    /// What comes after a generation with these members.
+    pub fn after(&mut self, members: &Population) -> Next {
+        let best = members.merits[members.order()[0]];
         self.idle = if best.is_better_than(&self.best) { 0 } else { self.idle + 1 };
         if self.idle == 0 {
             self.best = best;
         }
-        self.idle
+        if self.idle < self.rules.patience && !members.has_collapsed(self.rules.tolerance, self.unit) {
+            return Next::Generation;
+        }
+        if self.renewed >= self.rules.restarts {
+            return Next::End;
+        }
+        self.renewed += 1;
+        (self.best, self.idle) = (Merit::FAILED, 0);
+        Next::Members
     }
 }
