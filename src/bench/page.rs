@@ -9,9 +9,11 @@ pub(super) fn page(title: &str, heading: &str, pictures: &[String], tables: &str
     let body = html! {
         header { p class="task" { "benchmark" } h1 { (title) } }
         main {
-            section {
-                h2 { (heading) }
-                @for picture in pictures { figure { (PreEscaped(picture)) } }
+            @if !pictures.is_empty() {
+                section {
+                    h2 { (heading) }
+                    @for picture in pictures { figure { (PreEscaped(picture)) } }
+                }
             }
             section { h2 { "Runs" } div class="wide" tabindex="0" { pre { (tables) } } }
         }

@@ -10,12 +10,13 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     let accuracy = all.first().map_or(0.0, |(_, results)| results.accuracy);
     let rough = |row: &Row| row.to_rough;
     let fine = |row: &Row| row.to_fine;
-    let plots = [
-        data(all, rough, ROUGH),
-        data(all, fine, accuracy),
-        performance(all, rough, ROUGH),
-        performance(all, fine, accuracy),
-    ];
+    // No point of a front is called solved.
+    let of_fronts = all.iter().any(|(_, results)| results.rows.iter().any(|row| row.front.is_some()));
+    let profiles = || {
+        let data = [data(all, rough, ROUGH), data(all, fine, accuracy)];
+        data.into_iter().chain([performance(all, rough, ROUGH), performance(all, fine, accuracy)]).collect()
+    };
+    let plots: Vec<Option<Plot>> = if of_fronts { Vec::new() } else { profiles() };
     let title = format!("Benchmark of solvers: {suite}");
     let pictures: Vec<String> = plots.iter().flatten().map(Plot::svg).collect();
     super::super::page::page(&title, "Profiles", &pictures, tables, "results.json")

@@ -1,0 +1,75 @@
+//! What a second thread gains where every evaluation takes 0.2 s: generations, polls of patterns, slopes by differences.
+//!
+//! An evaluation waits instead of computing, so that the ratio is that of the solver and the engine, whatever else the
+//! machine does.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use mops::solvers::genetic::GeneticOptions;
+use mops::solvers::pattern_search::PatternSearchOptions;
+use mops::solvers::sqp::SqpOptions;
+use mops::{Budget, Evaluation, Evaluator, Run, Shape, Solver, SolverOptions, Usage};
+
+const TAKES: Duration = Duration::from_millis(200);
+const TUNERS: usize = 6;
+const EVALUATIONS: usize = 80;
+
+/// Two bowls whose larger value counts.
+struct Slow(Shape);
+
+impl Evaluator for Slow {
+    fn shape(&self) -> &Shape {
+        &self.0
+    }
+
+    fn evaluate(&self, point: &[f64]) -> Evaluation {
+        sleep(TAKES);
+        let bowl = |centre: f64| point.iter().map(|u| (u - centre).powi(2)).sum::<f64>() + 1.0;
+        let scaled = vec![bowl(0.3), bowl(0.6)];
+        Evaluation {
+            point: point.to_vec(),
+            tuners: point.to_vec(),
+            readings: Vec::new(),
+            merit: self.0.merit(&scaled),
+            scaled: Some(scaled),
+            residuals: Vec::new(),
+            failures: Vec::new(),
+        }
+    }
+
+    fn tuners_at(&self, point: &[f64]) -> Vec<f64> {
+        point.to_vec()
+    }
+
+    fn seed(&self) -> u64 {
+        1
+    }
+}
+
+/// Seconds for the budget on so many threads, and the best objective.
+fn take(problem: &Slow, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+    pool.install(|| {
+        let begun = Instant::now();
+        let mut run = Run::new(problem, Budget { evaluations: EVALUATIONS }, &());
+        run.solve(solver, &[0.9; TUNERS]);
+        let best = run.archive().iter().map(|record| record.merit.objective).fold(f64::INFINITY, f64::min);
+        (begun.elapsed().as_secs_f64(), best)
+    })
+}
+
+fn main() {
+    let shape = Shape { spacing: vec![0.0; TUNERS], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
+    let problem = Slow(shape);
+    let build: [(&str, fn() -> Box<dyn Solver>); 3] = [
+        ("genetic", || GeneticOptions::default().build()),
+        ("pattern-search", || PatternSearchOptions::default().build()),
+        ("sqp, slopes by differences", || SqpOptions::default().build()),
+    ];
+    for (name, build) in build {
+        let [(one, best), (two, same)] = [1, 2].map(|threads| take(&problem, build().as_mut(), threads));
+        assert_eq!(best.to_bits(), same.to_bits(), "{name}: threads change no bit");
+        println!("{name:28} 1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {:.2}", one / two);
+    }
+}
