@@ -15,6 +15,9 @@ const TAKES: Duration = Duration::from_millis(200);
 const TUNERS: usize = 6;
 const EVALUATIONS: usize = 80;
 
+/// A solver's name, and how it is built.
+type Named = (&'static str, fn() -> Box<dyn Solver>);
+
 /// Two bowls whose larger value counts.
 struct Slow(Shape);
 
@@ -62,12 +65,12 @@ fn take(problem: &Slow, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
 fn main() {
     let shape = Shape { spacing: vec![0.0; TUNERS], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
     let problem = Slow(shape);
-    let build: [(&str, fn() -> Box<dyn Solver>); 3] = [
+    let solvers: [Named; 3] = [
         ("genetic", || GeneticOptions::default().build()),
         ("pattern-search", || PatternSearchOptions::default().build()),
         ("sqp, slopes by differences", || SqpOptions::default().build()),
     ];
-    for (name, build) in build {
+    for (name, build) in solvers {
         let [(one, best), (two, same)] = [1, 2].map(|threads| take(&problem, build().as_mut(), threads));
         assert_eq!(best.to_bits(), same.to_bits(), "{name}: threads change no bit");
         println!("{name:28} 1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {:.2}", one / two);
