@@ -481,6 +481,19 @@ fn a_term_at_a_port_acts_before_the_mass_matrix_at_the_input_and_at_the_output()
 }
 
 #[test]
+fn an_output_of_time_is_exact_beside_a_state_that_rests() {
+    let model = model(
+        "states = { x = '1' }\nder = { x = '0' }\noutputs = { y = 'sin(20*time)', z = '1/(1 + 25*(time - 4)^2)' }",
+    );
+    let response = respond(&model, &[], &[("x0", 1.0)], 10.0);
+    for i in 0..=1000 {
+        let t = 0.01 * f64::from(i);
+        let (y, z) = ((20.0 * t).sin(), 1.0 / (1.0 + 25.0 * (t - 4.0).powi(2)));
+        assert!((at(&response, "y", t) - y).abs() < 1e-8 && (at(&response, "z", t) - z).abs() < 1e-8, "{t}");
+    }
+}
+
+#[test]
 fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
     let text = "
         states = { x = 'm', v = 'm/s' }
