@@ -2,6 +2,7 @@
 //!
 //! This crate knows no concrete criterion, model or solver; they come in through a [`Catalogue`].
 
+pub mod band_limited;
 mod case;
 mod catalogue;
 mod conclude;
