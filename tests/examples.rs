@@ -16,6 +16,25 @@ fn a_study_in_rust_finds_the_best_compromise() {
     assert!(outcome.worst_scaled <= best * 1.001, "{} {best}", outcome.worst_scaled);
 }
 
+#[path = "../examples/own_solver.rs"]
+mod own_solver;
+
+#[test]
+fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_threads() {
+    let kinds = own_solver::catalogue().solvers;
+    let kind = kinds.iter().find(|kind| kind.name == "shrinking-box").expect("it is in the catalogue");
+    let solved = |jobs| {
+        let options = mops::Options { solver: kind.default_choice(), jobs: Some(jobs), ..mops::Options::default() };
+        mops::solve(own_study::study().unwrap(), &options, &()).unwrap().outcome
+    };
+    let by_default = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap().outcome;
+    let (one, four) = (solved(1), solved(4));
+    assert!(one.worst_scaled <= 1.0001 * by_default.worst_scaled, "{} {}", one.worst_scaled, by_default.worst_scaled);
+    assert_eq!((one.worst_scaled.to_bits(), one.evaluations), (four.worst_scaled.to_bits(), four.evaluations));
+    let each = mops::Shape { objective: mops::Objective::Each, ..mops::Shape::default() };
+    assert!(kind.default_choice().make().accepts(&each).is_err_and(|why| why.contains("nsga2")));
+}
+
 #[path = "../examples/repaired.rs"]
 mod repaired;
 
