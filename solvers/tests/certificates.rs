@@ -88,6 +88,29 @@ fn a_point_of_the_kink_that_both_rows_can_leave_behind_is_not_certified() {
     }
 }
 
+/// A steep kink of the first row alone, oblique and strongly bent: steps along it leave it, or see the mean of both sides.
+fn steep(x: &[f64]) -> [f64; 2] {
+    let off = x[1] - 0.5 - BENT * (x[0] - 0.5).powi(2) - (x[2] - 0.4);
+    let distance = |x1: f64| (x[0] - x1).powi(2) + (x[2] - 0.4).powi(2);
+    [distance(0.3) + (20.0 * off).max(-60.0 * off), distance(0.7)]
+}
+
+const BENT: f64 = 5.0;
+
+fn on_the_steep_sheet(x1: f64) -> [f64; 3] {
+    [x1, 0.5 + BENT * (x1 - 0.5).powi(2), 0.4]
+}
+
+#[test]
+fn a_steep_kink_is_seen_from_both_sides() {
+    for x1 in [0.32, 0.35, 0.4, 0.45, 0.55, 0.6, 0.65, 0.68] {
+        assert_eq!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+    for x1 in [0.2, 0.25, 0.75, 0.8] {
+        assert_ne!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+}
+
 #[test]
 fn a_jump_nearby_certifies_nothing() {
     // Up to the jump both rows fall along the second coordinate.
