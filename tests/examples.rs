@@ -16,6 +16,26 @@ fn a_study_in_rust_finds_the_best_compromise() {
     assert!(outcome.worst_scaled <= best * 1.001, "{} {best}", outcome.worst_scaled);
 }
 
+#[test]
+fn the_slopes_at_the_optimum_are_those_of_the_criteria() {
+    let solved = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap();
+    let found = solved.outcome.found.slopes.as_ref().expect("a design tells them");
+    assert_eq!(found.tuners, ["k", "d"]);
+    let keys: Vec<&str> = found.criteria.iter().map(|criterion| criterion.key.as_str()).collect();
+    let row = keys.iter().position(|key| key.ends_with("/shaking")).expect("it counts");
+    // The smooth one of the two, by differences of simulations.
+    let at = solved.problem.point_of(&solved.best.tuners);
+    let shaking = |j: usize, step: f64| {
+        let mut point = at.clone();
+        point[j] += step;
+        solved.problem.evaluate(&point).scaled.expect("it can be simulated")[row]
+    };
+    for (j, slope) in found.criteria[row].slopes.iter().enumerate() {
+        let difference = (shaking(j, 1e-4) - shaking(j, -1e-4)) / 2e-4;
+        assert!((slope - difference).abs() < 1e-4 * difference.abs().max(0.1), "{slope} {difference}");
+    }
+}
+
 #[path = "../examples/own_solver.rs"]
 mod own_solver;
 
