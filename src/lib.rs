@@ -54,7 +54,7 @@ pub use mops_criteria as criteria;
 pub use mops_discrepancy as discrepancy;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
-pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface};
+pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
 pub use solve::{Keeping, Options, Solved, Unsuitable, solve};
 
 /// Everything that comes with mops: models, criteria, solvers and studies.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use mops_core::{
     Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Problem, Record, Run,
-    SolverChoice, Stop, Store, Study, Watch, conclude,
+    SlopesReport, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -131,6 +131,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let pareto = pareto(&run, stop, store);
     let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
+    outcome.found.slopes = slopes(&run, stop, store);
     outcome.seconds = begun.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
@@ -157,6 +158,20 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
     let archive = run.archive().to_vec();
     drop(run);
     Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None }
+}
+
+/// The distance within which the slopes at the reported point describe the problem, in the unit box; that of the certificate,
+/// so that they are known from it.
+const NEAR: f64 = 1e-4;
+
+/// How the criteria of a design change with its tuners at the best point; nothing where the user does not want to wait.
+fn slopes(run: &Run<'_>, stop: Stop, store: Option<&dyn Store>) -> Option<SlopesReport> {
+    let problem = run.problem();
+    if problem.study().task != Task::Design || stop == Stop::Interrupted {
+        return None;
+    }
+    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &()).keeping(store);
+    SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.

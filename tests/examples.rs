@@ -16,6 +16,45 @@ fn a_study_in_rust_finds_the_best_compromise() {
     assert!(outcome.worst_scaled <= best * 1.001, "{} {best}", outcome.worst_scaled);
 }
 
+#[test]
+fn the_slopes_at_the_optimum_are_those_of_the_criteria() {
+    let solved = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap();
+    let found = solved.outcome.found.slopes.as_ref().expect("a design tells them");
+    assert_eq!(found.tuners, ["k", "d"]);
+    let keys: Vec<&str> = found.criteria.iter().map(|criterion| criterion.key.as_str()).collect();
+    let row = keys.iter().position(|key| key.ends_with("/shaking")).expect("it counts");
+    // The smooth one of the two, by differences of simulations.
+    let at = solved.problem.point_of(&solved.best.tuners);
+    let shaking = |j: usize, step: f64| {
+        let mut point = at.clone();
+        point[j] += step;
+        solved.problem.evaluate(&point).scaled.expect("it can be simulated")[row]
+    };
+    for (j, slope) in found.criteria[row].slopes.iter().enumerate() {
+        let difference = (shaking(j, 1e-4) - shaking(j, -1e-4)) / 2e-4;
+        assert!((slope - difference).abs() < 1e-4 * difference.abs().max(0.1), "{slope} {difference}");
+    }
+}
+
+#[path = "../examples/own_solver.rs"]
+mod own_solver;
+
+#[test]
+fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_threads() {
+    let kinds = own_solver::catalogue().solvers;
+    let kind = kinds.iter().find(|kind| kind.name == "shrinking-box").expect("it is in the catalogue");
+    let solved = |jobs| {
+        let options = mops::Options { solver: kind.default_choice(), jobs: Some(jobs), ..mops::Options::default() };
+        mops::solve(own_study::study().unwrap(), &options, &()).unwrap().outcome
+    };
+    let by_default = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap().outcome;
+    let (one, four) = (solved(1), solved(4));
+    assert!(one.worst_scaled <= 1.0001 * by_default.worst_scaled, "{} {}", one.worst_scaled, by_default.worst_scaled);
+    assert_eq!((one.worst_scaled.to_bits(), one.evaluations), (four.worst_scaled.to_bits(), four.evaluations));
+    let each = mops::Shape { objective: mops::Objective::Each, ..mops::Shape::default() };
+    assert!(kind.default_choice().make().accepts(&each).is_err_and(|why| why.contains("nsga2")));
+}
+
 #[path = "../examples/repaired.rs"]
 mod repaired;
 

@@ -1,5 +1,7 @@
 //! The live page of a run: what a browser sees, what everybody else does, and that nobody holds up the run.
 
+#[path = "common/devtools.rs"]
+mod devtools;
 #[path = "common/headless.rs"]
 mod headless;
 
@@ -142,31 +144,59 @@ fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
     let mut run = watched(&crowded, &search);
     let head = format!("GET /{}/events HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", run.token, run.port);
     let mut viewers: Vec<TcpStream> = Vec::new();
+    let elsewhere = head.replacen(&run.token, "nowhere", 1);
+    let rebound = head.replacen("Host: 127.0.0.1", "Host: rebound.example", 1);
     for i in 0..60 {
-        // Some say nothing, some half of it, some never read; a run that is over takes no more.
+        // Some say nothing, some half of it, some never read, some leave at once, some ask for what is not theirs; a run that
+        // is over takes no more.
         let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
-        let _ = viewer.write_all(&head.as_bytes()[..[0, head.len() / 2, head.len()][i % 3]]);
-        viewers.push(viewer);
+        let said = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
+        let _ = viewer.write_all(said.as_bytes());
+        if i % 6 != 3 {
+            viewers.push(viewer);
+        }
     }
     assert!(run.process.wait().unwrap().success());
     assert_eq!(result(&crowded), result(&alone));
 }
 
 #[test]
-fn a_browser_shows_criteria_convergence_and_tuners_while_the_run_goes() {
+fn a_browser_sees_values_move_while_the_run_goes_and_that_it_is_over() {
     let Some(browser) = headless::browser() else {
         eprintln!("{}", headless::SKIPPED);
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let run = watched(&folder.path().join("out"), &LONG);
+    let out = folder.path().join("out");
+    let mut run = watched(&out, &LONG);
     run.first_state();
-    let page = format!("http://127.0.0.1:{}/{}/", run.port, run.token);
-    let output = headless::dump(&browser, folder.path(), &page, &["--timeout=4000"]);
-    let page = String::from_utf8_lossy(&output.stdout);
-    assert!(page.contains("<h1 id=\"study\">pid-design</h1>"), "{page}");
-    assert!(page.contains("of 100000</dd>") && page.contains("Best objective"), "{page}");
-    for text in [">overshoot</th>", ">settling</th>", ">Td</th>", "class=\"result\"", "<circle"] {
-        assert!(page.contains(text), "{text}: {page}");
+    let address = format!("http://127.0.0.1:{}/{}/", run.port, run.token);
+    let mut page = devtools::Page::open(&browser, folder.path(), &address);
+    let seen = page.once(
+        "(() => { const shown = document.body?.dataset.shown; window.all ??= []; \
+         if (shown && window.all.at(-1)?.[0] !== Number(shown)) window.all.push([Number(shown), document.querySelector('#share').value]); \
+         return window.all.length >= 3 && document.querySelector('#tuners td') ? window.all : null; })()",
+    );
+    let seen: Vec<[f64; 2]> = serde_json::from_value(seen).unwrap();
+    assert!(seen.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]), "{seen:?}");
+    let told = page.evaluate(
+        "({ study: document.querySelector('h1').textContent, page: document.body.textContent, \
+            curve: document.querySelectorAll('#curve path.result, #curve path.measured').length, \
+            dot: document.querySelectorAll('#curve circle').length })",
+    );
+    assert_eq!(told["study"], "pid-design");
+    let text = told["page"].as_str().unwrap();
+    for part in ["of 100000", "Best objective", "overshoot", "settling", "Td"] {
+        assert!(text.contains(part), "{part}: {text}");
     }
+    assert!(told["curve"].as_u64().unwrap() > 0 && told["dot"] == 1, "{told}");
+    // By keys alone: the first stop is the table of criteria, which scrolls on a narrow screen.
+    page.press("Tab");
+    assert_eq!(page.evaluate("document.activeElement.getAttribute('aria-label')"), "Criteria");
+    let pid = run.process.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let verdict = page.once("(() => { const v = document.querySelector('#verdict').textContent; return v.includes('is over') ? v : null; })()");
+    assert!(verdict.as_str().unwrap().contains(out.to_str().unwrap()), "{verdict}");
+    assert!(run.process.wait().unwrap().code().is_some_and(|code| code <= 1) && out.join("result.json").is_file());
+    assert_eq!(page.problems(), Vec::<String>::new());
 }

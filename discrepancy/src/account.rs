@@ -4,8 +4,10 @@ use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Riv
 use crate::fit::dot;
 use crate::plan::separating;
 use crate::repaired::Calibrated;
+use crate::round::Round;
 use crate::screen::Screened;
-use crate::search::{Round, Trial};
+use crate::search::Trial;
+use crate::stability::stability;
 use crate::subject::Subject;
 use crate::weigh::{Dispersion, criterion, probabilities};
 
@@ -115,12 +117,14 @@ pub fn found(
         effect: effect.name().to_owned(),
         name: format!("{tail}-{}", effect.name()),
         companion: a.candidate.companion.as_ref().map(ToString::to_string),
+        only: a.candidate.only.map(|only| last.fit.subject.measurements[only].name.clone()),
         class: effect.class().name().to_owned(),
         formula: effect.formula().to_owned(),
         strengths: after.strengths(index, &last.variant, dispersion.repeats),
         probability: own.map_or(1.0, |r| r.probability),
         bic_gain: own.map_or(f64::NAN, |r| r.bic_gain),
         indistinguishable: rivals,
+        stability: round.and_then(stability),
         place,
     }
 }

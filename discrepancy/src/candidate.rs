@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
+use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
 /// An effect at a place.
 #[derive(Clone)]
@@ -43,6 +43,15 @@ impl Candidate {
     pub fn unit(&self, strength: &Strength, unit: &Unit) -> String {
         let untold = matches!(self.port, Port::Joint { unit: None, .. } | Port::Process { unit: None, .. });
         if untold && strength.dimension.output != 0 { String::new() } else { unit.to_string() }
+    }
+
+    /// Whether it is dry friction: a joint has one at most.
+    pub fn is_dry_friction(&self) -> bool {
+        let strengths: Vec<f64> =
+            self.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect();
+        let moving =
+            At { t: 0.0, value: 0.0, q: 0.0, v: 1.0, a: 0.0, mobility: 1.0, other: 0.0, other_speed: 0.0, u: &[] };
+        self.effect.act(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
     }
 
     /// Its place as results spell it. What an equation of its own gains is a process only where it is no joint.

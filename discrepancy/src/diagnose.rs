@@ -69,7 +69,7 @@ pub fn diagnose(
     let after = search.calibrate(&last, &held).ok_or_else(lost)?;
     let Judgement { verdict, last, after, unexplained, note } = judge(&search, &base, &located, last, after);
 
-    let rounds = growth.rounds;
+    let (rounds, steps) = (growth.rounds, growth.steps);
     let ranked = ranking(&rounds, &last);
     let dispersion = Dispersion::of(&last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
@@ -87,6 +87,7 @@ pub fn diagnose(
         next_experiment: next_experiment(&rounds, &found),
         found,
         removed: search.removed(&base, &held),
+        steps,
         ranked,
         unexplained,
         before: search.errors(&before),

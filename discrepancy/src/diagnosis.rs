@@ -3,6 +3,8 @@
 use mops_core::Role;
 use serde::Serialize;
 
+use crate::stability::Stability;
+
 /// Whether the model lacks something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -56,6 +58,8 @@ pub struct Found {
     pub name: String,
     /// The second place of an effect that needs one, such as where cross-talk comes from, as `kind:name`.
     pub companion: Option<String>,
+    /// The only experiment in which it acts, of what happens once.
+    pub only: Option<String>,
     /// Its class, such as `dissipative`.
     pub class: String,
     /// Its formula, for people.
@@ -68,6 +72,8 @@ pub struct Found {
     pub bic_gain: f64,
     /// Effects within 6 of its BIC.
     pub indistinguishable: Vec<Rival>,
+    /// How its choice holds where the data change; `None` where nothing was tried beside it.
+    pub stability: Option<Stability>,
 }
 
 /// A declared term that was found to be the wrong one.
@@ -223,6 +229,19 @@ pub struct Evidence {
     pub found: Vec<(String, Curve)>,
 }
 
+/// A model that the search passed through.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Step {
+    /// What made it of the one before: `added`, `exchanged`, `begun otherwise`, `left out`, `one for two`.
+    pub did: &'static str,
+    /// Its effects, each as `effect at kind:name`.
+    pub effects: Vec<String>,
+    /// Windows that records were cut into; 1: none.
+    pub windows: usize,
+    /// Its error on calibration and selection data, in units of the noise.
+    pub normalised: f64,
+}
+
 /// A diagnosis.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
@@ -236,6 +255,8 @@ pub struct Diagnosis {
     pub found: Vec<Found>,
     /// Declared terms found to be wrong.
     pub removed: Vec<Removed>,
+    /// The way of the search.
+    pub steps: Vec<Step>,
     /// Effects that were tried, best first.
     pub ranked: Vec<Ranked>,
     /// What no effect explains.

@@ -8,6 +8,7 @@ use mops_core::{Case, Job, Model};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::least_squares::Normal;
 use crate::subject::{Local, Series, Subject};
 
 /// An unknown of all pieces.
@@ -25,7 +26,7 @@ pub struct Global {
 
 impl Global {
     /// Whether it has one value only.
-    fn is_pinned(&self) -> bool {
+    pub fn is_pinned(&self) -> bool {
         self.bounds[0] == self.bounds[1]
     }
 }
@@ -93,7 +94,7 @@ pub struct Expected {
 
 impl Expected {
     /// The independent ones at a point.
-    fn at(&self, point: &Point) -> DVector<f64> {
+    pub fn at(&self, point: &Point) -> DVector<f64> {
         let values = &point.globals[self.first..self.first + self.whitening.ncols()];
         self.whitening.as_ref() * DVector::from_column_slice(values)
     }
@@ -120,7 +121,7 @@ pub struct Fitted {
     /// The residuals of each piece.
     pub residuals: Vec<Vec<f64>>,
     /// The normal equations there, where the last iteration needed them.
-    normal: Option<Arc<Normal>>,
+    pub normal: Option<Arc<Normal>>,
 }
 
 impl Fitted {
@@ -141,22 +142,15 @@ pub struct Known {
 
 /// Which slopes are wanted.
 #[derive(Clone, Copy)]
-enum Slopes {
+pub enum Slopes {
+    /// None.
     None,
+    /// All of them.
     All,
     /// Those by what is not pinned; 0 stands for the others.
     Free,
     /// Those by the unknowns from these on: globals, then locals of the piece.
     From(usize, usize),
-}
-
-/// Normal equations at a point.
-#[derive(Debug)]
-struct Normal {
-    chi2: f64,
-    residuals: Vec<Vec<f64>>,
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
 }
 
 impl Fit<'_> {
@@ -226,7 +220,8 @@ impl Fit<'_> {
         self.look(piece, point, Slopes::None).map(|found| found.r)
     }
 
-    fn look(&self, piece: usize, point: &Point, slopes: Slopes) -> Option<Residuals> {
+    /// Residuals of a piece with the slopes that are wanted.
+    pub fn look(&self, piece: usize, point: &Point, slopes: Slopes) -> Option<Residuals> {
         let p = &self.pieces[piece];
         let parameters = self.parameters(piece, point);
         let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
@@ -268,264 +263,10 @@ impl Fit<'_> {
         self.looks(point, Slopes::All)
     }
 
-    fn looks(&self, point: &Point, slopes: Slopes) -> Option<Vec<Residuals>> {
+    /// The same of all pieces.
+    pub fn looks(&self, point: &Point, slopes: Slopes) -> Option<Vec<Residuals>> {
         (0..self.pieces.len()).into_par_iter().map(|piece| self.look(piece, point, slopes)).collect()
     }
-
-    /// Sum of the squares of the globals of which something is expected, in units of that.
-    fn unexpected(&self, point: &Point) -> f64 {
-        self.expected.iter().map(|expected| expected.at(point).norm_squared()).sum()
-    }
-
-    fn unknowns(&self) -> usize {
-        self.globals.len() + self.pieces.iter().map(|p| p.locals.len()).sum::<usize>()
-    }
-
-    /// Normal equations in the coordinates of the search.
-    fn normal(&self, point: &Point) -> Option<Normal> {
-        Some(self.equations(point, self.looks(point, Slopes::Free)?))
-    }
-
-    /// The same where the first unknowns stand as in another fit, and the others change nothing but slopes.
-    fn normal_beside(&self, point: &Point, known: &Known) -> Option<Normal> {
-        let (first, before) = (known.point.globals.len(), &known.point.locals);
-        let stays = |(now, then): (&Vec<f64>, &Vec<f64>)| now.starts_with(then);
-        let same = point.globals.starts_with(&known.point.globals)
-            && point.locals.len() == before.len()
-            && point.locals.iter().zip(before).all(stays);
-        if !same {
-            return self.normal(point);
-        }
-        let beside = |(piece, known): (usize, &Residuals)| {
-            let own = before[piece].len();
-            let found = self.look(piece, point, Slopes::From(first, own))?;
-            let (globals, locals) = found.j.split_at(self.globals.len() - first);
-            let j = [&known.j[..first], globals, &known.j[first..], locals].concat();
-            Some(Residuals { r: known.r.clone(), j })
-        };
-        let all: Option<Vec<Residuals>> = known.all.par_iter().enumerate().map(beside).collect();
-        Some(self.equations(point, all?))
-    }
-
-    fn equations(&self, point: &Point, all: Vec<Residuals>) -> Normal {
-        let (n, g) = (self.unknowns(), self.globals.len());
-        let mut matrix = DMatrix::zeros(n, n);
-        let mut gradient = DVector::zeros(n);
-        let (mut chi2, mut offset) = (0.0, g);
-        for (piece, residuals) in all.iter().enumerate() {
-            let locals = self.pieces[piece].locals.len();
-            let at: Vec<usize> = (0..g).chain(offset..offset + locals).collect();
-            let factor = |k: usize| {
-                if k < g { self.stretch(k, point.globals[k]) } else { self.pieces[piece].locals[k - g].scale }
-            };
-            chi2 += residuals.r.iter().map(|r| r * r).sum::<f64>();
-            for a in 0..at.len() {
-                let (ja, fa) = (&residuals.j[a], factor(a));
-                gradient[at[a]] += fa * dot(ja, &residuals.r);
-                for b in a..at.len() {
-                    let value = fa * factor(b) * dot(ja, &residuals.j[b]);
-                    matrix[(at[a], at[b])] += value;
-                    if a != b {
-                        matrix[(at[b], at[a])] += value;
-                    }
-                }
-            }
-            offset += locals;
-        }
-        for expected in &self.expected {
-            let at = expected.at(point);
-            let turn = DMatrix::from_fn(at.len(), expected.whitening.ncols(), |i, k| {
-                expected.whitening[(i, k)] * self.stretch(expected.first + k, point.globals[expected.first + k])
-            });
-            let (first, n) = (expected.first, turn.ncols());
-            let mut part = gradient.rows_mut(first, n);
-            part += turn.tr_mul(&at);
-            let mut part = matrix.view_mut((first, first), (n, n));
-            part += turn.tr_mul(&turn);
-        }
-        Normal { chi2, residuals: all.into_iter().map(|piece| piece.r).collect(), matrix, gradient }
-    }
-
-    /// Change of a global per unit of its coordinate.
-    fn stretch(&self, k: usize, value: f64) -> f64 {
-        if self.globals[k].log { value } else { self.globals[k].scale }
-    }
-
-    /// The point moved by a step in the coordinates of the search, within bounds.
-    fn moved(&self, point: &Point, step: &DVector<f64>) -> Point {
-        let mut moved = point.clone();
-        for (k, global) in self.globals.iter().enumerate() {
-            let value = point.globals[k];
-            let to = if global.log { value * step[k].clamp(-3.0, 3.0).exp() } else { value + step[k] * global.scale };
-            moved.globals[k] = to.clamp(global.bounds[0], global.bounds[1]);
-        }
-        let mut offset = self.globals.len();
-        for (piece, locals) in self.pieces.iter().zip(&mut moved.locals) {
-            for (local, value) in piece.locals.iter().zip(locals) {
-                *value = (*value + step[offset] * local.scale).clamp(local.bounds[0], local.bounds[1]);
-                offset += 1;
-            }
-        }
-        moved
-    }
-
-    /// Which unknowns stand at a bound towards which the sum of squares falls.
-    fn held(&self, point: &Point, gradient: &DVector<f64>) -> Vec<bool> {
-        let at = |value: f64, bounds: [f64; 2], slope: f64| {
-            (value <= bounds[0] && slope > 0.0) || (value >= bounds[1] && slope < 0.0)
-        };
-        let g = self.globals.len();
-        let global =
-            |k: usize| self.globals[k].is_pinned() || at(point.globals[k], self.globals[k].bounds, gradient[k]);
-        let mut held: Vec<bool> = (0..g).map(global).collect();
-        for (piece, locals) in self.pieces.iter().zip(&point.locals) {
-            for (local, &value) in piece.locals.iter().zip(locals) {
-                held.push(at(value, local.bounds, gradient[held.len()]));
-            }
-        }
-        held
-    }
-
-    /// Levenberg and Marquardt's method within bounds, from a point; `None` where that cannot be simulated.
-    ///
-    /// Source: J. More, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630
-    /// (1978); unknowns at a bound that the gradient presses against are left out of a step (D. Bertsekas, Projected Newton
-    /// methods, SIAM J. Control Optim. 20 (1982)).
-    pub fn solve(&self, start: Point, iterations: usize) -> Option<Fitted> {
-        let normal = Arc::new(self.normal(&start)?);
-        Some(self.descend(start, normal, iterations))
-    }
-
-    /// The same where much of the start is known.
-    pub fn solve_beside(&self, start: Point, known: &Known, iterations: usize) -> Option<Fitted> {
-        let normal = Arc::new(self.normal_beside(&start, known)?);
-        Some(self.descend(start, normal, iterations))
-    }
-
-    /// The same from where a fit of this problem ended.
-    pub fn resume(&self, from: &Fitted, iterations: usize) -> Option<Fitted> {
-        let normal = self.normal_at(from)?;
-        Some(self.descend(from.point.clone(), normal, iterations))
-    }
-
-    fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
-        fitted.normal.clone().or_else(|| self.normal(&fitted.point).map(Arc::new))
-    }
-
-    fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
-        let count = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
-        let residuals = normal.residuals.clone();
-        let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: None };
-        let mut normal = normal;
-        let mut damping = 1e-3;
-        let mut total = fitted.chi2 + self.unexpected(&fitted.point);
-        for iteration in 1..=iterations {
-            let held = self.held(&fitted.point, &normal.gradient);
-            let mut improved = None;
-            for _ in 0..8 {
-                let Some(step) = damped_step(&normal, &held, damping) else {
-                    damping *= 10.0;
-                    continue;
-                };
-                let trial = self.moved(&fitted.point, &step);
-                let residuals = self.all(&trial);
-                let chi2 = residuals.as_ref().map_or(f64::INFINITY, |all| sum_of_squares(all));
-                let sum = chi2 + self.unexpected(&trial);
-                if let Some(residuals) = residuals.filter(|_| sum < total) {
-                    improved = Some((trial, chi2, residuals));
-                    break;
-                }
-                if step.amax() < 1e-9 {
-                    break;
-                }
-                damping *= if chi2.is_finite() { 6.0 } else { 20.0 };
-            }
-            let Some((trial, chi2, residuals)) = improved else { break };
-            let now = chi2 + self.unexpected(&trial);
-            let gain = std::mem::replace(&mut total, now) - now;
-            damping = (damping * 0.15).max(1e-9);
-            if iteration == iterations || gain < 1e-3 + 1e-6 * total {
-                // Nobody may ask for the slopes here.
-                return Fitted { point: trial, chi2, residuals, ..fitted };
-            }
-            let Some(next) = self.normal(&trial) else { break };
-            (fitted.point, fitted.chi2) = (trial, next.chi2);
-            fitted.residuals.clone_from(&next.residuals);
-            normal = Arc::new(next);
-        }
-        Fitted { normal: Some(normal), ..fitted }
-    }
-
-    /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1; 0
-    /// for what stands at a bound, and where the slopes cannot be had.
-    pub fn covariance(&self, fitted: &Fitted) -> DMatrix<f64> {
-        let g = self.globals.len();
-        let mut covariance = DMatrix::zeros(g, g);
-        let Some(normal) = self.normal_at(fitted) else { return covariance };
-        let held = self.held(&fitted.point, &normal.gradient);
-        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let mut matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
-        let stretch = |k: usize| self.stretch(k, fitted.point.globals[k]);
-        // What the data do not tell is still known to lie between the bounds: uniform there.
-        for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
-            let [low, high] = self.globals[k].bounds;
-            if (high - low).is_finite() {
-                matrix[(i, i)] += 12.0 * (stretch(k) / (high - low)).powi(2);
-            }
-        }
-        let inverse = pseudo_inverse(&matrix);
-        for (i, &a) in free.iter().enumerate().filter(|(_, a)| **a < g) {
-            for (j, &b) in free.iter().enumerate().filter(|(_, b)| **b < g) {
-                covariance[(a, b)] = inverse[(i, j)] * stretch(a) * stretch(b);
-            }
-        }
-        covariance
-    }
-}
-
-/// `-(M + damping diag M)^-1 g` over the unknowns that are not held.
-fn damped_step(normal: &Normal, held: &[bool], damping: f64) -> Option<DVector<f64>> {
-    let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k] && normal.matrix[(k, k)] > 0.0).collect();
-    let mut step = DVector::zeros(held.len());
-    if free.is_empty() {
-        return Some(step);
-    }
-    let scale: Vec<f64> = free.iter().map(|&k| normal.matrix[(k, k)].sqrt()).collect();
-    let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-        let value = normal.matrix[(free[i], free[j])] / (scale[i] * scale[j]);
-        if i == j { value + damping } else { value }
-    });
-    let right = DVector::from_fn(free.len(), |i, _| -normal.gradient[free[i]] / scale[i]);
-    let solved = matrix.cholesky()?.solve(&right);
-    for (i, &k) in free.iter().enumerate() {
-        step[k] = solved[i] / scale[i];
-    }
-    Some(step)
-}
-
-/// Inverse of a symmetric matrix without the directions whose eigenvalue, scaled to a unit diagonal, is below 1e-12.
-pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = matrix.nrows();
-    if n == 0 {
-        return DMatrix::zeros(0, 0);
-    }
-    let scale: Vec<f64> = (0..n).map(|k| matrix[(k, k)].max(f64::MIN_POSITIVE).sqrt()).collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
-    let eigen = scaled.symmetric_eigen();
-    let largest = eigen.eigenvalues.amax();
-    let mut inverse = DMatrix::zeros(n, n);
-    for k in 0..n {
-        let value = eigen.eigenvalues[k];
-        if value > 1e-12 * largest {
-            let v = eigen.eigenvectors.column(k);
-            inverse += (v * v.transpose()) / value;
-        }
-    }
-    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]))
-}
-
-fn sum_of_squares(all: &[Vec<f64>]) -> f64 {
-    all.iter().map(|r| r.iter().map(|r| r * r).sum::<f64>()).sum()
 }
 
 /// Scalar product.

@@ -4,7 +4,9 @@
 use mops_core::{Mistake, Watch};
 
 use crate::diagnose::{Options, UNEXPLAINED};
-use crate::search::{Round, Search, Trial};
+use crate::diagnosis::Step;
+use crate::round::Round;
+use crate::search::{Search, Trial};
 use crate::variant::Added;
 use crate::weigh::{Dispersion, by_chance, criterion};
 
@@ -12,8 +14,11 @@ use crate::weigh::{Dispersion, by_chance, criterion};
 /// Factors, JASA 90 (1995), section 3.2: strong evidence.
 const CLEARLY: f64 = 6.0;
 
-/// Effects exchanged at most before the next is added.
-const EXCHANGES: usize = 3;
+/// How often effects are held against their rivals at most while a model grows.
+const EXCHANGES: usize = 4;
+
+/// How often a model that has grown is settled at most.
+const SETTLINGS: u32 = 3;
 
 /// A model that grew, and how.
 pub struct Growth<'a> {
@@ -21,8 +26,24 @@ pub struct Growth<'a> {
     pub last: Trial<'a>,
     /// What was tried: first for the first effect, and so on, or for each effect with the others in.
     pub rounds: Vec<Round<'a>>,
+    /// The models on the way.
+    pub steps: Vec<Step>,
     /// Probability of a residual as structured as the declared model's if nothing were missing.
     pub p_value: f64,
+}
+
+impl<'a> Growth<'a> {
+    fn begun(last: Trial<'a>) -> Self {
+        Self { last, rounds: Vec::new(), steps: Vec::new(), p_value: 1.0 }
+    }
+
+    /// Goes on to another model.
+    fn step(&mut self, did: &'static str, to: Trial<'a>) {
+        let name = |a: &Added| format!("{} at {}", a.candidate.effect.name(), a.candidate.place());
+        let effects = to.added.iter().map(name).collect();
+        self.steps.push(Step { did, effects, windows: to.windows, normalised: to.fitted.normalised() });
+        self.last = to;
+    }
 }
 
 impl<'a> Search<'a> {
@@ -32,32 +53,33 @@ impl<'a> Search<'a> {
     /// The user ended it.
     #[allow(clippy::cast_precision_loss)]
     pub fn grow(&self, declared: &Trial<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
-        let begun = |last| Growth { last, rounds: Vec::new(), p_value: 1.0 };
-        let mut growth = self.onward(begun(declared.clone()), options, watch)?;
+        let mut growth = self.onward(Growth::begun(declared.clone()), options, watch)?;
         if growth.last.added.is_empty() || options.max_effects < 2 {
             return Ok(growth);
         }
-        let explains = |whole: &Trial<'_>| whole.fitted.normalised() <= UNEXPLAINED;
-        let mut best = self.whole(&growth.last);
-        if best.as_ref().is_some_and(explains) {
+        let best = self.whole(&growth.last);
+        if best.as_ref().is_some_and(|whole| whole.fitted.normalised() <= UNEXPLAINED) {
             return Ok(growth);
         }
         // Where the best first step led nowhere, another may lead on.
-        let ways = self.other_ways(declared, &growth);
-        for (tried, way) in ways.iter().enumerate() {
-            watch.stage("other ways, as something is left", 0.75 + 0.05 * (tried + 1) as f64 / ways.len() as f64);
-            let other = self.onward(begun(self.over_or_in_windows(way)), options, watch)?.last;
-            let Some(other) = self.whole(&other) else { continue };
-            let of = Dispersion::of(&other);
-            if best.as_ref().is_none_or(|best| criterion(&other, &of) < criterion(best, &of) - CLEARLY) {
-                growth.last = other.clone();
-                if explains(&other) {
-                    break;
-                }
-                best = Some(other);
-            }
+        watch.stage("other ways, as something is left", 0.76);
+        let further: Vec<Trial<'a>> =
+            self.other_ways(declared, &growth).iter().filter_map(|way| self.further(way)).collect();
+        let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
+        let Some(way) = way else { return Ok(growth) };
+        growth.step("begun otherwise", way.clone());
+        let other = self.onward(Growth::begun(way.clone()), options, watch)?;
+        if is_clearly_better(&other.last, Some(way)) {
+            growth.steps.extend(other.steps);
+            growth.last = other.last;
         }
         Ok(growth)
+    }
+
+    /// A model with the effect that helps it most, over whole records.
+    fn further(&self, way: &Trial<'a>) -> Option<Trial<'a>> {
+        let round = self.round(&self.over_or_in_windows(way))?;
+        self.whole(round.trials.first()?)
     }
 
     /// Single effects to begin with again, best first: runners-up of the first round, and what a fit that begins where the
@@ -83,6 +105,7 @@ impl<'a> Search<'a> {
     #[allow(clippy::cast_precision_loss)]
     fn onward(&self, begun: Growth<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
         let mut growth = begun;
+        let mut exchanges = EXCHANGES;
         // The round after the present one, where it was looked at already.
         let mut ahead: Option<Round<'a>> = None;
         let most = options.max_effects;
@@ -116,11 +139,13 @@ impl<'a> Search<'a> {
                     break;
                 }
             };
-            (growth.last, ahead) = next;
+            growth.step("added", next.0);
+            ahead = next.1;
             growth.rounds.push(round);
             // What one effect stood in for may have its place once the next is in.
-            if let Some(better) = self.exchanges(&growth.last, watch) {
-                (growth.last, ahead) = (better, None);
+            while let Some(better) = self.exchange(&growth.last, &mut exchanges, watch) {
+                growth.step("exchanged", better);
+                ahead = None;
             }
         }
         Ok(growth)
@@ -140,23 +165,29 @@ impl<'a> Search<'a> {
 
     /// The same over whole records, without what is superfluous, each effect held against its rivals.
     pub fn settle(&self, growth: Growth<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
-        watch.stage("what can be left out", 0.82);
-        let Growth { last, mut rounds, p_value } = growth;
-        let mut last = self.over_whole(&last).unwrap_or(last);
-        if last.added.len() > 1 {
-            last = self.pruned(last, options.level);
+        let mut growth = growth;
+        growth.last = self.over_whole(&growth.last).unwrap_or(growth.last);
+        for settling in 0..SETTLINGS {
+            watch.stage("what can be left out", 0.8 + 0.03 * f64::from(settling));
+            if let Some(pruned) = self.pruned(&growth.last, options.level) {
+                growth.step("left out", pruned);
+            }
+            while growth.last.added.len() > 1 && growth.last.windows == 1 {
+                let Some((one, round)) = self.merged(&growth.last) else { break };
+                growth.step("one for two", one);
+                growth.rounds.insert(0, round);
+            }
+            if growth.last.added.len() < 2 || growth.last.windows > 1 {
+                break;
+            }
+            watch.stage("each effect against its rivals", 0.81 + 0.03 * f64::from(settling));
+            let exchanged;
+            (exchanged, growth.rounds) = self.exchanged(&growth.last);
+            let Some(better) = exchanged else { break };
+            // Beside another effect, what was needed may be superfluous.
+            growth.step("exchanged", better);
         }
-        while last.added.len() > 1 && last.windows == 1 {
-            let Some((one, round)) = self.merged(&last) else { break };
-            last = one;
-            rounds.insert(0, round);
-        }
-        if last.added.len() < 2 || last.windows > 1 {
-            return Growth { last, rounds, p_value };
-        }
-        watch.stage("each effect against its rivals", 0.86);
-        let (exchanged, rounds) = self.exchanged(&last);
-        Growth { last: exchanged.unwrap_or(last), rounds, p_value }
+        growth
     }
 
     /// The model with one effect in place of two at the same port that it does the work of, as an asymmetric friction does that
@@ -181,19 +212,14 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// The model after effects were exchanged, one after the other, as long as something is left; `None` where none was.
-    fn exchanges(&self, last: &Trial<'a>, watch: &dyn Watch) -> Option<Trial<'a>> {
-        let mut better: Option<Trial<'a>> = None;
-        for _ in 0..EXCHANGES {
-            let last = better.as_ref().unwrap_or(last);
-            if last.added.len() < 2 || last.windows > 1 || last.fitted.normalised() <= UNEXPLAINED {
-                break;
-            }
-            watch.stage("each effect against its rivals", 0.5);
-            let Some(next) = self.exchanged(last).0 else { break };
-            better = Some(next);
+    /// The model with one of its effects exchanged, as long as something is left and not too many were.
+    fn exchange(&self, last: &Trial<'a>, left: &mut usize, watch: &dyn Watch) -> Option<Trial<'a>> {
+        if *left == 0 || last.added.len() < 2 || last.windows > 1 || last.fitted.normalised() <= UNEXPLAINED {
+            return None;
         }
-        better
+        *left -= 1;
+        watch.stage("each effect against its rivals", 0.5);
+        self.exchanged(last).0
     }
 
     /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
@@ -201,9 +227,8 @@ impl<'a> Search<'a> {
     fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Round<'a>>) {
         let rounds: Vec<Round<'a>> = (0..last.added.len()).filter_map(|index| self.rivals(last, index)).collect();
         let of = Dispersion::of(last);
-        let better = rounds.iter().filter_map(|round| round.trials.first());
-        let better = better.min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
-        let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - CLEARLY).cloned();
+        let better = least(rounds.iter().filter_map(|round| round.trials.first()), &of);
+        let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - margin(b, last)).cloned();
         (exchanged, rounds)
     }
 
@@ -211,23 +236,57 @@ impl<'a> Search<'a> {
     fn rivals(&self, last: &Trial<'a>, index: usize) -> Option<Round<'a>> {
         let without = self.over_or_in_windows(&self.without(last, index)?);
         let mut round = self.round(&without)?;
-        round.trials.retain(|t| t.windows == last.windows);
         let own = &last.added[index];
+        let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a.clone());
+        let others: Vec<Added> = others.collect();
+        let with = |own: &Added| [others.as_slice(), std::slice::from_ref(own)].concat();
         // The effect itself stands where the whole model ended, not where a new fit from nothing may have stopped; but with
         // the others in, another shape of it may do better.
-        let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a);
-        let order: Vec<_> = others.chain([own]).cloned().collect();
-        round.trials.extend(self.from(last, &order, 10));
+        let mut trials: Vec<Trial<'a>> = self.from(last, &with(own), 10).into_iter().collect();
+        // What is simpler begins there too, whatever a linear view from afar says of it.
+        for s in round.screened.iter().filter(|s| s.added.candidate.is_simpler_than(&own.candidate)) {
+            let fitted =
+                round.trials.iter().filter_map(|t| t.added.last()).find(|a| a.candidate.is(&s.added.candidate));
+            trials.extend(self.from(last, &with(fitted.unwrap_or(&s.added)), 40));
+        }
+        for (rank, trial) in std::mem::take(&mut round.trials).into_iter().enumerate() {
+            // As does what was looked at in windows alone.
+            if trial.windows == last.windows {
+                trials.push(trial);
+            } else if rank < self.limits.finalists {
+                trials.extend(self.from(last, &trial.added, 40));
+            }
+        }
         let of = Dispersion::of(last);
-        round.trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
-        let mut seen = 0;
-        round.trials.retain(|t| {
-            let same = t.added.last().is_some_and(|a| a.candidate.is(&own.candidate));
-            seen += usize::from(same);
-            !same || seen == 1
-        });
+        trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
+        for trial in trials {
+            let is_known = |t: &Trial<'a>| match (t.added.last(), trial.added.last()) {
+                (Some(a), Some(b)) => a.candidate.is(&b.candidate),
+                _ => false,
+            };
+            if !round.trials.iter().any(is_known) {
+                round.trials.push(trial);
+            }
+        }
         Some(round)
     }
+}
+
+/// How much better a model must be to take the place of another: what is simpler need not be better clearly.
+fn margin(trial: &Trial<'_>, than: &Trial<'_>) -> f64 {
+    let is_simpler = |a: &Added| than.added.iter().any(|b| a.candidate.is_simpler_than(&b.candidate));
+    if trial.added.last().is_some_and(is_simpler) { 0.0 } else { CLEARLY }
+}
+
+/// The model of the least criterion.
+fn least<'t, 'a: 't>(trials: impl IntoIterator<Item = &'t Trial<'a>>, of: &Dispersion) -> Option<&'t Trial<'a>> {
+    trials.into_iter().min_by(|a, b| criterion(a, of).total_cmp(&criterion(b, of)))
+}
+
+/// Whether a model is better than another, as its own residuals weigh them; than none it is.
+fn is_clearly_better(trial: &Trial<'_>, than: Option<&Trial<'_>>) -> bool {
+    let of = Dispersion::of(trial);
+    than.is_none_or(|than| criterion(trial, &of) < criterion(than, &of) - CLEARLY)
 }
 
 /// Probability that effects do as well by chance, chosen among so many directions.

@@ -14,15 +14,19 @@ mod growth;
 mod held_out;
 mod hygiene;
 mod judge;
+mod least_squares;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
 mod plan;
+mod reduced;
 mod removed;
 mod repaired;
+mod round;
 mod screen;
 mod search;
 mod short_term;
+mod stability;
 mod stopgap;
 mod subject;
 #[cfg(test)]
@@ -40,5 +44,6 @@ pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
-    StrengthValue, Unexplained, Verdict, WindowErrors,
+    Step, StrengthValue, Unexplained, Verdict, WindowErrors,
 };
+pub use stability::{HangsOn, Stability};

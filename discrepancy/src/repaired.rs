@@ -6,9 +6,10 @@ use nalgebra::DMatrix;
 use crate::base;
 use crate::diagnosis::{ExperimentError, StrengthValue};
 use crate::fit::{Fit, Point};
-use crate::search::{Search, Trial};
+use crate::search::{ASTRAY, Search, Trial};
 use crate::subject::Measurement;
 use crate::variant::{Added, Variant, problem};
+use crate::windows::whole;
 
 /// A model that was fitted to calibration data alone, and its predictions everywhere.
 pub struct Calibrated {
@@ -66,34 +67,36 @@ impl Search<'_> {
             free.extend((0..strengths.len()).filter(shared).map(|k| (index, k)));
         }
         let tuners = fitted.point.globals[..subject.globals.len()].to_vec();
+        #[allow(clippy::cast_precision_loss)]
+        let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
+        let enough = ASTRAY * square.sqrt();
         let mut experiments = Vec::new();
         for (index, measurement) in subject.measurements.iter().enumerate() {
             let known = fit.pieces.iter().position(|p| p.measurement == index);
             experiments.push(match known {
                 Some(piece) => prognosis(&fit, &fitted.point, piece, measurement)?,
-                None => self.forecast(&added, &tuners, index, of_trial(index, measurement.locals.len()))?,
+                None => self.forecast(&added, &tuners, index, of_trial(index, measurement.locals.len()), enough)?,
             });
         }
-        #[allow(clippy::cast_precision_loss)]
-        let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
         let covariance = fit.covariance(&fitted);
         Some(Calibrated { added, tuners, covariance, chi2: fitted.chi2, square, free, experiments })
     }
 
-    /// Start values of an experiment with everything else held, and what the model then says.
-    fn forecast(&self, added: &[Added], tuners: &[f64], index: usize, from: Option<Vec<f64>>) -> Option<Prognosis> {
+    /// Start values of an experiment with everything else held, and what the model then says; `enough` is what it may leave.
+    fn forecast(
+        &self,
+        added: &[Added],
+        tuners: &[f64],
+        index: usize,
+        from: Option<Vec<f64>>,
+        enough: f64,
+    ) -> Option<Prognosis> {
         let measurement = &self.subject.measurements[index];
-        let mut best: Option<(f64, Prognosis)> = None;
-        let pieces = || base::pieces(self.subject, |_| true).into_iter().filter(|p| p.measurement == index).collect();
+        let piece = whole(index, measurement);
         let first: Vec<f64> = measurement.locals.iter().map(|l| l.start).collect();
-        for start in [from, Some(first)].into_iter().flatten() {
-            let solved = self.starts(added, tuners, pieces(), vec![start], 60);
-            let Some((fit, fitted)) = solved else { continue };
-            if best.as_ref().is_none_or(|(chi2, _)| fitted.chi2 < *chi2) {
-                best = Some((fitted.chi2, prognosis(&fit, &fitted.point, 0, measurement)?));
-            }
-        }
-        best.map(|(_, prognosis)| prognosis)
+        let beginnings = from.into_iter().chain([first]).collect();
+        let (fit, fitted) = self.begun(added, tuners, &piece, beginnings, enough)?;
+        prognosis(&fit, &fitted.point, 0, measurement)
     }
 }
 

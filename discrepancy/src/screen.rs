@@ -30,11 +30,17 @@ pub struct Scene {
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
 const NOTICED: f64 = 21.0;
 
+/// Other values of shapes that no fit moves are fitted too: so many, of which the gain is at least this share of the best.
+const OTHERS: usize = 2;
+const NEAR: f64 = 0.3;
+
 /// A screened candidate.
 #[derive(Clone)]
 pub struct Screened {
     /// The candidate with the best strengths tried.
     pub added: Added,
+    /// The same with other values of shapes that no fit moves, where these do not do much worse.
+    pub others: Vec<Added>,
     /// By how much the sum of squares falls, to first order.
     pub gain: f64,
     /// Share of its trace that the unknowns absorb.
@@ -230,7 +236,8 @@ fn best_of(
     let effect = candidate.effect.as_ref();
     let own: Vec<usize> =
         (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
-    let mut best: Option<Screened> = None;
+    let fixed: Vec<usize> = (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].fixed).collect();
+    let mut found: Vec<Screened> = Vec::new();
     let mut by_chance = vec![0.0_f64; draws.len()];
     let combinations = sizes.combinations(effect);
     let resolved = effect.strengths().iter().filter(|s| s.trials == Trials::Frequencies);
@@ -261,7 +268,10 @@ fn best_of(
             *best = best.max(gain);
         }
         let (along, factor, gain) = left.against(&scene.residuals, first, group[0][0]);
-        if best.as_ref().is_some_and(|best| best.gain >= gain) {
+        // The best of each shape that no fit moves.
+        let same = |s: &Screened| fixed.iter().all(|&k| s.added.strengths[k] == group[0][k]);
+        let before = found.iter().position(same);
+        if before.is_some_and(|k| found[k].gain >= gain) {
             continue;
         }
         let mut strengths = group[0].clone();
@@ -274,8 +284,16 @@ fn best_of(
         };
         let own_strengths = fit.pieces.iter().zip(&chosen).flat_map(of_piece).collect();
         let length = left.rest.sqrt();
-        best = Some(Screened {
-            added: Added { candidate: candidate.clone(), strengths, own: own_strengths, sizes: *sizes, expected: None },
+        let now = Screened {
+            others: Vec::new(),
+            added: Added {
+                candidate: candidate.clone(),
+                strengths,
+                own: own_strengths,
+                starts: Vec::new(),
+                sizes: *sizes,
+                expected: None,
+            },
             gain,
             absorbed: 1.0 - left.rest / left.size,
             pull: along / length,
@@ -283,8 +301,18 @@ fn best_of(
             noticed,
             direction: left.trace.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),
-        });
+        };
+        match before {
+            Some(k) => found[k] = now,
+            None => found.push(now),
+        }
     }
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut found = found.into_iter();
+    let best = found.next().map(|best| {
+        let near = found.filter(|other| other.gain > NEAR * best.gain).take(OTHERS);
+        Screened { others: near.map(|other| other.added).collect(), ..best }
+    });
     Some((best, by_chance))
 }
 

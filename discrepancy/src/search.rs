@@ -3,21 +3,25 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Effect, Role, Trials, stream};
+use mops_core::{Effect, Role, stream};
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Known, Piece, dot};
-use crate::screen::{Scene, Screened, screen};
-use crate::subject::Subject;
+use crate::fit::{Fit, Fitted, Piece, dot};
+use crate::subject::{Local, Subject};
 use crate::variant::{Added, Variant, problem};
-use crate::weigh::{Dispersion, by_chance, criterion};
+use crate::weigh::{Dispersion, criterion};
 use crate::windows::cut;
 
 /// Residuals, in units of the noise, up to which a linear view of them is trusted.
-const NEARLY_LINEAR: f64 = 6.0;
+pub(crate) const NEARLY_LINEAR: f64 = 6.0;
+
+/// Residuals of windows, in units of the noise, up to which a model is brought to whole records by windows that grow.
+const WORTH_STRETCHING: f64 = 1.5;
+
+/// How many times larger than expected the residuals of an experiment are where its fit went astray.
+pub(crate) const ASTRAY: f64 = 2.0;
 
 /// A model that was fitted to calibration and selection data together.
 #[derive(Clone)]
@@ -55,33 +59,9 @@ pub struct Search<'a> {
     pub simulations: &'a AtomicUsize,
 }
 
-/// Candidates of one round: as screened, and the best of them as fitted.
-pub struct Round<'a> {
-    /// As screened, best first.
-    pub screened: Vec<Screened>,
-    /// As fitted, best first.
-    pub trials: Vec<Trial<'a>>,
-    /// Directions that were looked in, as many as independent ones.
-    pub directions: f64,
-    /// The same as white noise in place of the residuals shows it, where that was tried.
-    pub independent: f64,
-    /// The criterion of what the round began with.
-    pub before: f64,
-    /// Residuals and slopes of what the round began with.
-    known: Known,
-}
-
-/// Draws of white noise in place of residuals.
-const DRAWS: usize = 40;
-
-fn white(count: usize) -> Vec<Vec<f64>> {
-    let mut random = stream(0, "white");
-    (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
-}
-
 impl<'a> Search<'a> {
     /// Pieces that choose between models: calibration and selection data, each record in so many windows.
-    fn pieces(&self, windows: usize) -> Vec<Piece> {
+    pub(crate) fn pieces(&self, windows: usize) -> Vec<Piece> {
         let whole = base::pieces(self.subject, |role| role != Role::Validation);
         if windows == 1 {
             return whole;
@@ -111,10 +91,79 @@ impl<'a> Search<'a> {
 
     /// The trial over whole records; `None` where that cannot be simulated.
     pub fn over_whole(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
-        let pieces = self.pieces(1);
+        let whole = self.stretched(trial, 1);
+        let left = trial.fitted.normalised();
+        let followed = |whole: &Trial<'a>| whole.fitted.normalised() < ASTRAY * left;
+        if left > WORTH_STRETCHING || whole.as_ref().is_some_and(followed) {
+            return whole;
+        }
+        if trial.windows <= 2 {
+            return whole.map(|whole| self.begun_anew(whole, ASTRAY * left));
+        }
+        // What fits windows may lie too far from what fits whole records for one step.
+        let by_half = self.stretched(trial, trial.windows / 2).and_then(|half| self.over_whole(&half));
+        let found = whole.into_iter().chain(by_half);
+        found.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))
+    }
+
+    /// The trial over whole records with other start values in the experiments that it leaves more than `enough` of.
+    #[allow(clippy::cast_precision_loss)]
+    fn begun_anew(&self, whole: Trial<'a>, enough: f64) -> Trial<'a> {
+        let tuners = &whole.fitted.point.globals[..self.subject.globals.len()];
+        let mut locals = self.own_locals(&whole);
+        for ((piece, residuals), locals) in self.pieces(1).iter().zip(&whole.fitted.residuals).zip(&mut locals) {
+            if dot(residuals, residuals) > enough * enough * residuals.len() as f64
+                && let Some((_, found)) = self.begun(&whole.added, tuners, piece, vec![locals.clone()], enough)
+            {
+                *locals = found.point.locals[0][..piece.locals.len()].to_vec();
+            }
+        }
+        let anew = self.trial(&whole.added, tuners, locals, 1, 40);
+        anew.filter(|anew| anew.fitted.chi2 < whole.fitted.chi2).unwrap_or(whole)
+    }
+
+    /// Start values of an experiment, everything else held, from several beginnings; where all of these leave more than
+    /// `enough`, from others around the first guess, as where a sensor that saturates says nothing of the first moments.
+    pub fn begun(
+        &self,
+        added: &[Added],
+        tuners: &[f64],
+        piece: &Piece,
+        beginnings: Vec<Vec<f64>>,
+        enough: f64,
+    ) -> Option<(Fit<'a>, Fitted)> {
+        const DRAWN: usize = 12;
+        /// Standard deviation of those, in scales of the start values.
+        const SPREAD: f64 = 3.0;
+        let mut random = stream(0, "beginnings");
+        let mut draw = |local: &Local| {
+            let z: f64 = StandardNormal.sample(&mut random);
+            (local.start + SPREAD * local.scale * z).clamp(local.bounds[0], local.bounds[1])
+        };
+        let given = beginnings.len();
+        let drawn = (0..DRAWN).map(|_| piece.locals.iter().map(&mut draw).collect());
+        let mut best: Option<(Fit<'a>, Fitted)> = None;
+        for (tried, start) in beginnings.into_iter().chain(drawn).enumerate() {
+            if tried >= given && best.as_ref().is_some_and(|(_, best)| best.normalised() <= enough) {
+                break;
+            }
+            let Some(found) = self.starts(added, tuners, vec![piece.clone()], vec![start], 60) else { continue };
+            if best.as_ref().is_none_or(|(_, best)| found.1.chi2 < best.chi2) {
+                best = Some(found);
+            }
+        }
+        best
+    }
+
+    /// The trial with fewer windows, each begun where one of those that it holds began.
+    fn stretched(&self, trial: &Trial<'a>, windows: usize) -> Option<Trial<'a>> {
+        let pieces = self.pieces(windows);
         let mut locals = base::first_locals(&pieces);
         for (piece, locals) in pieces.iter().zip(&mut locals) {
-            let first = trial.fit.pieces.iter().position(|p| p.measurement == piece.measurement)?;
+            let begins_with = |p: &Piece| {
+                p.measurement == piece.measurement && (p.case.begins - piece.case.begins).abs() < 1e-6 * p.horizon
+            };
+            let first = trial.fit.pieces.iter().position(begins_with)?;
             for (local, value) in piece.locals.iter().zip(locals) {
                 let window = &trial.fit.pieces[first];
                 if let Some(k) = window.locals.iter().position(|l| l.parameter == local.parameter) {
@@ -123,7 +172,7 @@ impl<'a> Search<'a> {
             }
         }
         let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
-        self.trial(&trial.added, tuners, locals, 1, 40)
+        self.trial(&trial.added, tuners, locals, windows, 40)
     }
 
     /// The same where the trial is over whole records already.
@@ -180,143 +229,8 @@ impl<'a> Search<'a> {
         Some(Trial { added: added.to_vec(), windows, fit, variant, fitted }.read())
     }
 
-    /// Screens the whole catalogue against what a trial leaves, and fits the best.
-    pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
-        let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
-        // What chance does is asked of the declared model alone.
-        let draws = if from.added.is_empty() { white(scene.residuals.len()) } else { Vec::new() };
-        let screening = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene, &draws);
-        let (independent, screened) = (screening.independent(), screening.screened);
-        let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
-        let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
-        // Of every place the best, so that no place is lost for a bad linearisation.
-        for (i, s) in screened.iter().enumerate().take(gaining) {
-            let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
-            if chosen.len() < 2 * self.limits.refits
-                && chosen.iter().filter(|k| same(k)).count() < 2
-                && !chosen.contains(&i)
-            {
-                chosen.push(i);
-            }
-        }
-        // And what is simpler of the same kind at the same place, as a shape may do no more than take up noise.
-        for (i, s) in screened.iter().enumerate().take(gaining) {
-            let simpler = |k: &usize| s.added.candidate.is_simpler_than(&screened[*k].added.candidate);
-            if !chosen.contains(&i) && chosen.iter().any(simpler) {
-                chosen.push(i);
-            }
-        }
-        let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
-        let started: Vec<Trial<'a>> = chosen
-            .into_par_iter()
-            .filter_map(|i| self.beside(from, &known, &[self.neutral_start(&screened[i].added)], 5))
-            .collect();
-        let mut trials = self.race(started);
-        if from.windows > 1 {
-            // Windows forgive what whole records do not: these decide, where they can be fitted.
-            let wholes: Vec<Trial<'a>> = trials[..trials.len().min(self.limits.finalists)]
-                .par_iter()
-                .filter_map(|t| self.over_whole(t))
-                .collect();
-            if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
-                trials = wholes;
-                trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-            }
-        }
-        let directions = screened.iter().map(|s| s.directions).sum();
-        let independent = independent.unwrap_or(directions);
-        Some(Round { screened, trials, directions, independent, before: from.score(), known })
-    }
-
-    /// The best candidates of a round, fitted from where the study begins: the fit of the model without them may have ended
-    /// where no effect can help it.
-    pub fn afresh(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
-        const MOST: usize = 24;
-        let tuners = self.subject.start();
-        let locals = base::first_locals(&self.pieces(from.windows));
-        let chosen = &round.screened[..round.screened.len().min(MOST)];
-        let fit = |s: &Screened| self.trial(std::slice::from_ref(&s.added), &tuners, locals.clone(), from.windows, 8);
-        self.race(chosen.par_iter().filter_map(fit).collect())
-    }
-
-    /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when
-    /// another effect is in. Chosen by the normal equations of two traces, then fitted.
-    pub fn pairs(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
-        const FEW: usize = 60;
-        let few = &round.screened[..round.screened.len().min(FEW)];
-        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        for i in 0..few.len() {
-            for j in i + 1..few.len() {
-                let (a, b) = (&few[i], &few[j]);
-                let dry = dry(&a.added.candidate) && dry(&b.added.candidate);
-                if a.added.candidate.port == b.added.candidate.port && dry {
-                    continue;
-                }
-                let likeness = dot(&a.direction, &b.direction);
-                let rest = 1.0 - likeness * likeness;
-                if rest < 1e-3 {
-                    continue;
-                }
-                let (p, q) = (a.pull, b.pull);
-                let (x, y) = ((p - likeness * q) / rest, (q - likeness * p) / rest);
-                if (a.one_sided && x <= 0.0) || (b.one_sided && y <= 0.0) {
-                    continue;
-                }
-                pairs.push((x * p + y * q, i, j));
-            }
-        }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut chosen: Vec<(usize, usize)> = pairs.iter().take(self.limits.refits).map(|&(_, i, j)| (i, j)).collect();
-        // One and the same effect in two places: joints of a kind have bearings of a kind.
-        let twins = pairs.iter().filter(|&&(_, i, j)| {
-            let (a, b) = (&few[i].added.candidate, &few[j].added.candidate);
-            a.effect.name() == b.effect.name() && a.effect.rarity() == 0
-        });
-        for &(_, i, j) in twins.take(4) {
-            if !chosen.contains(&(i, j)) {
-                chosen.push((i, j));
-            }
-        }
-        let started: Vec<Trial<'a>> = chosen
-            .into_par_iter()
-            .filter_map(|(i, j)| {
-                self.beside(from, &round.known, &[&few[i], &few[j]].map(|s| self.neutral_start(&s.added)), 6)
-            })
-            .collect();
-        self.race(started)
-    }
-
-    /// Those that lead after a few steps go on, and the best of them to the end; best first.
-    fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
-        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
-            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-            let rest = trials.split_off(trials.len().min(count));
-            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
-            trials.extend(rest);
-        }
-        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        trials
-    }
-
-    /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
-    fn neutral_start(&self, added: &Added) -> Added {
-        let mut added = added.clone();
-        let first = &added.candidate.effect.strengths()[0];
-        if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
-            added.strengths[0] = neutral;
-        }
-        added
-    }
-
-    /// The trial without one of its effects, fitted again.
-    pub fn without(&self, trial: &Trial<'a>, index: usize) -> Option<Trial<'a>> {
-        let mut added = trial.added.clone();
-        added.remove(index);
-        self.from(trial, &added, 40)
-    }
-
     /// Start values of the pieces of a trial, those of effects left out.
-    fn own_locals(&self, trial: &Trial<'a>) -> Vec<Vec<f64>> {
+    pub(crate) fn own_locals(&self, trial: &Trial<'a>) -> Vec<Vec<f64>> {
         let own = self.pieces(trial.windows);
         let locals = own.iter().zip(&trial.fitted.point.locals);
         locals.map(|(piece, values)| values[..piece.locals.len()].to_vec()).collect()
@@ -326,21 +240,6 @@ impl<'a> Search<'a> {
     pub fn from(&self, from: &Trial<'a>, added: &[Added], iterations: usize) -> Option<Trial<'a>> {
         let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
         self.trial(added, tuners, self.own_locals(from), from.windows, iterations)
-    }
-
-    /// The trial with effects that are at first neutral, where that is so: nothing is simulated twice.
-    fn beside(&self, from: &Trial<'a>, known: &Known, more: &[Added], iterations: usize) -> Option<Trial<'a>> {
-        let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
-        let added = [from.added.as_slice(), more].concat();
-        let (pieces, locals) = (self.pieces(from.windows), self.own_locals(from));
-        let (fit, point, variant) = problem(self.subject, &added, pieces, tuners, locals, &[], self.simulations);
-        let neutral = |a: &Added| a.candidate.effect.strengths()[0].neutral == Some(a.strengths[0]);
-        let fitted = if more.iter().all(neutral) {
-            fit.solve_beside(point, known, iterations)?
-        } else {
-            fit.solve(point, iterations)?
-        };
-        Some(Trial { added, windows: from.windows, fit, variant, fitted }.read())
     }
 
     /// The trial in the form in which the search goes on: over whole records where their residuals are small enough for a
@@ -360,62 +259,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The trial without effects that the others make superfluous.
-    pub fn pruned(&self, mut trial: Trial<'a>, level: f64) -> Trial<'a> {
-        let mut index = 0;
-        while trial.added.len() > 1 && index < trial.added.len() {
-            let Some(without) = self.without(&trial, index) else {
-                index += 1;
-                continue;
-            };
-            let dispersion = Dispersion::of(&trial);
-            let loss = (without.fitted.chi2 - trial.fitted.chi2) / dispersion.weight();
-            if by_chance(loss, 30.0) > level {
-                trial = without;
-                index = 0;
-            } else {
-                index += 1;
-            }
-        }
-        trial
-    }
-
-    /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that
-    /// may be zero, and are no larger than their uncertainty.
-    #[allow(clippy::cast_precision_loss)]
-    pub fn without_declared(&self, trial: Trial<'a>) -> (Trial<'a>, Vec<usize>) {
-        let mut held = Vec::new();
-        let mut trial = trial;
-        if trial.added.is_empty() {
-            return (trial, held);
-        }
-        let mut covariance = trial.fit.covariance(&trial.fitted);
-        for k in 0..self.subject.globals.len() {
-            let global = &trial.fit.globals[k];
-            let value = trial.fitted.point.globals[k];
-            let error = covariance[(k, k)].max(0.0).sqrt();
-            let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
-            let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
-            if !(zero && (at_least || value.abs() < 2.0 * error)) {
-                continue;
-            }
-            let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
-            tuners[k] = global.bounds[0].max(0.0);
-            let (own, locals) = (self.pieces(trial.windows), self.own_locals(&trial));
-            let all: Vec<usize> = held.iter().copied().chain([k]).collect();
-            let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
-            let Some(fitted) = made.0.solve(made.1, 40) else { continue };
-            let weight = Dispersion::of(&trial).weight();
-            if (fitted.chi2 - trial.fitted.chi2) / weight < (fitted.count as f64).ln() {
-                held = all;
-                let (added, windows) = (trial.added.clone(), trial.windows);
-                trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
-                covariance = trial.fit.covariance(&trial.fitted);
-            }
-        }
-        (trial, held)
-    }
-
+    /// Candidates beside effects that are in.
     pub fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
         let interface = self.subject.model.interface();
         let of = &self.subject.measurements;
@@ -424,36 +268,29 @@ impl<'a> Search<'a> {
         measured.dedup();
         let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
         let taken = |c: &Candidate| {
-            added.iter().any(|a| a.candidate.is(c) || (a.candidate.port == c.port && dry(&a.candidate) && dry(c)))
+            added.iter().any(|a| {
+                a.candidate.is(c)
+                    || (a.candidate.port == c.port && a.candidate.is_dry_friction() && c.is_dry_friction())
+            })
         };
         let all = candidates(self.effects, interface, &measured, &calibration);
         all.into_iter().filter(|c| !taken(c)).collect()
     }
 }
 
-/// Whether an effect is dry friction: a joint has one at most.
-fn dry(c: &Candidate) -> bool {
-    c.effect.act(&first_values(c)).friction(&still(), &vec![0.0; c.effect.states()]).is_some()
-}
-
-/// Any strengths: to ask an effect what it is.
-fn first_values(c: &Candidate) -> Vec<f64> {
-    c.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect()
-}
-
-fn still() -> mops_core::At<'static, f64> {
-    mops_core::At { t: 0.0, value: 0.0, q: 0.0, v: 1.0, a: 0.0, mobility: 1.0, other: 0.0, other_speed: 0.0, u: &[] }
-}
-
 impl<'a> Trial<'a> {
     /// Takes the strengths from the solution.
-    fn read(mut self) -> Self {
+    pub(crate) fn read(mut self) -> Self {
         for (index, a) in self.added.iter_mut().enumerate() {
             let count = a.candidate.effect.strengths().len();
             let in_piece = |m: usize| self.fit.pieces.iter().position(|p| p.measurement == m);
             let (variant, fit, point) = (&self.variant, &self.fit, &self.fitted.point);
             let piece = a.candidate.only.and_then(in_piece).unwrap_or(0);
             a.strengths = variant.strengths(fit, point, index, count, piece);
+            let first = variant.first[index] + count;
+            let starts =
+                |piece: usize| fit.parameters(piece, point)[first..][..a.candidate.effect.free_starts()].to_vec();
+            a.starts = fit.pieces.iter().enumerate().map(|(k, piece)| (piece.measurement, starts(k))).collect();
             for own in &mut a.own {
                 if let Some(piece) = in_piece(own.0) {
                     own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
@@ -464,7 +301,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Fitted further.
-    fn continued(self, iterations: usize) -> Option<Self> {
+    pub(crate) fn continued(self, iterations: usize) -> Option<Self> {
         let fitted = self.fit.resume(&self.fitted, iterations)?;
         Some(Self { fitted, ..self }.read())
     }

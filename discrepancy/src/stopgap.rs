@@ -146,7 +146,14 @@ pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> 
         let effect = Stopgap { over: table.over, kind: [kind], points: table.points.iter().map(|p| p[0]).collect() };
         let candidate = Candidate { effect: Arc::new(effect), port: located.port.clone(), companion: None, only: None };
         let strengths = table.points.iter().map(|p| size * p[1]).collect();
-        let added = Added { candidate, strengths, own: Vec::new(), sizes, expected: table.expected.clone() };
+        let added = Added {
+            candidate,
+            strengths,
+            own: Vec::new(),
+            starts: Vec::new(),
+            sizes,
+            expected: table.expected.clone(),
+        };
         let all: Vec<Added> = from.added.iter().cloned().chain([added]).collect();
         Some((search.from(from, &all, 25)?, table.clone()))
     };

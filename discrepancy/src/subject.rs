@@ -136,8 +136,12 @@ impl Subject {
                 let ParameterSource::Tuner { tuner, factor } = *source else { continue };
                 let t = &study.tuners[tuner];
                 if t.case == Some(plan.case) && t.active && t.tie.is_none() {
-                    let bounds = t.bounds.map(|b| b * factor);
+                    let mut bounds = t.bounds.map(|b| b * factor);
                     let scale = ((bounds[1] - bounds[0]) / 20.0).abs();
+                    // A sensor that saturates or is off lets a start value lie far from what it shows.
+                    for (end, _) in t.guessed.iter().enumerate().filter(|(_, guessed)| **guessed) {
+                        bounds[end] = model.interface().parameters[parameter].range[end];
+                    }
                     locals.push(Local { parameter, bounds, start: t.start * factor, scale });
                 }
             }

@@ -42,6 +42,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         case: None,
         active: true,
         tie: None,
+        guessed: [false; 2],
     };
     let source = |(k, &value): (usize, &f64)| {
         if k < globals { ParameterSource::Tuner { tuner: k, factor: 1.0 } } else { ParameterSource::Constant(value) }
@@ -117,6 +118,7 @@ pub fn study(subject: &Subject) -> Study {
                 case: Some(index),
                 active: true,
                 tie: None,
+                guessed: [false; 2],
             });
         }
     }

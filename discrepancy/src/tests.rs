@@ -3,6 +3,7 @@
 mod absorbed;
 mod correlated;
 mod derivatives;
+mod holds;
 mod pairs;
 mod selection;
 mod sessions;

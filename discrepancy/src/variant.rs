@@ -21,6 +21,8 @@ pub struct Added {
     pub strengths: Vec<f64>,
     /// Strengths that differ from experiment to experiment: experiment, index of the strength, value.
     pub own: Vec<(usize, usize, f64)>,
+    /// Start values of its own states in each piece, with the experiment of that, as far as they are known.
+    pub starts: Vec<(usize, Vec<f64>)>,
     /// Typical sizes at its place.
     pub sizes: Sizes,
     /// Turns the strengths into independent ones of variance 1, where something is expected of them.
@@ -69,6 +71,20 @@ fn is_log(strength: &Strength, value: f64) -> bool {
     strength.neutral != Some(0.0) && strength.bounds[0] >= 0.0 && value > 0.0
 }
 
+/// What is known of the start values of an effect's states in pieces: those of the same pieces, else those of the beginnings of
+/// the experiments.
+fn known_starts<'a>(added: &'a Added, pieces: &[Piece]) -> Vec<Option<&'a Vec<f64>>> {
+    let of = |index: usize| {
+        let measurement = pieces[index].measurement;
+        if added.starts.len() == pieces.len() && added.starts[index].0 == measurement {
+            return Some(&added.starts[index].1);
+        }
+        let begins = index == 0 || pieces[index - 1].measurement != measurement;
+        added.starts.iter().find(|(m, _)| begins && *m == measurement).map(|(_, values)| values)
+    };
+    (0..pieces.len()).map(of).collect()
+}
+
 /// The problem of fitting a variant to pieces of experiments; `tuners` are the globals of the study and `locals` the start
 /// values of the pieces to begin with; those in `held` stay where they are.
 pub fn problem<'a>(
@@ -113,13 +129,15 @@ pub fn problem<'a>(
             let neutral = effect.strengths()[0].neutral.unwrap_or(0.0);
             pieces.iter_mut().filter(|p| p.measurement != only).for_each(|p| p.fixed.push((first, neutral)));
         }
-        for (piece, locals) in pieces.iter_mut().zip(&mut locals) {
+        let known = known_starts(a, &pieces);
+        for ((piece, locals), known) in pieces.iter_mut().zip(&mut locals).zip(known) {
             for state in 0..effect.free_starts() {
                 let parameter = first + effect.strengths().len() + state;
                 let scale = if state == 0 { a.sizes.position } else { a.sizes.speed };
                 let bounds = [-10.0 * scale, 10.0 * scale];
-                piece.locals.push(Local { parameter, bounds, start: 0.0, scale: 0.1 * scale });
-                locals.push(0.0);
+                let start = known.map_or(0.0, |known| known[state].clamp(bounds[0], bounds[1]));
+                piece.locals.push(Local { parameter, bounds, start, scale: 0.1 * scale });
+                locals.push(start);
             }
         }
     }

@@ -73,9 +73,10 @@ fn starts(measurement: &Measurement, model: &dyn Model, at: f64, length: f64) ->
             (None, None, Some(local)) => (local.start, local.scale),
             (None, None, None) => return None,
         };
+        // Bounds that the study gives are those of the beginning.
         let range = interface.parameters[parameter].range;
-        let value = value.clamp(range[0], range[1]);
-        Some(Local { parameter, bounds: range, start: value, scale: scale.max(1e-9) })
+        let bounds = known.filter(|_| at == 0.0).map_or(range, |local| local.bounds);
+        Some(Local { parameter, bounds, start: value.clamp(bounds[0], bounds[1]), scale: scale.max(1e-9) })
     };
     interface.states.iter().filter_map(start).collect()
 }
@@ -121,6 +122,12 @@ fn shifted(input: &Input, from: f64) -> Input {
             frequency: *frequency,
             phase: phase + std::f64::consts::TAU * frequency * from,
             offset: *offset,
+        },
+        // The signal between two samples is told by those around them, before the window too.
+        Input::Sampled { times, values, hold: Hold::BandLimited } => Input::Sampled {
+            times: times.iter().map(|t| t - from).collect(),
+            values: values.clone(),
+            hold: Hold::BandLimited,
         },
         Input::Sampled { times, values, hold } => {
             let first = times.partition_point(|&t| t <= from);

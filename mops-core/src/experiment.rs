@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::band_limited;
 use crate::unit::Unit;
 
 /// What an experiment is used for.
@@ -20,13 +21,15 @@ pub enum Role {
 
 /// How a sampled input acts between its samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Hold {
     /// The value stays until the next sample.
     #[default]
     Zero,
     /// Straight line from sample to sample.
     First,
+    /// The signal without content above half the sampling frequency that passes through the samples, which are evenly spaced.
+    BandLimited,
 }
 
 /// How an input of a model moves over time.
@@ -84,14 +87,27 @@ impl Input {
                 let after = times.partition_point(|&time| time <= t);
                 match (after, hold) {
                     (0, _) => values[0],
-                    (k, Hold::First) if k < times.len() => {
+                    (k, hold) if k < times.len() && *hold != Hold::Zero => {
                         let s = (t - times[k - 1]) / (times[k] - times[k - 1]);
-                        values[k - 1] + s * (values[k] - values[k - 1])
+                        match hold {
+                            Hold::BandLimited => band_limited::polynomial(&band_limited::piece(values, k - 1), s).0,
+                            _ => values[k - 1] + s * (values[k] - values[k - 1]),
+                        }
                     }
                     (k, _) => values[k - 1],
                 }
             }
         }
+    }
+
+    /// Where the input has to be evenly sampled, the time (s) from which a step between samples differs from the mean step by
+    /// more than 1 %.
+    pub fn uneven(&self) -> Option<f64> {
+        let Self::Sampled { times, hold: Hold::BandLimited, .. } = self else { return None };
+        #[allow(clippy::cast_precision_loss)]
+        let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
+        let differs = |pair: &&[f64]| (pair[1] - pair[0] - mean).abs() > band_limited::EVEN * mean;
+        times.windows(2).find(differs).map(|pair| pair[0])
     }
 
     /// Whether samples that are held look as if they had moved smoothly: most differ from the one before, by steps (their
@@ -191,6 +207,19 @@ mod tests {
         assert_eq!((sampled(Hold::Zero).at(0.5), sampled(Hold::First).at(0.5)), (0.0, 2.0));
         assert_eq!((sampled(Hold::Zero).at(1.0), sampled(Hold::First).at(5.0)), (4.0, 6.0));
         assert_eq!(sampled(Hold::Zero).next_break(0.0), 1.0);
+    }
+
+    #[test]
+    fn a_band_limited_input_passes_through_its_samples_and_wants_them_evenly_spaced() {
+        let sampled = |times: Vec<f64>| Input::Sampled {
+            values: times.iter().map(|t| (4.0 * t).sin()).collect(),
+            times,
+            hold: Hold::BandLimited,
+        };
+        let even = sampled((0..100).map(|i| 0.2 * f64::from(i)).collect());
+        assert!((even.at(10.0) - 40.0_f64.sin()).abs() < 1e-12 && (even.at(10.1) - 40.4_f64.sin()).abs() < 1e-4);
+        assert_eq!((even.at(-1.0), even.at(99.0)), (0.0, (4.0_f64 * 0.2 * 99.0).sin()));
+        assert_eq!((even.uneven(), sampled(vec![0.0, 0.2, 0.5, 0.6]).uneven()), (None, Some(0.2)));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! This crate knows no concrete criterion, model or solver; they come in through a [`Catalogue`].
 
+pub mod band_limited;
 mod case;
 mod catalogue;
 mod conclude;
@@ -30,6 +31,7 @@ mod random;
 mod robustness;
 mod run;
 mod scalar;
+mod slopes;
 mod solver;
 pub mod statistics;
 mod study;
@@ -79,6 +81,7 @@ pub use robustness::{
 };
 pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch};
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
+pub use slopes::{CriterionSlopes, SlopesReport};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
     Axis, AxisDraft, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DiagnosisTask, Distribution, DistributionDraft,

@@ -8,6 +8,7 @@ use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
 use crate::problem::{Evaluation, FEASIBLE};
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
+use crate::slopes::SlopesReport;
 use crate::solver::Stop;
 use crate::study::{Study, Task};
 use crate::trade_offs::TradeOffs;
@@ -90,6 +91,9 @@ pub struct Findings {
     /// What the data or the criteria tell of the tuners.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<SensitivityReport>,
+    /// Of a design: how the criteria change with the tuners at the reported point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slopes: Option<SlopesReport>,
     /// The objective over one tuner or two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,

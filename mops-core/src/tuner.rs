@@ -51,6 +51,8 @@ pub struct Tuner {
     pub active: bool,
     /// Where it follows from other tuners: the expression, and the indices of the tuners it names.
     pub tie: Option<(Expression, Vec<usize>)>,
+    /// Whether the smallest and the largest value were read off data, as those of start values: guesses, not limits.
+    pub guessed: [bool; 2],
 }
 
 impl Tuner {
@@ -139,6 +141,7 @@ mod tests {
             case: None,
             active: true,
             tie: None,
+            guessed: [false; 2],
         }
     }
 

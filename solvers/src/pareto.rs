@@ -19,13 +19,26 @@ const AHEAD: f64 = 1e-3;
 /// Number of times that pieces beyond a kink are added.
 const MOST_PIECES: usize = 12;
 
+/// So many of them, and slopes are taken all around the point.
+const FEW_PIECES: usize = 2;
+
+/// How far around the point that is, in the unit box.
+const AROUND: f64 = 0.5 * AHEAD;
+
+/// A piece from around the point that stands higher above it, per unit of [`AHEAD`], lies beyond a jump and says nothing of it.
+const JUMP: f64 = 0.5;
+
 /// Looks for a direction that lowers one row to be minimised and raises none, within the bounds and the active
 /// constraints. None: `certified-local`. One, that also holds a small step ahead: `no`. No slopes, or a direction that
 /// only the linear model sees: `not-shown`.
 ///
 /// A criterion may have kinks of its own (an overshoot is the largest of several peaks), and an optimum lies on them as a rule:
 /// where the problem does not keep what the slopes promise, they are taken a step ahead too, and both pieces count from then
-/// on (C. Lemarechal's cutting planes; K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization (1985)).
+/// on (C. Lemarechal's cutting planes; K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization (1985)). A step along
+/// a kink stays on it, where differences see the mean of both sides: after a few steps slopes are taken a little to either side
+/// along every coordinate as well, and `certified-local` then says that no direction improves for the slopes of all of these
+/// points (A. A. Goldstein, Mathematical Programming 13 (1977) 14-22; J. V. Burke, A. S. Lewis, M. L. Overton, SIAM Journal on
+/// Optimization 15 (2005) 751-779).
 pub fn certify(oracle: &mut dyn Oracle, point: &[f64]) -> Pareto {
     certificate(oracle, point).pareto
 }
@@ -55,7 +68,7 @@ fn shown(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>)
     }
     let here = at.at.scaled.clone().expect("a point that was linearised has values");
     let Some(mut cone) = Cone::new(&shape, &at) else { return Pareto::NotShown };
-    for _ in 0..MOST_PIECES {
+    for added in 1..=MOST_PIECES {
         let Some((step, promised, worth)) = cone.direction(point) else { return Pareto::NotShown };
         if promised <= IMPROVEMENT {
             *weights = Some(worth);
@@ -69,9 +82,28 @@ fn shown(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>)
             return Pareto::No;
         }
         let Ok(Some(beyond)) = oracle.linearise(&ahead, 0.1 * AHEAD) else { return Pareto::NotShown };
-        cone.add(&shape, point, &beyond);
+        cone.add(&shape, point, &beyond, f64::INFINITY);
+        if added == FEW_PIECES {
+            for beside in around(point) {
+                // Where nothing can be simulated nothing is known.
+                match oracle.linearise(&beside, 0.1 * AHEAD) {
+                    Ok(Some(beside)) => cone.add(&shape, point, &beside, JUMP * AHEAD),
+                    Ok(None) => {}
+                    Err(_) => return Pareto::NotShown,
+                }
+            }
+        }
     }
     Pareto::NotShown
+}
+
+/// The points a little to either side along every coordinate, as far as they lie in the box.
+fn around(point: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+    let beside = move |j: usize, step: f64| {
+        let u = point[j] + step;
+        (0.0..=1.0).contains(&u).then(|| point.iter().enumerate().map(|(k, v)| if k == j { u } else { *v }).collect())
+    };
+    (0..point.len()).flat_map(move |j| [AROUND, -AROUND].into_iter().filter_map(move |step| beside(j, step)))
 }
 
 /// Whether no row is worse, one is better, and all constraints hold.
@@ -116,15 +148,20 @@ impl Cone {
         })
     }
 
-    /// The rows as they extend to here from a point beyond a kink; what lies above the row here is brought down to it.
-    fn add(&mut self, shape: &Shape, here: &[f64], beyond: &Linearisation) {
+    /// The rows as they extend to here from a point beyond a kink; what lies above the row here is brought down to it, if it is
+    /// not higher than `highest`.
+    fn add(&mut self, shape: &Shape, here: &[f64], beyond: &Linearisation, highest: f64) {
         let rows = Rows::of(&Shape { objective: Objective::Max, ..shape.clone() }, beyond);
         let back: Vec<f64> = here.iter().zip(&beyond.at.point).map(|(a, b)| a - b).collect();
-        let extended = |row: Linear| Linear { value: (row.value + dot(&row.slope, &back)).min(0.0), slope: row.slope };
+        let extended = |row: Linear| {
+            let value = row.value + dot(&row.slope, &back);
+            (value <= highest).then(|| Linear { value: value.min(0.0), slope: row.slope })
+        };
         for (k, (row, scale)) in rows.objectives.iter().zip(&self.scales).enumerate() {
-            self.pieces.push((k, extended(scaled(row, *scale))));
+            self.pieces.extend(extended(scaled(row, *scale)).map(|piece| (k, piece)));
         }
-        self.inequalities.extend(rows.inequalities.into_iter().map(extended).filter(|row| row.value > -1e-4));
+        let inequalities = rows.inequalities.into_iter().filter_map(extended);
+        self.inequalities.extend(inequalities.filter(|row| row.value > -1e-4));
     }
 
     /// The step of at most [`AHEAD`] that lowers the rows most, none of them rising; with what it promises: the sum of what the

@@ -60,7 +60,7 @@ fn known_front(problem: &mops_problems::Problem, count: usize) -> (Vec<Vec<f64>>
 #[test]
 fn weighted_chebyshev_spreads_thirty_exact_points_over_fronts_of_two_objectives() {
     for (suite, names) in
-        [("zdt", &["ZDT1", "ZDT2", "ZDT3"][..]), ("constrained-fronts", &["BNH", "SRN", "TNK", "OSY"])]
+        [("zdt", &["ZDT1", "ZDT2", "ZDT3", "ZDT6"][..]), ("constrained-fronts", &["BNH", "SRN", "TNK", "OSY"])]
     {
         let suite = mops_problems::suites().into_iter().find(|s| s.name == suite).unwrap();
         for problem in (suite.problems)().into_iter().filter(|problem| names.contains(&problem.name.as_str())) {

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::past::Past;
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, print};
-use crate::report::{Responses, comparison_page, significant};
+use crate::report::{Responses, Rows, comparison_page, significant};
 
 /// What is compared.
 #[derive(Args)]
@@ -48,16 +48,15 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
         let all = json!({ "runs": names, "outcome": of(&whole), "tuners": of(&tuners), "criteria": of(&criteria) });
         print(&(serde_json::to_string_pretty(&all).expect("lines are JSON") + "\n"));
     }
-    let mut text = legend(&names);
-    text += &format!("\n{}", rows("run", names.len(), &whole));
-    text += &format!("\n{}", rows("tuner", names.len(), &tuners));
-    text += &format!("\n{}", rows("criterion", names.len(), &criteria));
+    let tables = [(["Results", "run"], whole), (["Tuners", "tuner"], tuners), (["Criteria", "criterion"], criteria)];
+    let tables = tables.map(|(title, lines)| rows(title, names.len(), &lines));
     if !arguments.json {
-        print(&text);
+        print(&tables.iter().fold(legend(&names), |text, rows| text + "\n" + &in_words(rows)));
     }
     if let Some(path) = &arguments.out {
         let (responses, silent) = responses(catalogue, &runs, &results);
-        let page = comparison_page(&text, &responses, &silent);
+        let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
+        let page = comparison_page(&names, &tables, &responses, &silent);
         std::fs::write(path, page).map_err(cannot_write(path))?;
         if !arguments.json {
             print(&format!("\nthe responses are drawn in {}\n", path.display()));
@@ -123,7 +122,7 @@ fn letter(index: usize) -> String {
     of_alphabet.map_or_else(|| format!("{}", index + 1), String::from)
 }
 
-fn rows(what: &str, runs: usize, lines: &[Line]) -> String {
+fn rows([title, what]: [&'static str; 2], runs: usize, lines: &[Line]) -> Rows {
     let mut header = vec![what.to_owned(), "unit".to_owned()];
     header.extend((0..runs).map(letter));
     header.extend((1..runs).map(|i| format!("{} to A, %", letter(i))));
@@ -137,9 +136,13 @@ fn rows(what: &str, runs: usize, lines: &[Line]) -> String {
         let differences = differences(line).into_iter().map(percent);
         [line.name.clone(), line.unit.clone()].into_iter().chain(values).chain(differences).collect()
     };
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    Rows { title, header, lines: lines.iter().map(row).collect() }
+}
+
+fn in_words(rows: &Rows) -> String {
+    let header: Vec<&str> = rows.header.iter().map(String::as_str).collect();
     let numeric: Vec<usize> = (2..header.len()).collect();
-    table(&header, &numeric, lines.iter().map(row).collect())
+    table(&header, &numeric, rows.lines.clone())
 }
 
 /// The responses of every run at its tuners; and of which there are none, and why.

@@ -22,7 +22,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
     if !diagnosis.before.is_empty() {
         text += &format!("\n{}", errors_table(diagnosis));
     }
-    let told = diagnosis.found.iter().filter_map(words::confusable);
+    let told = diagnosis.found.iter().flat_map(words::remarks);
     let sentences: String = told.map(|sentence| format!("- {}\n", plain(&sentence))).collect();
     if !sentences.is_empty() {
         text += &format!("\n{sentences}");

@@ -27,6 +27,7 @@ mod robustness;
 mod run;
 mod schema;
 mod simulate;
+mod sparkline;
 mod study;
 mod tables;
 

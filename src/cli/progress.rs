@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mops_core::{CriterionReport, Evaluation, RunState, Study, Usage, Watch, criterion_reports};
 
+use super::sparkline::sparkline;
 use super::tables::number;
 
 /// A progress bar on standard error, with the best objective so far; and the ear for Ctrl-C.
@@ -17,9 +18,37 @@ pub(super) struct Progress {
     staged: AtomicBool,
     /// The study whose criteria are shown below the bar, where they are.
     study: Option<Study>,
-    /// The lines below the bar.
-    below: Mutex<String>,
+    /// What stands below the bar.
+    below: Mutex<Below>,
 }
+
+/// The lines below the bar.
+#[derive(Default)]
+struct Below {
+    criteria: String,
+    /// Evaluations and objective where the best point got better.
+    curve: Vec<(usize, f64)>,
+}
+
+impl Below {
+    /// A better point; of many, every second one goes.
+    fn better(&mut self, evaluations: usize, objective: f64) {
+        if self.curve.last().is_some_and(|(_, last)| objective.to_bits() == last.to_bits()) {
+            return;
+        }
+        if self.curve.len() >= 8 * SPARKS {
+            let mut index = 0;
+            self.curve.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+        }
+        self.curve.push((evaluations, objective));
+    }
+}
+
+/// Letters of the curve.
+const SPARKS: usize = 40;
 
 impl Progress {
     /// Begins to listen, and to show the bar where `shown` and standard error is a terminal.
@@ -51,7 +80,7 @@ impl Progress {
         Self { bar, interrupted, staged: AtomicBool::new(false), study: None, below: Mutex::default() }
     }
 
-    /// Shows the criteria of the best point below the bar.
+    /// Shows the convergence, and the criteria of the best point, below the bar.
     #[must_use]
     pub fn with_criteria_of(self, study: &Study) -> Self {
         Self { study: Some(study.clone()), ..self }
@@ -76,13 +105,19 @@ impl Watch for Progress {
         } else {
             format!(", violated by {:.3e}", state.best.violation)
         };
-        let below = self.below.lock().unwrap_or_else(PoisonError::into_inner);
-        self.bar.set_message(format!("best {:.6}{violation}{failed}{below}", state.best.objective));
+        let mut below = self.below.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut lines = String::new();
+        if self.study.is_some() {
+            below.better(state.evaluations, state.best.objective);
+            lines = format!("\n  {}{}", sparkline(&below.curve, state.evaluations, SPARKS), below.criteria);
+        }
+        self.bar.set_message(format!("best {:.6}{violation}{failed}{lines}", state.best.objective));
     }
 
     fn improved(&self, best: &Evaluation) {
         if let Some(study) = &self.study {
-            *self.below.lock().unwrap_or_else(PoisonError::into_inner) = lines(&criterion_reports(study, best));
+            let criteria = lines(&criterion_reports(study, best));
+            self.below.lock().unwrap_or_else(PoisonError::into_inner).criteria = criteria;
         }
     }
 

@@ -46,7 +46,7 @@ pub(super) struct Common {
     /// The address is printed; it holds a secret, and nobody else on the machine or in the network finds it.
     #[arg(long)]
     watch: bool,
-    /// Show the best criteria against their demands in the terminal while the run goes.
+    /// Show convergence, and the best criteria against their demands, in the terminal while the run goes.
     #[arg(long, conflicts_with_all = ["quiet", "json"])]
     dashboard: bool,
     /// Print result.json on standard output, and nothing else.

@@ -24,6 +24,7 @@ pub(crate) fn block(diagnosis: &Diagnosis) -> Value {
         "p_value": diagnosis.p_value,
         "found": diagnosis.found.iter().map(found).collect::<Value>(),
         "removed": diagnosis.removed,
+        "steps": diagnosis.steps,
         "ranked": diagnosis.ranked.iter().map(ranked).collect::<Value>(),
         "unexplained": unexplained,
         "next_experiment": diagnosis.next_experiment,
@@ -51,9 +52,13 @@ fn found(found: &Found) -> Value {
         "probability": found.probability,
         "bic_gain": found.bic_gain,
         "indistinguishable": found.indistinguishable,
+        "stability": found.stability,
     });
     if let Some(companion) = &found.companion {
         value["companion"] = json!(companion);
+    }
+    if let Some(only) = &found.only {
+        value["experiment"] = json!(only);
     }
     value
 }

@@ -2,8 +2,8 @@
 
 use mops_core::Role;
 use mops_discrepancy::{
-    Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Rival,
-    StrengthValue, Unexplained, Verdict,
+    Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove, Prediction, Ranked, Rival,
+    Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 
 /// A value between -1 and 1 that looks like chance.
@@ -111,14 +111,29 @@ pub(crate) fn coulomb() -> Diagnosis {
             place: "joint:phi".into(),
             name: "phi-coulomb-friction".into(),
             companion: None,
+            only: None,
             class: "dissipative".into(),
             formula: "-torque sgn(speed), with a stuck mode".into(),
             strengths: vec![strength("c", 0.0124, "N m")],
             probability: 0.97,
             bic_gain: 2400.0,
             indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
+            stability: Some(Stability {
+                share: 0.83,
+                hangs_on: vec![HangsOn {
+                    experiment: "swing".into(),
+                    effect: "stribeck-friction".into(),
+                    place: "joint:phi".into(),
+                }],
+            }),
         }],
         removed: Vec::new(),
+        steps: vec![Step {
+            did: "added",
+            effects: vec!["coulomb-friction at joint:phi".into()],
+            windows: 1,
+            normalised: 1.0,
+        }],
         ranked: vec![
             ranked("coulomb-friction", "joint:phi", 0.97, 2400.0),
             ranked("stribeck-friction", "joint:phi", 0.02, 2399.3),

@@ -143,6 +143,13 @@ fn effect(text: &mut TomlText, original: &Original<'_>, found: &Found) {
         let known = known.and_then(|effect| effect.strengths().iter().find(is));
         text.set(&["tuners", &format!("{name}.{}", strength.name)], &tuner(strength, known));
     }
+    // What happened once is neutral in all other experiments.
+    if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.strengths().first())) {
+        let parameter = format!("{name}.{}", first.name);
+        for experiment in text.keys(&["experiments"]).iter().filter(|experiment| *experiment != only) {
+            text.set(&["experiments", experiment, "parameters", &parameter], &number(first.neutral.unwrap_or(0.0)));
+        }
+    }
 }
 
 /// The model that has the place.
@@ -260,6 +267,17 @@ free     = [\"phi\", \"theta\"]
         assert_eq!(keys, ["swing/phi", "swing/theta"]);
         let channels = &study.cases[0].experiment.as_ref().unwrap().channels;
         assert!(channels.iter().all(|channel| channel.noise == Some(0.003)));
+    }
+
+    #[test]
+    fn what_happened_once_is_neutral_in_all_other_experiments() {
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.found[0].only = Some("another".into());
+        diagnosis.found[0].effect = "wind-gust".into();
+        let text = made(&diagnosis, &[]);
+        let found: toml::Table = text.parse().expect("TOML");
+        let parameters = &found["experiments"]["swing"]["parameters"];
+        assert_eq!(parameters["phi-coulomb-friction.a"].as_float(), Some(0.0), "{text}");
     }
 
     #[test]

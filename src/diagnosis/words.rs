@@ -125,8 +125,27 @@ pub(crate) fn strength(strength: &StrengthValue) -> String {
     format!("{name} = {}{range}{unit}", significant(*value, 4))
 }
 
+/// When an effect acted, and why it may be another, in sentences.
+pub(crate) fn remarks(found: &Found) -> Vec<String> {
+    let once = |only: &String| format!("`{}` {} acted once, in `{only}` alone.", found.effect, at(&found.place));
+    found.only.iter().map(once).chain(confusable(found)).chain(unstable(found)).collect()
+}
+
+/// That the choice of an effect hangs on parts of the data; `None` where it holds in 95 % of those drawn anew.
+fn unstable(found: &Found) -> Option<String> {
+    let stability = found.stability.as_ref()?;
+    let hangs =
+        stability.hangs_on.iter().map(|h| format!("without `{}` it is `{}` {}", h.experiment, h.effect, at(&h.place)));
+    let hangs: Vec<String> = hangs.collect();
+    (stability.share < 0.95 || !hangs.is_empty()).then(|| {
+        let others = if hangs.is_empty() { String::new() } else { format!("; {}", list(&hangs)) };
+        let (effect, place, percent) = (&found.effect, at(&found.place), share(stability.share));
+        format!("`{effect}` {place} does best in {percent} of data sets drawn anew in blocks from these{others}.")
+    })
+}
+
 /// What the data cannot tell from an effect, a sentence; `None` where there is nothing.
-pub(crate) fn confusable(found: &Found) -> Option<String> {
+fn confusable(found: &Found) -> Option<String> {
     let close = |rivals: &mut dyn Iterator<Item = &Rival>| -> Vec<String> {
         rivals.map(|r| format!("`{}` {} ({})", r.effect, at(&r.place), probability(r.probability))).collect()
     };
@@ -195,6 +214,8 @@ mod tests {
         let text = confusable(&made_up::coulomb().found[0]).unwrap();
         assert!(text.contains("cannot tell `coulomb-friction` in the joint `phi` from `stribeck-friction`"), "{text}");
         assert!(text.contains("not excluded: `quadratic-drag`"), "{text}");
+        let text = &remarks(&made_up::coulomb().found[0])[1];
+        assert!(text.contains("does best in 83 % of data sets") && text.contains("without `swing` it is"), "{text}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-// Selects a point of the front in all pictures and in the table at once, and sorts the table. Everything that belongs to a
-// point carries its number as data-point.
+// Selects a point of the front in all pictures and in the table at once. Everything that belongs to a point carries its
+// number as data-point.
 (() => {
   "use strict";
   const table = document.querySelector("table.front");
@@ -10,10 +10,10 @@
   let shown = null;
 
   // Where the dots of a picture are, in its own units.
-  const dots = new Map(pictures.map((svg) => [svg, [...svg.querySelectorAll("g.dot[data-point]")].map((g) => {
+  const dots = (svg) => [...svg.querySelectorAll("g.dot[data-point]")].map((g) => {
     const [x, y] = g.querySelector("path").getAttribute("d").slice(1).split(/[ h]/).map(Number);
     return { point: g.dataset.point, x, y };
-  })]));
+  });
 
   function show(point) {
     if (point === shown) return;
@@ -39,7 +39,7 @@
     const scale = svg.viewBox.baseVal.width / box.width;
     const [x, y] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
     let best = null;
-    for (const dot of dots.get(svg)) {
+    for (const dot of dots(svg)) {
       const distance = Math.hypot(dot.x - x, dot.y - y);
       if (distance < 24 && (!best || distance < best.distance)) best = { distance, point: dot.point };
     }
@@ -90,25 +90,5 @@
     row.addEventListener("keydown", onKey);
   }
 
-  [...table.tHead.rows[0].cells].forEach((head, column) => {
-    if (!head.textContent) return;
-    const button = document.createElement("button");
-    button.type = "button";
-    button.append(...head.childNodes);
-    head.append(button);
-    button.addEventListener("click", () => {
-      const down = head.getAttribute("aria-sort") === "ascending";
-      for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-      head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const value = (row) => row.cells[column].dataset.value ?? row.cells[column].textContent;
-      const order = (a, b) => {
-        const [x, y] = [value(a), value(b)];
-        const difference = Number(x) - Number(y);
-        return Number.isNaN(difference) ? x.localeCompare(y) : difference;
-      };
-      const rows = [...body.rows].sort(order);
-      body.append(...(down ? rows.reverse() : rows));
-    });
-  });
   document.querySelector(".hint").hidden = false;
 })();

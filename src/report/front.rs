@@ -5,9 +5,9 @@ use mops_core::{Analysis, Demand, Pareto, TradeOffs, Tuner};
 
 use super::Report;
 use super::figures::{Figure, Group};
-use super::numbers::{labelled, number};
+use super::numbers::{labelled, number, significant};
 use super::page::scrolling;
-use super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use super::plot::{Curve, CurveStyle, Ink, Level, Plot, Third, Upright};
 use super::sampling::{points, within_columns};
 
 /// More criteria than this are not drawn in pairs.
@@ -24,8 +24,16 @@ struct Quantity {
     demand: Option<f64>,
 }
 
-/// The script that selects a point in all pictures and in the table.
-pub(super) const SCRIPT: &str = include_str!("front.js");
+impl Quantity {
+    /// The least and the largest of its values.
+    fn ends(&self) -> [f64; 2] {
+        let finite = self.values.iter().copied().filter(|value| value.is_finite());
+        finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+    }
+}
+
+/// The scripts that turn a front over three criteria, and that select a point in all pictures and in the table.
+pub(super) const SCRIPTS: [&str; 2] = [include_str!("space.js"), include_str!("front.js")];
 
 /// The plots of a front; `None` where none was found.
 pub(super) fn group(report: &Report<'_>) -> Option<Group> {
@@ -42,7 +50,10 @@ pub(super) fn group(report: &Report<'_>) -> Option<Group> {
             }
         }
     }
-    if criteria.len() > 2 {
+    if let [x, y, z] = criteria.as_slice() {
+        add("front-space".to_owned(), space(found, [x, y, z]));
+    }
+    if criteria.len() + tuners.len() > 2 {
         add("front-parallel".to_owned(), parallel(found, &criteria, &tuners));
     }
     for tuner in tuners.iter().take(MOST_TUNERS) {
@@ -84,21 +95,8 @@ fn tuners(report: &Report<'_>) -> Vec<Quantity> {
     study.tuners.iter().enumerate().filter(|(_, tuner)| tuner.active).map(quantity).collect()
 }
 
-/// A dot for every point, and rings of other colours on those worth a look.
+/// A dot for every point, and dots of other colours on those worth a look.
 fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
-    let dot = |i: usize| (x.values[i], y.values[i]);
-    let one = |i: usize, name: &str, ink| Curve {
-        name: name.to_owned(),
-        points: vec![dot(i)],
-        style: CurveStyle::Dots,
-        ink,
-        of: Some(i),
-        ..Curve::default()
-    };
-    let mut curves: Vec<Curve> =
-        (0..x.values.len()).map(|i| one(i, if i == 0 { "points of the front" } else { "" }, Ink::Result)).collect();
-    curves.extend(found.knee.map(|i| one(i, "knee", Ink::Measured)));
-    curves.push(one(found.nearest, "nearest to the demands", Ink::Demand));
     Plot {
         title: format!("{} over {}", y.name, x.name),
         x_label: labelled(&x.name, &x.unit),
@@ -107,7 +105,35 @@ fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
         log_y: y.log,
         levels: y.demand.map(|value| Level { name: "demand".to_owned(), value }).into_iter().collect(),
         vertical: x.demand,
-        curves,
+        curves: dots(found, x, y).into_iter().map(|(_, curve)| curve).collect(),
+        ..Plot::default()
+    }
+}
+
+/// The dots of a picture, each with the point that it stands for.
+fn dots(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Vec<(usize, Curve)> {
+    let one = |i: usize, name: &str, ink| {
+        let points = vec![(x.values[i], y.values[i])];
+        (i, Curve { name: name.to_owned(), points, style: CurveStyle::Dots, ink, of: Some(i), ..Curve::default() })
+    };
+    let name = |i| if i == 0 { "points of the front" } else { "" };
+    let mut all: Vec<(usize, Curve)> = (0..x.values.len()).map(|i| one(i, name(i), Ink::Result)).collect();
+    all.extend(found.knee.map(|i| one(i, "knee", Ink::Measured)));
+    all.push(one(found.nearest, "nearest to the demands", Ink::Demand));
+    all
+}
+
+/// The same over three criteria.
+fn space(found: &TradeOffs, [x, y, z]: [&Quantity; 3]) -> Plot {
+    let dots = dots(found, x, y);
+    let third =
+        Third { label: labelled(&z.name, &z.unit), values: dots.iter().map(|(i, _)| vec![z.values[*i]]).collect() };
+    Plot {
+        title: format!("{}, {} and {}", x.name, y.name, z.name),
+        x_label: labelled(&x.name, &x.unit),
+        y_label: labelled(&y.name, &y.unit),
+        curves: dots.into_iter().map(|(_, curve)| curve).collect(),
+        third: Some(third),
         ..Plot::default()
     }
 }
@@ -115,27 +141,32 @@ fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
 /// A line for every point across all quantities, each from its least to its largest value.
 fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Plot {
     let all: Vec<&Quantity> = criteria.iter().chain(tuners.iter().take(MOST_TUNERS)).collect();
-    let height = |quantity: &Quantity, i: usize| {
+    let ends: Vec<[f64; 2]> = all.iter().map(|quantity| quantity.ends()).collect();
+    let height = |quantity: &Quantity, [low, high]: [f64; 2], i: usize| {
         let drawn = |value: f64| if quantity.log { value.ln() } else { value };
-        let values = || quantity.values.iter().map(|v| drawn(*v)).filter(|v| v.is_finite());
-        let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let [low, high] = [low, high].map(drawn);
         if high > low { (drawn(quantity.values[i]) - low) / (high - low) } else { 0.5 }
     };
     #[allow(clippy::cast_precision_loss)]
     let line = |i: usize, ink| Curve {
-        points: all.iter().enumerate().map(|(at, quantity)| ((at + 1) as f64, height(quantity, i))).collect(),
+        points: all.iter().zip(&ends).enumerate().map(|(at, (q, ends))| (at as f64, height(q, *ends, i))).collect(),
         ink,
         of: Some(i),
         ..Curve::default()
     };
     let mut curves: Vec<Curve> = (0..criteria[0].values.len()).map(|i| line(i, Ink::Result)).collect();
-    let nearest = line(found.nearest, Ink::Demand);
-    curves.push(Curve { name: "nearest to the demands".to_owned(), ..nearest });
-    let names: Vec<String> = all.iter().enumerate().map(|(at, q)| format!("{} {}", at + 1, q.name)).collect();
+    let worth = [(found.knee, "knee", Ink::Measured), (Some(found.nearest), "nearest to the demands", Ink::Demand)];
+    curves
+        .extend(worth.into_iter().filter_map(|(i, name, ink)| Some(Curve { name: name.to_owned(), ..line(i?, ink) })));
+    let upright = |(quantity, ends): (&&Quantity, &[f64; 2])| Upright {
+        name: labelled(&quantity.name, &quantity.unit),
+        ends: ends.map(|end| significant(end, 3)),
+    };
     Plot {
         title: "Parallel coordinates".to_owned(),
-        x_label: names.join(", "),
-        y_label: "least to largest".to_owned(),
+        x_label: "quantity".to_owned(),
+        y_label: "From least to largest".to_owned(),
+        uprights: all.iter().zip(&ends).map(upright).collect(),
         curves,
         ..Plot::default()
     }
@@ -202,7 +233,10 @@ pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
         }
     };
     html! {
-        p class="hint" hidden { "Hover over a point, or move with the arrow keys; a click or Enter keeps it. Click a column to sort." }
+        p class="hint" hidden {
+            "Hover over a point, or move with the arrow keys; a click or Enter keeps it, Escape lets go of it. Click a column to sort."
+            @if found.criteria.len() == 3 { " The box turns as it is dragged, or by Shift and the arrow keys." }
+        }
         (scrolling("Points of the front", rows))
     }
 }

@@ -13,6 +13,7 @@ mod excitation;
 mod figures;
 mod front;
 mod legend;
+mod matrix;
 mod numbers;
 mod page;
 mod plot;
@@ -23,6 +24,8 @@ mod sampling;
 mod scene;
 mod sensitivity;
 mod side_by_side;
+mod slopes;
+mod space;
 mod surface;
 mod svg;
 mod sweep;
@@ -30,6 +33,7 @@ mod sweep;
 mod tests;
 mod tuners;
 mod uncertainty;
+mod uprights;
 mod verdict;
 
 use std::fs;
@@ -42,10 +46,10 @@ use mops_discrepancy::Diagnosis;
 pub(crate) use bode::{Sweep, bode, frequencies};
 pub(crate) use numbers::{FileNames, file_name, significant};
 pub(crate) use page::document;
-pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface};
+pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
-pub(crate) use side_by_side::{Responses, comparison_page};
+pub(crate) use side_by_side::{Responses, Rows, comparison_page};
 
 /// The style sheet of all pages.
 pub(crate) const STYLE: &str = include_str!("style.css");

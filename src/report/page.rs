@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs no network; a front has a script to move about in it, all else none.
+//! The page: one HTML file that needs no network. Scripts sort its tables and move about in a front; it reads well without.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_core::{CalibrationReport, Task};
@@ -7,7 +7,9 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::numbers::significant;
 use super::verdict::{self, Tone};
-use super::{calibration, criteria, diagnosis, excitation, front, robustness, sensitivity, tuners, uncertainty};
+use super::{
+    calibration, criteria, diagnosis, excitation, front, matrix, robustness, sensitivity, slopes, tuners, uncertainty,
+};
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {
@@ -23,7 +25,10 @@ pub(super) struct Pictures {
     pub(super) uncertainty: Option<Group>,
 }
 
-/// The frame that all pages have: one file, light and dark.
+/// The script that makes tables sortable.
+const TABLES: &str = include_str!("tables.js");
+
+/// The frame that all pages have: one file, light and dark, its tables sortable.
 pub(crate) fn document(title: &str, body: Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -36,7 +41,7 @@ pub(crate) fn document(title: &str, body: Markup) -> Markup {
                 title { (title) }
                 style { (PreEscaped(super::STYLE)) }
             }
-            body { (body) }
+            body { (body) script { (PreEscaped(TABLES)) } }
         }
     }
 }
@@ -70,8 +75,13 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
                     @if let Some(group) = &pictures.excitation { (figures(group)) }
                 }))
             }
+            @if let Some(table) = matrix::section(outcome) { (section("Criteria by case", table)) }
             @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
             @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
+            @if let Some(found) = &outcome.found.slopes {
+                @let one_case = report.problem.study().cases.len() == 1;
+                (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
+            }
             @if !pictures.responses.is_empty() {
                 (section("Responses", html! {
                     @if let Some(text) = &pictures.left_out { p { (text) } }
@@ -100,7 +110,7 @@ pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
             }))
         }
         footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
-        @if pictures.front.is_some() { script { (PreEscaped(front::SCRIPT)) } }
+        @if pictures.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
     };
     document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
 }

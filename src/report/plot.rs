@@ -96,6 +96,24 @@ pub struct Surface {
     pub log: bool,
 }
 
+/// A third axis, upwards, for points in space.
+#[derive(Debug, Clone, Default)]
+pub struct Third {
+    /// Quantity and unit along it.
+    pub label: String,
+    /// For every curve the values that belong to its points.
+    pub values: Vec<Vec<f64>>,
+}
+
+/// An upright axis of parallel coordinates, on which curves run from 0 at its foot to 1 at its head.
+#[derive(Debug, Clone, Default)]
+pub struct Upright {
+    /// The quantity.
+    pub name: String,
+    /// What stands at its foot and at its head.
+    pub ends: [String; 2],
+}
+
 /// A plot. Curves are drawn in their order, the last on top.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
@@ -125,6 +143,10 @@ pub struct Plot {
     pub degrees: bool,
     /// A surface behind the curves; its grid is then what is shown of x and y.
     pub surface: Option<Surface>,
+    /// A third axis: the points of all curves are then dots in a box.
+    pub third: Option<Third>,
+    /// Axes of parallel coordinates, at x = 0, 1, 2, ..., instead of the others.
+    pub uprights: Vec<Upright>,
 }
 
 impl Plot {

@@ -42,6 +42,7 @@ fn failed(error: impl std::error::Error) -> io::Error {
 fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
     match mark {
         Mark::Of { marks, .. } => marks.iter().try_for_each(|mark| draw(paper, mark)),
+        Mark::InSpace { mark, .. } => draw(paper, mark),
         Mark::Line { points, ink, width, dashed } => {
             let parts = if *dashed { dashes(points, 6.0, 4.0) } else { vec![points.clone()] };
             let segments: Vec<[Point; 2]> =

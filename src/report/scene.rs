@@ -4,6 +4,7 @@ use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
 use super::plot::{CurveStyle, Ink, Plot, Surface};
 use super::range::{drawable, equal, range_of, y_range};
+use super::space::{Place, View};
 use super::surface::SCALE_WIDTH;
 
 /// Size of every plot; one unit is a pixel of a page at its natural size.
@@ -49,6 +50,11 @@ pub(super) enum Mark {
         point: usize,
         marks: Vec<Self>,
     },
+    /// What has its places in a box that can be turned, as it is seen at first.
+    InSpace {
+        places: Vec<Place>,
+        mark: Box<Self>,
+    },
 }
 
 /// Which end of a text stands at its place.
@@ -63,11 +69,16 @@ pub(super) enum Anchor {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scene {
     pub(super) marks: Vec<Mark>,
+    /// From where the box of [`Mark::InSpace`] is seen.
+    pub(super) view: Option<View>,
 }
 
 impl Scene {
     /// Lays out a plot.
     pub(super) fn of(plot: &Plot) -> Self {
+        if plot.third.is_some() {
+            return Self::space(plot);
+        }
         let mut scene = Self::default();
         let xs = plot.curves.iter().flat_map(|c| &c.points).map(|p| p.0).chain(plot.x_range.into_iter().flatten());
         let x_range = match &plot.surface {
@@ -110,7 +121,11 @@ impl Scene {
                 scene.marks.push(Mark::Box { frame: Frame { from, to }, ink: Ink::Band });
             }
         }
-        scene.axes(plot, &x, &y, frame);
+        if plot.uprights.is_empty() {
+            scene.axes(plot, &x, &y, frame);
+        } else {
+            scene.uprights(&plot.uprights, [&x, &y], frame);
+        }
         if let Some(at) = plot.vertical.and_then(|value| x.position(value)).filter(|at| (0.0..=1.0).contains(at)) {
             let px = left + at * (frame.to[0] - left);
             let points = vec![[px, top], [px, frame.to[1]]];

@@ -1,10 +1,10 @@
 //! The page of a comparison: the responses of several runs over each other.
 
-use maud::{PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use mops_core::{Analysis, Problem};
 
 use super::numbers::labelled;
-use super::page::document;
+use super::page::{document, scrolling, section};
 use super::plot::{Curve, Ink, Plot};
 use super::sampling;
 
@@ -18,23 +18,61 @@ pub(crate) struct Responses {
     pub(crate) tuners: Vec<f64>,
 }
 
-/// The page: tables as text, responses as pictures, sentences on what is not shown.
-pub(crate) fn comparison_page(tables: &str, runs: &[Responses], silent: &[String]) -> String {
+/// A table of a comparison: names, units, then numbers.
+pub(crate) struct Rows {
+    /// What it is of.
+    pub(crate) title: &'static str,
+    /// What stands above each column.
+    pub(crate) header: Vec<String>,
+    /// The lines, as long as the header.
+    pub(crate) lines: Vec<Vec<String>>,
+}
+
+/// The page: which letter stands for which folder, tables, responses as pictures, sentences on what is not shown.
+pub(crate) fn comparison_page(
+    names: &[(String, String)],
+    tables: &[Rows],
+    runs: &[Responses],
+    silent: &[String],
+) -> String {
     let plots = plots(runs);
     let body = html! {
-        header { p class="task" { "comparison" } h1 { "Runs side by side" } }
+        header {
+            p class="task" { "Comparison" }
+            h1 { "Runs side by side" }
+            dl class="long" { @for (letter, name) in names { div { dt { (letter) } dd { (name) } } } }
+        }
         main {
-            section { h2 { "Results" } pre tabindex="0" { (tables) } }
-            section {
-                h2 { "Responses" }
+            @for rows in tables {
+                (section(rows.title, scrolling(rows.title, table(rows))))
+            }
+            (section("Responses", html! {
                 @for sentence in silent { p { (sentence) } }
                 @if plots.is_empty() { p { "There is no signal over time to draw." } }
                 div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
-            }
+            }))
         }
         footer { "Written by mops " (env!("CARGO_PKG_VERSION")) "." }
     };
     document("Comparison of runs", body).into_string()
+}
+
+fn table(rows: &Rows) -> Markup {
+    let class = |column: usize| (column >= 2).then_some("number");
+    html! {
+        table {
+            thead { tr { @for (i, head) in rows.header.iter().enumerate() { th scope="col" class=[class(i)] { (head) } } } }
+            tbody {
+                @for line in &rows.lines {
+                    tr {
+                        @for (i, cell) in line.iter().enumerate() {
+                            @if i == 0 { th scope="row" { (cell) } } @else { td class=[class(i)] { (cell) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// A curve, with the plot it belongs to: case, model, signal, and its label.

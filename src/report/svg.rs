@@ -7,13 +7,14 @@ use maud::{Markup, html};
 use super::clip::Point;
 use super::plot::Ink;
 use super::scene::{Anchor, Mark, SIZE, Scene};
+use super::space::View;
 
 /// The document, with a title and a description for readers that cannot see it.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
     let [width, height] = SIZE;
     let markup = html! {
         svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox={ "0 0 " (width) " " (height) } width=(width)
-            height=(height) role="img" aria-label=(title) font-family="DejaVu Sans, Verdana, Arial, sans-serif"
+            height=(height) data-view=[view(scene)] role="img" aria-label=(title) font-family="DejaVu Sans, Verdana, Arial, sans-serif"
             stroke-linecap="round" stroke-linejoin="round" {
             title { (title) }
             desc { (description) }
@@ -24,14 +25,29 @@ pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String 
     markup.into_string()
 }
 
+/// From where a box is seen, as the page that turns it reads it: turn, height, scale, middle.
+fn view(scene: &Scene) -> Option<String> {
+    let View { turn, height, scale, middle: [x, y] } = scene.view?;
+    Some(format!("{turn} {height} {scale} {x} {y}"))
+}
+
 fn element(mark: &Mark) -> Markup {
     match mark {
+        Mark::InSpace { places, mark } => {
+            let places: Vec<String> = places.as_flattened().iter().map(|v| format!("{v:.4}")).collect();
+            html! { g data-space=(places.join(" ")) { (element(mark)) } }
+        }
         Mark::Line { points, ink, width, dashed } => html! {
             path class=(class(*ink)) d=(line(points)) fill="none" stroke=(colour(*ink)) stroke-width=(width)
                 stroke-dasharray=[dashed.then_some("6 4")] {}
         },
         Mark::Of { point, marks } => {
-            let kind = if matches!(marks.as_slice(), [Mark::Dots { .. }]) { "dot" } else { "line" };
+            let is_dot = |mark: &Mark| matches!(mark, Mark::Dots { .. });
+            let kind = match marks.as_slice() {
+                [Mark::InSpace { mark, .. }] if is_dot(mark) => "dot",
+                [mark] if is_dot(mark) => "dot",
+                _ => "line",
+            };
             html! { g class=(kind) data-point=(point) { @for mark in marks { (element(mark)) } } }
         }
         // A line of no length with round ends is a dot, and the shortest way to write one.

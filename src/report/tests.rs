@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use mops_core::{
     Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
-    CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model, Outcome, Parameter,
-    Pareto, Problem, Record, Response, Role, StartReport, Stop, Task, Trace, TunerDraft, TunerReport, Unit, Usage,
-    Value, Variable,
+    CriterionSlopes, CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model,
+    Outcome, Parameter, Pareto, Problem, Record, Response, Role, SlopesReport, StartReport, Stop, Task, Trace,
+    TunerDraft, TunerReport, Unit, Usage, Value, Variable,
 };
 
-use super::plot::{Curve, CurveStyle, Plot};
+use super::plot::{Curve, CurveStyle, Plot, Third};
 use super::{Level, Report, numbers};
 
 /// `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
@@ -191,7 +191,7 @@ fn page_of(
 #[test]
 fn the_page_shows_every_criterion_and_escapes_what_users_write() {
     let (_folder, page) = written("<script>alert(1)</script>", 5.0, Usage::Minimise);
-    assert!(!page.contains("<script") && page.contains("&lt;script&gt;alert(1)"));
+    assert!(!page.contains("<script>alert") && page.contains("&lt;script&gt;alert(1)"));
     assert_eq!(page.matches("<th scope=\"row\">end<small>not settled at the end").count(), 2);
     for text in [
         "nominal &amp; more",
@@ -268,4 +268,30 @@ fn empty_and_constant_plots_are_drawn() {
         }
     }
     assert_eq!(numbers::labelled("y", "1"), "y");
+}
+
+#[test]
+fn cases_and_slopes_are_shown_as_tables_of_shades() {
+    let (problem, best, mut outcome, archive) = study("lag", 5.0, Usage::Minimise);
+    let slope = |key: &str, slope| CriterionSlopes { key: key.into(), slopes: vec![slope] };
+    let criteria = vec![slope("nominal & more/end", 25.0), slope("step/1/end", f64::NAN)];
+    outcome.found.slopes = Some(SlopesReport { tuners: vec!["T".into()], criteria });
+    let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
+    // Both cases at 1 - exp(-5/2) = 0.9179 for a demand of 0.5.
+    assert_eq!(page.matches("data-value=\"1.83").count(), 2 + 2 + 2, "two cells, their worsts, and the worst of all");
+    assert!(page.contains("Criteria by case") && page.contains("number shade mixed above"));
+    assert!(page.contains(">+0.25</td>") && page.contains("--share:45%"), "a quarter for a step of a hundredth");
+    assert!(page.contains(">n/a</td>"), "a slope that is not known is told as such");
+}
+
+#[test]
+fn a_third_axis_keeps_the_places_that_a_page_turns() {
+    let dot = |x| Curve { points: vec![(x, 2.0 * x)], style: CurveStyle::Dots, of: Some(0), ..Curve::default() };
+    let third = Third { label: "z (s)".into(), values: vec![vec![0.0], vec![4.0]] };
+    let plot = Plot { curves: vec![dot(0.0), dot(1.0)], third: Some(third), ..Plot::default() };
+    let svg = plot.svg();
+    assert!(svg.contains("data-view=") && svg.contains(">z (s)</text>") && !svg.contains("NaN"));
+    assert_eq!(svg.matches("class=\"dot\" data-point=\"0\"").count(), 2);
+    let of_all_signs = |sign: f64| svg.contains(&format!("data-space=\"{sign:.4} {sign:.4} {sign:.4}\""));
+    assert!(of_all_signs(-1.0) && of_all_signs(1.0), "the ends of the ranges lie in opposite corners: {svg}");
 }

@@ -105,17 +105,21 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
     words
 }
 
-/// What a unit of the first criterion costs of the second at a point.
+/// What a round step of the first criterion, small beside its range over the front, costs of the second at a point.
 fn price(found: &TradeOffs, i: usize) -> String {
     let (Some(weights), [first, second]) = (&found.points[i].weights, found.criteria.as_slice()) else {
         return String::new();
     };
-    let rate = (weights[0] / weights[1]).abs();
+    let step = 10f64.powf((0.2 * (first.worst - first.best).abs()).log10().floor());
+    if !step.is_normal() {
+        return String::new();
+    }
+    let cost = step * (weights[0] / weights[1]).abs();
     format!(
         " There, {} better by {} costs {} of {}.",
         name(found, 0),
-        amount(1.0, &first.unit),
-        amount(rate, &second.unit),
+        amount(step, &first.unit),
+        amount(cost, &second.unit),
         name(found, 1)
     )
 }

@@ -17,8 +17,8 @@ const CONNECTIONS: usize = 32;
 /// Time for a request, and for the viewer to take a part of the answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// States are at least so far apart.
-const PACE: Duration = Duration::from_millis(250);
+/// States are at least so far apart. A browser that draws them takes its time from the run.
+const PACE: Duration = Duration::from_millis(500);
 
 /// A stream says something at least so often, so that a viewer that left is noticed.
 const PULSE: Duration = Duration::from_secs(2);
@@ -37,6 +37,8 @@ pub(super) struct Server {
 struct Shared {
     live: Arc<Live>,
     connections: AtomicUsize,
+    /// Streams that wait for a state, and so will take the last one at once.
+    waiting: AtomicUsize,
     closed: AtomicBool,
 }
 
@@ -48,7 +50,12 @@ impl Server {
         let mut random = [0; 16];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
         let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
-        let shared = Arc::new(Shared { live, connections: AtomicUsize::new(0), closed: AtomicBool::new(false) });
+        let shared = Arc::new(Shared {
+            live,
+            connections: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
+            closed: AtomicBool::new(false),
+        });
         let (of_thread, token_of_thread) = (Arc::clone(&shared), token.clone());
         thread::Builder::new()
             .name("watch".into())
@@ -60,11 +67,11 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Ends it; viewers have a moment to take the last state.
+    /// Ends it. Viewers who wait for the last state get it; those who say nothing, or take nothing, are not waited for.
     pub fn close(self) {
         let until = Instant::now() + Duration::from_secs(1);
-        while self.shared.connections.load(Ordering::Relaxed) > 0 && Instant::now() < until {
-            thread::sleep(Duration::from_millis(10));
+        while self.shared.waiting.load(Ordering::Relaxed) > 0 && Instant::now() < until {
+            thread::sleep(Duration::from_millis(2));
         }
         self.shared.closed.store(true, Ordering::Relaxed);
         // Wakes who listens.
@@ -177,15 +184,34 @@ fn whole(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> io::Re
 fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
     let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\n");
     stream.write_all(head.as_bytes())?;
-    let mut seen = 0;
+    let (mut seen, mut pace) = (0, Duration::ZERO);
     loop {
+        let waiting = Waiting::begin(&shared.waiting);
+        shared.live.pause(pace);
         let (version, over, state) = shared.live.after(seen, PULSE);
+        // The last state is waited for until it is taken.
+        let _waiting = over.then_some(waiting);
         let name = if over { "event: over\n" } else { "" };
         stream.write_all(format!("{name}data: {state}\n\n").as_bytes())?;
         if over || shared.closed.load(Ordering::Relaxed) {
             return Ok(());
         }
-        seen = version;
-        thread::sleep(PACE);
+        (seen, pace) = (version, PACE);
+    }
+}
+
+/// A stream that waits, as long as this lives.
+struct Waiting<'a>(&'a AtomicUsize);
+
+impl<'a> Waiting<'a> {
+    fn begin(count: &'a AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::Relaxed);
+        Self(count)
+    }
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }

@@ -87,6 +87,12 @@ impl Live {
         self.change(|newest| newest.over = Some((seconds, folder.to_owned())));
     }
 
+    /// Waits for so long, or until the run is over.
+    pub fn pause(&self, patience: Duration) {
+        let goes_on = |newest: &mut Newest| newest.over.is_none();
+        drop(self.changed.wait_timeout_while(self.newest(), patience, goes_on));
+    }
+
     /// The state as JSON once it is newer than `seen`, or after `patience`; its version, and whether the run is over.
     pub fn after(&self, seen: u64, patience: Duration) -> (u64, bool, String) {
         let newest = self.newest();

@@ -17,20 +17,24 @@ pub fn browser() -> Option<PathBuf> {
     names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file())
 }
 
+/// What a browser is told that shows nothing and asks nobody.
+pub const FLAGS: [&str; 8] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+];
+
 /// The document that an address leads to once its scripts have run, with a profile of its own in the folder.
+#[allow(dead_code)]
 pub fn dump(browser: &Path, folder: &Path, address: &str, more: &[&str]) -> Output {
-    let flags = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--dump-dom",
-    ];
     let profile = format!("--user-data-dir={}", folder.join("profile").display());
     let limit = Duration::from_secs(120);
-    Command::new(browser).args(flags).args(more).args([&profile, address]).timeout(limit).output().unwrap()
+    let mut command = Command::new(browser);
+    command.args(FLAGS).arg("--dump-dom").args(more).args([&profile, address]);
+    command.timeout(limit).output().unwrap()
 }

@@ -53,7 +53,14 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
         let own = Vec::new();
         let with = Variant::new(
             &subject,
-            &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, sizes, expected: None }],
+            &[Added {
+                candidate: candidate.clone(),
+                strengths: strengths.clone(),
+                own,
+                starts: Vec::new(),
+                sizes,
+                expected: None,
+            }],
         );
         let mut parameters = TRUTH.to_vec();
         parameters.extend(&strengths);

@@ -33,7 +33,7 @@ impl Definition for PositionDependentFriction {
             "periods in a turn",
             Dimension::ONE.over(Dimension::POSITION),
             NOT_NEGATIVE,
-            Trials::Plain(&[1.0, 2.0, 4.0]),
+            Trials::Plain(&[1.0, 2.0, 3.0, 4.0, 6.0]),
         )
         .kept(),
         phase(),

@@ -1,5 +1,6 @@
 //! An input as a simulation meets it: smooth within a step, with its jumps at breaks.
 
+use mops_core::band_limited::{piece, polynomial};
 use mops_core::{Hold, Input, Scalar};
 
 /// An input with its present value and slope.
@@ -15,38 +16,47 @@ pub struct Drive<'a, S = f64> {
     slope: f64,
     /// The first of the samples after `since`.
     after: usize,
-    /// What goes on top of the value where the input is a sine.
-    sine: Option<Sine>,
+    /// What goes on top of the value in place of a straight line.
+    curve: Option<Curve>,
 }
 
-/// `amplitude sin(angular t + phase)`.
 #[derive(Debug, Clone, Copy)]
-struct Sine {
-    amplitude: f64,
-    /// Angular frequency, rad/s.
-    angular: f64,
-    phase: f64,
+enum Curve {
+    /// `amplitude sin(angular t + phase)`; the angular frequency in rad/s.
+    Sine { amplitude: f64, angular: f64, phase: f64 },
+    /// A polynomial of `(t - since)/step`.
+    Piece { since: f64, step: f64, coefficients: [f64; 6] },
 }
 
-impl Sine {
+impl Curve {
     // Inlined, it would be evaluated for every input: to the compiler a sine is harmless enough to be taken in advance.
     #[inline(never)]
     fn at(&self, t: f64) -> f64 {
-        self.amplitude * (self.angular * t + self.phase).sin()
+        match self {
+            Self::Sine { amplitude, angular, phase } => amplitude * (angular * t + phase).sin(),
+            Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).0,
+        }
+    }
+
+    fn slope(&self, t: f64) -> f64 {
+        match self {
+            Self::Sine { amplitude, angular, phase } => amplitude * angular * (angular * t + phase).cos(),
+            Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).1 / step,
+        }
     }
 }
 
 impl<S: Scalar> Drive<'_, S> {
     /// A drive that stays at a value.
     pub fn held(value: S) -> Self {
-        Self { input: None, since: 0.0, value, slope: 0.0, after: 0, sine: None }
+        Self { input: None, since: 0.0, value, slope: 0.0, after: 0, curve: None }
     }
 }
 
 impl<'a, S: Scalar> Drive<'a, S> {
     /// A drive at time 0; nothing drives where `input` is absent.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, sine: None };
+        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, curve: None };
         drive.pass_break(0.0);
         drive
     }
@@ -54,15 +64,15 @@ impl<'a, S: Scalar> Drive<'a, S> {
     /// The value at `t`.
     #[inline]
     pub fn at(&self, t: f64) -> S {
-        match &self.sine {
-            Some(sine) => self.value + sine.at(t),
+        match &self.curve {
+            Some(curve) => self.value + curve.at(t),
             None => self.value + self.slope * (t - self.since),
         }
     }
 
-    /// How fast it moves at present, per s; 0 for a sine.
-    pub fn slope(&self) -> f64 {
-        self.slope
+    /// How fast it moves at `t`, per s.
+    pub fn slope(&self, t: f64) -> f64 {
+        self.curve.as_ref().map_or(self.slope, |curve| curve.slope(t))
     }
 
     /// The next time after `t` at which the value or its slope jumps; samples that are held and repeat themselves do not.
@@ -111,7 +121,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
             Input::Sine { amplitude, frequency, phase, offset } => {
                 self.value = S::from(*offset);
                 let angular = std::f64::consts::TAU * frequency;
-                self.sine = Some(Sine { amplitude: *amplitude, angular, phase: *phase });
+                self.curve = Some(Curve::Sine { amplitude: *amplitude, angular, phase: *phase });
             }
             Input::Sampled { times, hold: Hold::First, .. } => {
                 self.after = self.first_after(times, t);
@@ -121,6 +131,14 @@ impl<'a, S: Scalar> Drive<'a, S> {
                 if next.is_finite() {
                     self.slope = (input.at(next) - value) / (next - t);
                 }
+            }
+            Input::Sampled { times, values, hold: Hold::BandLimited } => {
+                self.after = self.first_after(times, t);
+                self.curve = (1..times.len()).contains(&self.after).then(|| {
+                    let (since, next) = (times[self.after - 1], times[self.after]);
+                    Curve::Piece { since, step: next - since, coefficients: piece(values, self.after - 1) }
+                });
+                self.value = S::from(if self.curve.is_some() { 0.0 } else { input.at(t) });
             }
             Input::Sampled { times, values, hold: Hold::Zero } => {
                 self.after = self.first_after(times, t);
@@ -148,5 +166,18 @@ mod tests {
     fn first_order_hold_is_a_straight_line() {
         let input = Input::Sampled { times: vec![0.0, 2.0], values: vec![1.0, 5.0], hold: Hold::First };
         assert_eq!(Drive::<f64>::new(Some(&input)).at(0.5), 2.0);
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_curve() {
+        let times: Vec<f64> = (0..100).map(|i| 0.1 * f64::from(i)).collect();
+        let values = times.iter().map(|t| (3.0 * t).sin()).collect();
+        let sine = Input::Sine { amplitude: 1.0, frequency: 3.0 / std::f64::consts::TAU, phase: 0.0, offset: 0.0 };
+        for input in [sine, Input::Sampled { times, values, hold: Hold::BandLimited }] {
+            let mut drive: Drive<'_> = Drive::new(Some(&input));
+            drive.pass_break(5.0);
+            assert!((drive.at(5.05) - 15.15_f64.sin()).abs() < 1e-6, "{input:?}");
+            assert!((drive.slope(5.05) - 3.0 * 15.15_f64.cos()).abs() < 1e-4, "{input:?}");
+        }
     }
 }

@@ -81,7 +81,8 @@ impl<S: Scalar> Command<'_, S> {
             None => self.drive.at(t),
             Some(delay) => {
                 let late = delay - delay.value();
-                self.drive.at((t - delay.value()).max(0.0)) - late * self.drive.slope()
+                let then = (t - delay.value()).max(0.0);
+                self.drive.at(then) - late * self.drive.slope(then)
             }
         }
     }

@@ -34,7 +34,8 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         if column.0.hold.is_none() && values.looks_smooth() {
             warnings.push(format!(
                 "input `{input}` of `{name}` looks smooth, and is held between its samples: if it was not, \
-                 hold = \"first\" is right (hold = \"zero\" says that it was, and ends this warning)"
+                 hold = \"first\" is right, or \"band-limited\" where it was filtered before it was sampled \
+                 (hold = \"zero\" says that it was held, and ends this warning)"
             ));
         }
         inputs.push((input.clone(), values, unit));

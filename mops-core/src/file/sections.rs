@@ -297,8 +297,9 @@ pub(super) struct InputTable {
     pub scale: Option<f64>,
     /// What is added after scaling, in the column's unit.
     pub offset: Option<Quantity>,
-    /// How it acts between samples: `zero` (the default: it stays until the next one, as a computer puts it out) or
-    /// `first` (straight lines from sample to sample, as for one that moves smoothly).
+    /// How it acts between samples: `zero` (the default: it stays until the next one, as a computer puts it out), `first`
+    /// (straight lines from sample to sample, as for one that moves smoothly) or `band-limited` (nothing above half the sampling
+    /// frequency, as for one that was filtered before it was sampled).
     pub hold: Option<Hold>,
 }
 

@@ -27,6 +27,7 @@ impl Study {
                 case: None,
                 active: true,
                 tie: None,
+                guessed: [false; 2],
             });
         }
         study.tasks.uncertain = self.tasks.uncertain.iter().map(|uncertain| uncertain.at(tuners)).collect();

@@ -50,6 +50,15 @@ impl Aim {
         Self { roles: low.iter().zip(range).map(role).collect(), objective: Objective::Max }
     }
 
+    /// What each criterion counts as, in units of the subproblem.
+    pub fn heights(&self, criteria: &[f64]) -> Vec<f64> {
+        let height = |(role, f): (&Role, &f64)| {
+            let (factor, offset) = role.line();
+            factor * f + offset
+        };
+        self.roles.iter().zip(criteria).map(height).collect()
+    }
+
     /// What the criteria are worth; the violation is that of the criteria alone.
     pub fn merit(&self, criteria: &[f64]) -> Merit {
         let (mut violation, mut worst, mut sum) = (0.0_f64, f64::NEG_INFINITY, 0.0);
@@ -88,6 +97,9 @@ impl Aim {
     }
 }
 
+/// What the sum of a coordinate and a step may be beside the bound it leads to, and more.
+const ROUNDING: f64 = 1e-14;
+
 /// The problem as a subproblem has it; what is evaluated is remembered.
 pub struct View<'a> {
     oracle: &'a mut dyn Oracle,
@@ -112,6 +124,21 @@ impl<'a> View<'a> {
         evaluation
     }
 
+    /// The points with coordinates on the bounds that they are meant to lie on: a step to a bound leaves over what rounding
+    /// leaves over, and a criterion that is steepest there (a root, say) has slopes a little beside it that describe nothing.
+    fn on_bounds(point: &[f64]) -> Vec<f64> {
+        let end = |&u: &f64| {
+            if u < ROUNDING {
+                0.0
+            } else if u > 1.0 - ROUNDING {
+                1.0
+            } else {
+                u
+            }
+        };
+        point.iter().map(end).collect()
+    }
+
     fn keep(&mut self, evaluation: &Evaluation) {
         if self.best.as_ref().is_none_or(|best| evaluation.merit.is_better_than(&best.merit)) {
             self.best = Some(evaluation.clone());
@@ -125,7 +152,7 @@ impl Oracle for View<'_> {
     }
 
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
-        let answers = self.oracle.evaluate(points)?;
+        let answers = self.oracle.evaluate(&points.iter().map(|point| Self::on_bounds(point)).collect::<Vec<_>>())?;
         self.known.take(self.oracle.shape(), &answers);
         let answers: Vec<Evaluation> = answers.into_iter().map(|answer| self.seen(answer)).collect();
         answers.iter().for_each(|answer| self.keep(answer));
@@ -133,7 +160,9 @@ impl Oracle for View<'_> {
     }
 
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
-        let Some(Linearisation { at, mut rows, .. }) = self.oracle.linearise(point, reach)? else { return Ok(None) };
+        let Some(Linearisation { at, mut rows, .. }) = self.oracle.linearise(&Self::on_bounds(point), reach)? else {
+            return Ok(None);
+        };
         self.known.take(self.oracle.shape(), std::slice::from_ref(&at));
         for (row, (factor, _)) in rows.iter_mut().zip(&self.lines) {
             row.iter_mut().for_each(|slope| *slope *= factor);

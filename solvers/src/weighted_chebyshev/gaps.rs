@@ -1,6 +1,6 @@
 //! Two criteria: the rectangle between two neighbours, from the largest down.
 
-use mops_core::{Halt, Oracle};
+use mops_core::{FEASIBLE, Halt, Oracle};
 
 use super::aim::Aim;
 use super::insert;
@@ -104,8 +104,43 @@ fn within(
     if aim.merit(&found.criteria).objective > 1.0 - USUAL {
         found = subproblems.solve(oracle, &aim, &[p.clone(), q.clone()], radius)?;
     }
+    // An end of the front may be stationary for both criteria: no slope leads away from it.
+    if aim.merit(&found.criteria).objective > 1.0 - DEPTH
+        && let Some(start) = on_the_way(oracle, subproblems, &aim, p, q)?
+    {
+        found = subproblems.solve(oracle, &aim, &[start], radius)?;
+    }
     if aim.merit(&found.criteria).objective > 1.0 - DEPTH {
         return Ok(None);
     }
     subproblems.without_slack(oracle, &aim, found).map(Some)
+}
+
+/// Halvings of the way between two neighbours.
+const HALVINGS: usize = 10;
+
+/// The point on the straight way from `p` to `q` where both criteria stand equally high in the rectangle: criteria that are
+/// continuous have one. `None` where a simulation fails, or where a constraint is violated there.
+fn on_the_way(
+    oracle: &mut dyn Oracle,
+    subproblems: &mut Subproblems,
+    aim: &Aim,
+    p: &Place,
+    q: &Place,
+) -> Result<Option<Place>, Halt> {
+    let [mut low, mut high] = [0.0, 1.0];
+    let mut last = None;
+    for _ in 0..HALVINGS {
+        let at = 0.5 * (low + high);
+        let point = p.point.iter().zip(&q.point).map(|(a, b)| a + at * (b - a)).collect();
+        let answers = oracle.evaluate(&[point])?;
+        subproblems.known.take(oracle.shape(), &answers);
+        let Some(scaled) = &answers[0].scaled else { return Ok(None) };
+        let criteria = oracle.shape().objectives(scaled);
+        let heights = aim.heights(&criteria);
+        let feasible = answers[0].merit.violation <= FEASIBLE;
+        last = feasible.then(|| Place { point: answers[0].point.clone(), criteria });
+        if heights[0] < heights[1] { low = at } else { high = at }
+    }
+    Ok(last)
 }

@@ -75,6 +75,7 @@ pub(super) fn sections(diagnosis: &Diagnosis, pictures: &Pictures) -> Markup {
             }))
         }
         @if !diagnosis.ranked.is_empty() { (section("What it could be", ranking::table(diagnosis))) }
+        @if !diagnosis.steps.is_empty() { (section("How it was found", ranking::steps(diagnosis))) }
         @if !diagnosis.parameters.is_empty() && diagnosis.verdict != Verdict::None {
             (section("How the parameters moved", ranking::parameters(diagnosis)))
         }
@@ -109,7 +110,7 @@ fn effect(found: &Found) -> Markup {
                     li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval, selection included" } } }
                 }
                 li { "Probability " strong { (words::probability(found.probability)) } ", " (found.class) ", BIC lower by " (significant(found.bic_gain, 3)) "." }
-                @if let Some(text) = words::confusable(found) { li { (rich(&text)) } }
+                @for text in words::remarks(found) { li { (rich(&text)) } }
             }
         }
     }

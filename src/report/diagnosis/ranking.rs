@@ -83,6 +83,24 @@ fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
     Some(if rival.bic_behind < words::BARE_MENTION { "cannot be told apart" } else { "not excluded" })
 }
 
+/// The models that the search passed through.
+pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
+    html! {
+        table {
+            thead { tr { th scope="col" { "step" } th scope="col" { "effects in the model" } th scope="col" class="number" { "error, times the noise" } } }
+            tbody {
+                @for step in &diagnosis.steps {
+                    tr {
+                        th scope="row" { (step.did) }
+                        td { (step.effects.join(", ")) }
+                        td class="number" { (words::times(step.normalised)) @if step.windows > 1 { " in " (step.windows) " windows" } }
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// What the parameters had absorbed.
 pub(super) fn parameters(diagnosis: &Diagnosis) -> Markup {
     let rows = html! {

@@ -64,6 +64,11 @@ fn build_input(
             Input::Sampled { values, .. } => values.iter_mut().for_each(|v| *v *= factor),
         }
     }
+    if let Some(at) = input.uneven() {
+        return Err(Mistake::new(name, format!("the input `{name}` is not evenly sampled at {at} s"))
+            .with_help("hold = \"band-limited\" needs even steps: cut the record with `from` and `to`, or say hold = \"first\"")
+            .within("inputs"));
+    }
     Ok((name.clone(), input))
 }
 

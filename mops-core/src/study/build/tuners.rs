@@ -129,6 +129,7 @@ pub(super) fn build_tuner(
         case: None,
         active: !fixed,
         tie: None,
+        guessed: [false; 2],
     };
     if draft.per_case {
         for (index, case) in cases.iter().enumerate() {
@@ -240,6 +241,7 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
         case: Some(index),
         active: true,
         tie: None,
+        guessed: [min.is_none(), max.is_none()],
     })
 }
 

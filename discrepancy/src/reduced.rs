@@ -1,0 +1,70 @@
+//! What can be left out of a model: effects that others make superfluous, declared terms that effects do.
+
+use crate::search::{Search, Trial};
+use crate::variant::problem;
+use crate::weigh::{Dispersion, by_chance};
+
+impl<'a> Search<'a> {
+    /// The trial without one of its effects, fitted again.
+    pub fn without(&self, trial: &Trial<'a>, index: usize) -> Option<Trial<'a>> {
+        let mut added = trial.added.clone();
+        added.remove(index);
+        self.from(trial, &added, 40)
+    }
+
+    /// The trial without effects that the others make superfluous; `None` where each is needed.
+    pub fn pruned(&self, trial: &Trial<'a>, level: f64) -> Option<Trial<'a>> {
+        let mut pruned: Option<Trial<'a>> = None;
+        let mut index = 0;
+        loop {
+            let last = pruned.as_ref().unwrap_or(trial);
+            if last.added.len() < 2 || index >= last.added.len() {
+                return pruned;
+            }
+            let superfluous = |without: &Trial<'a>| {
+                let loss = (without.fitted.chi2 - last.fitted.chi2) / Dispersion::of(last).weight();
+                by_chance(loss, 30.0) > level
+            };
+            match self.without(last, index).filter(superfluous) {
+                Some(without) => (pruned, index) = (Some(without), 0),
+                None => index += 1,
+            }
+        }
+    }
+
+    /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that
+    /// may be zero, and are no larger than their uncertainty.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn without_declared(&self, trial: Trial<'a>) -> (Trial<'a>, Vec<usize>) {
+        let mut held = Vec::new();
+        let mut trial = trial;
+        if trial.added.is_empty() {
+            return (trial, held);
+        }
+        let mut covariance = trial.fit.covariance(&trial.fitted);
+        for k in 0..self.subject.globals.len() {
+            let global = &trial.fit.globals[k];
+            let value = trial.fitted.point.globals[k];
+            let error = covariance[(k, k)].max(0.0).sqrt();
+            let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
+            let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
+            if !(zero && (at_least || value.abs() < 2.0 * error)) {
+                continue;
+            }
+            let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
+            tuners[k] = global.bounds[0].max(0.0);
+            let (own, locals) = (self.pieces(trial.windows), self.own_locals(&trial));
+            let all: Vec<usize> = held.iter().copied().chain([k]).collect();
+            let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
+            let Some(fitted) = made.0.solve(made.1, 40) else { continue };
+            let weight = Dispersion::of(&trial).weight();
+            if (fitted.chi2 - trial.fitted.chi2) / weight < (fitted.count as f64).ln() {
+                held = all;
+                let (added, windows) = (trial.added.clone(), trial.windows);
+                trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
+                covariance = trial.fit.covariance(&trial.fitted);
+            }
+        }
+        (trial, held)
+    }
+}

@@ -1,0 +1,185 @@
+//! A round of the search: the whole catalogue screened against what a model leaves, and the best of it fitted.
+
+use mops_core::{Trials, stream};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::base;
+use crate::fit::{Known, dot};
+use crate::screen::{Scene, Screened, screen};
+use crate::search::{NEARLY_LINEAR, Search, Trial};
+use crate::variant::{Added, problem};
+
+/// Candidates of one round: as screened, and the best of them as fitted.
+pub struct Round<'a> {
+    /// As screened, best first.
+    pub screened: Vec<Screened>,
+    /// As fitted, best first.
+    pub trials: Vec<Trial<'a>>,
+    /// Directions that were looked in, as many as independent ones.
+    pub directions: f64,
+    /// The same as white noise in place of the residuals shows it, where that was tried.
+    pub independent: f64,
+    /// The criterion of what the round began with.
+    pub before: f64,
+    /// Residuals and slopes of what the round began with.
+    known: Known,
+}
+
+/// Draws of white noise in place of residuals.
+const DRAWS: usize = 40;
+
+fn white(count: usize) -> Vec<Vec<f64>> {
+    let mut random = stream(0, "white");
+    (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
+}
+
+impl<'a> Search<'a> {
+    /// Screens the whole catalogue against what a trial leaves, and fits the best.
+    pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
+        let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
+        // What chance does is asked of the declared model alone.
+        let draws = if from.added.is_empty() { white(scene.residuals.len()) } else { Vec::new() };
+        let screening = screen(&self.candidates(&from.added), &from.fit, &from.variant.model, &scene, &draws);
+        let (independent, screened) = (screening.independent(), screening.screened);
+        let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
+        let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
+        // Of every place the best, so that no place is lost for a bad linearisation.
+        for (i, s) in screened.iter().enumerate().take(gaining) {
+            let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
+            if chosen.len() < 2 * self.limits.refits
+                && chosen.iter().filter(|k| same(k)).count() < 2
+                && !chosen.contains(&i)
+            {
+                chosen.push(i);
+            }
+        }
+        // And what is simpler of the same kind at the same place, as a shape may do no more than take up noise.
+        for (i, s) in screened.iter().enumerate().take(gaining) {
+            let simpler = |k: &usize| s.added.candidate.is_simpler_than(&screened[*k].added.candidate);
+            if !chosen.contains(&i) && chosen.iter().any(simpler) {
+                chosen.push(i);
+            }
+        }
+        let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
+        let start = |i: usize| {
+            let shapes = std::iter::once(&screened[i].added).chain(&screened[i].others);
+            let fits = shapes.filter_map(|added| self.beside(from, &known, &[self.neutral_start(added)], 5));
+            fits.min_by(|a, b| a.score().total_cmp(&b.score()))
+        };
+        let mut trials = self.race(chosen.into_par_iter().filter_map(start).collect());
+        if from.windows > 1 {
+            // Windows forgive what whole records do not: these decide, where they can be fitted.
+            let finalists = &trials[..trials.len().min(self.limits.finalists)];
+            let is_simpler = |t: &Trial<'a>, than: &Trial<'a>| match (t.added.last(), than.added.last()) {
+                (Some(a), Some(b)) => a.candidate.is_simpler_than(&b.candidate),
+                _ => false,
+            };
+            let simpler = trials[finalists.len()..].iter().filter(|t| finalists.iter().any(|f| is_simpler(t, f)));
+            let worth: Vec<&Trial<'a>> = finalists.iter().chain(simpler).collect();
+            let wholes: Vec<Trial<'a>> = worth.par_iter().filter_map(|t| self.over_whole(t)).collect();
+            if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
+                trials = wholes;
+                trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            }
+        }
+        let directions = screened.iter().map(|s| s.directions).sum();
+        let independent = independent.unwrap_or(directions);
+        Some(Round { screened, trials, directions, independent, before: from.score(), known })
+    }
+
+    /// The best candidates of a round, fitted from where the study begins: the fit of the model without them may have ended
+    /// where no effect can help it.
+    pub fn afresh(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
+        const MOST: usize = 24;
+        let tuners = self.subject.start();
+        let locals = base::first_locals(&self.pieces(from.windows));
+        let chosen = &round.screened[..round.screened.len().min(MOST)];
+        let fit = |s: &Screened| self.trial(std::slice::from_ref(&s.added), &tuners, locals.clone(), from.windows, 8);
+        self.race(chosen.par_iter().filter_map(fit).collect())
+    }
+
+    /// Pairs of candidates that do well together, whatever they do alone: a friction may only show, with the right sign, when
+    /// another effect is in. Chosen by the normal equations of two traces, then fitted.
+    pub fn pairs(&self, from: &Trial<'a>, round: &Round<'a>) -> Vec<Trial<'a>> {
+        const FEW: usize = 60;
+        let few = &round.screened[..round.screened.len().min(FEW)];
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for i in 0..few.len() {
+            for j in i + 1..few.len() {
+                let (a, b) = (&few[i], &few[j]);
+                let dry = a.added.candidate.is_dry_friction() && b.added.candidate.is_dry_friction();
+                if a.added.candidate.port == b.added.candidate.port && dry {
+                    continue;
+                }
+                let likeness = dot(&a.direction, &b.direction);
+                let rest = 1.0 - likeness * likeness;
+                if rest < 1e-3 {
+                    continue;
+                }
+                let (p, q) = (a.pull, b.pull);
+                let (x, y) = ((p - likeness * q) / rest, (q - likeness * p) / rest);
+                if (a.one_sided && x <= 0.0) || (b.one_sided && y <= 0.0) {
+                    continue;
+                }
+                pairs.push((x * p + y * q, i, j));
+            }
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut chosen: Vec<(usize, usize)> = pairs.iter().take(self.limits.refits).map(|&(_, i, j)| (i, j)).collect();
+        // One and the same effect in two places: joints of a kind have bearings of a kind.
+        let twins = pairs.iter().filter(|&&(_, i, j)| {
+            let (a, b) = (&few[i].added.candidate, &few[j].added.candidate);
+            a.effect.name() == b.effect.name() && a.effect.rarity() == 0
+        });
+        for &(_, i, j) in twins.take(4) {
+            if !chosen.contains(&(i, j)) {
+                chosen.push((i, j));
+            }
+        }
+        let started: Vec<Trial<'a>> = chosen
+            .into_par_iter()
+            .filter_map(|(i, j)| {
+                self.beside(from, &round.known, &[&few[i], &few[j]].map(|s| self.neutral_start(&s.added)), 6)
+            })
+            .collect();
+        self.race(started)
+    }
+
+    /// Those that lead after a few steps go on, and the best of them to the end; best first.
+    fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
+        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
+            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            let rest = trials.split_off(trials.len().min(count));
+            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
+            trials.extend(rest);
+        }
+        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        trials
+    }
+
+    /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
+    fn neutral_start(&self, added: &Added) -> Added {
+        let mut added = added.clone();
+        let first = &added.candidate.effect.strengths()[0];
+        if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
+            added.strengths[0] = neutral;
+        }
+        added
+    }
+
+    /// The trial with effects that are at first neutral, where that is so: nothing is simulated twice.
+    fn beside(&self, from: &Trial<'a>, known: &Known, more: &[Added], iterations: usize) -> Option<Trial<'a>> {
+        let tuners = &from.fitted.point.globals[..self.subject.globals.len()];
+        let added = [from.added.as_slice(), more].concat();
+        let (pieces, locals) = (self.pieces(from.windows), self.own_locals(from));
+        let (fit, point, variant) = problem(self.subject, &added, pieces, tuners, locals, &[], self.simulations);
+        let neutral = |a: &Added| a.candidate.effect.strengths()[0].neutral == Some(a.strengths[0]);
+        let fitted = if more.iter().all(neutral) {
+            fit.solve_beside(point, known, iterations)?
+        } else {
+            fit.solve(point, iterations)?
+        };
+        Some(Trial { added, windows: from.windows, fit, variant, fitted }.read())
+    }
+}

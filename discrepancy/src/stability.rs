@@ -1,0 +1,114 @@
+//! Stability: whether the choice of an effect hangs on a few stretches of the data, or on one experiment.
+
+use mops_core::stream;
+use rand::Rng;
+use serde::Serialize;
+
+use crate::round::Round;
+use crate::search::Trial;
+use crate::weigh::{Dispersion, criterion};
+
+/// Records that are drawn anew.
+const DRAWS: usize = 1000;
+
+/// How the choice of an effect holds where the data change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stability {
+    /// Share of data sets, drawn anew in blocks from the data, in which the same effect does best.
+    ///
+    /// The fits are not repeated, their residuals are drawn. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
+    /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
+    /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
+    pub share: f64,
+    /// Experiments without which another effect would do best.
+    pub hangs_on: Vec<HangsOn>,
+}
+
+/// An experiment that an effect's choice hangs on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HangsOn {
+    /// The experiment.
+    pub experiment: String,
+    /// The effect that would do best without it.
+    pub effect: String,
+    /// The place of that, as `kind:name`.
+    pub place: String,
+}
+
+/// The stability of the best effect of a round; `None` where it has no rival over the same data.
+pub fn stability(round: &Round<'_>) -> Option<Stability> {
+    let best = round.trials.first()?;
+    let of = Dispersion::of(best);
+    let rivals: Vec<&Trial<'_>> = round.trials.iter().filter(|t| t.windows == best.windows).collect();
+    if rivals.len() < 2 {
+        return None;
+    }
+    let squares: Vec<Vec<f64>> = rivals.iter().map(|t| blocks(t, &of)).collect();
+    // What a criterion has beside the sum of squares.
+    let beside = |t: &Trial<'_>| criterion(t, &of) - t.fitted.chi2 / of.weight();
+    let beside: Vec<f64> = rivals.iter().map(|t| beside(t)).collect();
+    let leader = |weights: &[f64]| {
+        let value = |i: usize| {
+            let chi2: f64 = squares[i].iter().zip(weights).map(|(square, weight)| square * weight).sum();
+            chi2 / of.weight() + beside[i]
+        };
+        (0..rivals.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))).expect("there are two")
+    };
+    let owner = owners(best, &of);
+    let mut random = stream(0, "stability");
+    let mut same = 0;
+    for _ in 0..DRAWS {
+        let mut weights = vec![0.0; owner.len()];
+        (0..owner.len()).for_each(|_| weights[random.random_range(0..owner.len())] += 1.0);
+        same += usize::from(leader(&weights) == 0);
+    }
+    let mut measurements: Vec<usize> = owner.clone();
+    measurements.dedup();
+    let without = |&left_out: &usize| {
+        let weights: Vec<f64> = owner.iter().map(|&m| f64::from(u8::from(m != left_out))).collect();
+        let other = rivals[leader(&weights)].added.last()?;
+        let experiment = best.fit.subject.measurements[left_out].name.clone();
+        let own = best.added.last().is_some_and(|a| a.candidate.is(&other.candidate));
+        let (effect, place) = (other.candidate.effect.name().to_owned(), other.candidate.place());
+        (!own).then_some(HangsOn { experiment, effect, place })
+    };
+    let hangs_on = if measurements.len() > 1 { measurements.iter().filter_map(without).collect() } else { Vec::new() };
+    #[allow(clippy::cast_precision_loss)]
+    Some(Stability { share: same as f64 / DRAWS as f64, hangs_on })
+}
+
+/// Number of blocks that a piece of so many samples is cut into: of at least ten independent samples, and at most 40.
+#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn count(samples: usize, of: &Dispersion) -> usize {
+    ((samples as f64 / (10.0 * of.repeats)) as usize).clamp(1, 40)
+}
+
+/// Sums of squares of all channels over the blocks of all pieces.
+fn blocks(trial: &Trial<'_>, of: &Dispersion) -> Vec<f64> {
+    let mut all = Vec::new();
+    for (piece, residuals) in trial.fit.pieces.iter().zip(&trial.fitted.residuals) {
+        let longest = piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0);
+        let mut sums = vec![0.0; count(longest, of)];
+        let mut at = 0;
+        for s in &piece.series {
+            for (&t, r) in s.times.iter().zip(&residuals[at..]) {
+                #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let block = (t / piece.horizon.max(f64::MIN_POSITIVE) * sums.len() as f64) as usize;
+                let last = sums.len() - 1;
+                sums[block.min(last)] += r * r;
+            }
+            at += s.times.len();
+        }
+        all.extend(sums);
+    }
+    all
+}
+
+/// The experiment of each block.
+fn owners(trial: &Trial<'_>, of: &Dispersion) -> Vec<usize> {
+    let of_piece = |piece: &crate::fit::Piece| {
+        let longest = piece.series.iter().map(|s| s.times.len()).max().unwrap_or(0);
+        std::iter::repeat_n(piece.measurement, count(longest, of))
+    };
+    trial.fit.pieces.iter().flat_map(of_piece).collect()
+}

@@ -1,0 +1,64 @@
+//! The wrong hold of an input hides an effect: what the command did between its samples looks like a force of its own.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::{Effect, Hold, Input};
+use mops_models::effects::effects;
+
+use crate::screen::screen;
+use crate::search::{Limits, Search};
+use crate::testing::{Record, fitted, integrated, subject, white};
+
+const OSCILLATOR: &str = r#"
+states     = { x = "m", v = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", k = "N/m", d = "N s/m" }
+der        = { x = "v", v = "m*v' = u - k*x - d*v" }
+"#;
+const STEP: f64 = 0.1;
+const COUNT: usize = 400;
+/// Steps of the truth in each step of the record.
+const FINE: usize = 20;
+const NOISE: f64 = 1e-4;
+
+/// Up to half of the highest frequency that the samples can show.
+fn command(t: f64) -> f64 {
+    let sines = (1..=25).map(|k| f64::from(k) * std::f64::consts::PI * 0.5 / (25.0 * STEP));
+    sines.enumerate().map(|(i, w)| 2.0 * (w * t + (i * i) as f64).sin()).sum()
+}
+
+/// Positions of an oscillator with a spring that stiffens, driven by a command without steps.
+fn record(hold: Hold) -> Record {
+    let rates = |t: f64, x: &[f64; 2]| [x[1], (command(t) - 30.0 * x[0] - 0.6 * x[1] - 3.0 * x[0].powi(3)) / 1.2];
+    let states = integrated(rates, [0.0, 0.0], STEP / FINE as f64, COUNT * FINE);
+    let times: Vec<f64> = (0..COUNT).map(|k| k as f64 * STEP).collect();
+    let noise = white("hold", NOISE, COUNT);
+    let values = states.iter().step_by(FINE).zip(noise).map(|(s, e)| s[0] + e).collect();
+    let samples = times.iter().map(|&t| command(t)).collect();
+    Record {
+        inputs: vec![("u", Input::Sampled { times: times.clone(), values: samples, hold })],
+        times,
+        signals: vec![("x", values, NOISE)],
+    }
+}
+
+/// Share of what the declared model leaves that the missing effect explains.
+fn explained(hold: Hold) -> f64 {
+    let subject = subject(OSCILLATOR, &[1.2, 30.0, 0.6, 0.0, 0.0], 2, vec![record(hold)]);
+    let simulations = AtomicUsize::new(0);
+    let (fit, variant, _, scene) = fitted(&subject, &simulations);
+    let named: Vec<Arc<dyn Effect>> = effects();
+    let limits = Limits { refits: 10, finalists: 5 };
+    let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
+    let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
+    let left: f64 = scene.residuals.iter().map(|r| r * r).sum();
+    let cubic = screened.iter().find(|s| s.added.candidate.effect.name() == "cubic-stiffness");
+    cubic.expect("a position can have a spring").gain / left
+}
+
+#[test]
+fn the_wrong_input_hold_hides_the_effect() {
+    let (zero, band_limited) = (explained(Hold::Zero), explained(Hold::BandLimited));
+    assert!(band_limited > 0.9 && zero < 0.5, "{band_limited}, {zero}");
+}

@@ -1,0 +1,122 @@
+//! What is shown of points whose optimality is known.
+
+use mops_core::{Budget, Evaluation, Evaluator, Objective, Pareto, Run, Shape, Usage};
+use mops_solvers::certify;
+
+/// Two rows to be minimised over the unit cube; slopes come from differences.
+struct Two {
+    shape: Shape,
+    rows: fn(&[f64]) -> [f64; 2],
+}
+
+impl Two {
+    fn new(rows: fn(&[f64]) -> [f64; 2]) -> Self {
+        let shape = Shape {
+            spacing: vec![0.0; 3],
+            rows: vec![(Usage::Minimise, 1.0); 2],
+            objective: Objective::Each,
+            ..Shape::default()
+        };
+        Self { shape, rows }
+    }
+
+    /// What is shown of a point.
+    fn shown(&self, point: [f64; 3]) -> Pareto {
+        certify(&mut Run::new(self, Budget { evaluations: usize::MAX }, &()), &point)
+    }
+}
+
+impl Evaluator for Two {
+    fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    fn evaluate(&self, point: &[f64]) -> Evaluation {
+        let scaled = (self.rows)(point).to_vec();
+        let merit = self.shape.merit(&scaled);
+        Evaluation {
+            point: point.to_vec(),
+            tuners: point.to_vec(),
+            readings: Vec::new(),
+            scaled: Some(scaled),
+            residuals: Vec::new(),
+            merit,
+            failures: Vec::new(),
+        }
+    }
+
+    fn tuners_at(&self, point: &[f64]) -> Vec<f64> {
+        point.to_vec()
+    }
+
+    fn seed(&self) -> u64 {
+        1
+    }
+}
+
+/// How far a point is from a bent sheet, which is a kink of both rows and holds their front.
+fn off(x: &[f64]) -> f64 {
+    (x[1] - 0.5 - 4.0 * (x[0] - 0.5).powi(2) - (x[2] - 0.4).powi(2)).abs()
+}
+
+/// On the sheet the rows are squared distances to two points: the front is what lies between them.
+fn kinked(x: &[f64]) -> [f64; 2] {
+    let distance = |x1: f64| (x[0] - x1).powi(2) + (x[2] - 0.4).powi(2);
+    [distance(0.3) + 2.0 * off(x), distance(0.7) + 0.5 * off(x)]
+}
+
+fn on_the_sheet(x1: f64) -> [f64; 3] {
+    [x1, 0.5 + 4.0 * (x1 - 0.5).powi(2), 0.4]
+}
+
+#[test]
+fn points_of_a_front_on_a_bent_kink_are_certified() {
+    for x1 in [0.35, 0.4, 0.45, 0.55, 0.6, 0.65] {
+        assert_eq!(Two::new(kinked).shown(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+}
+
+#[test]
+fn a_point_of_the_kink_that_both_rows_can_leave_behind_is_not_certified() {
+    for x1 in [0.2, 0.25, 0.75, 0.8] {
+        assert_ne!(Two::new(kinked).shown(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+    // Beside the kink as well.
+    for x1 in [0.35, 0.5, 0.65] {
+        let [a, b, c] = on_the_sheet(x1);
+        assert_ne!(Two::new(kinked).shown([a, b + 0.01, c]), Pareto::CertifiedLocal, "{x1}");
+    }
+}
+
+/// A steep kink of the first row alone, oblique and strongly bent: steps along it leave it, or see the mean of both sides.
+fn steep(x: &[f64]) -> [f64; 2] {
+    let off = x[1] - 0.5 - BENT * (x[0] - 0.5).powi(2) - (x[2] - 0.4);
+    let distance = |x1: f64| (x[0] - x1).powi(2) + (x[2] - 0.4).powi(2);
+    [distance(0.3) + (20.0 * off).max(-60.0 * off), distance(0.7)]
+}
+
+const BENT: f64 = 5.0;
+
+fn on_the_steep_sheet(x1: f64) -> [f64; 3] {
+    [x1, 0.5 + BENT * (x1 - 0.5).powi(2), 0.4]
+}
+
+#[test]
+fn a_steep_kink_is_seen_from_both_sides() {
+    for x1 in [0.32, 0.35, 0.4, 0.45, 0.55, 0.6, 0.65, 0.68] {
+        assert_eq!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+    for x1 in [0.2, 0.25, 0.75, 0.8] {
+        assert_ne!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+    }
+}
+
+#[test]
+fn a_jump_nearby_certifies_nothing() {
+    // Up to the jump both rows fall along the second coordinate.
+    let jump = |x: &[f64]| {
+        let beyond = if x[1] > 0.5002 { 10.0 } else { 0.0 };
+        [beyond - x[1] + (x[0] - 0.4).powi(2), beyond - 2.0 * x[1] + (x[0] - 0.6).powi(2)]
+    };
+    assert_ne!(Two::new(jump).shown([0.5, 0.5, 0.5]), Pareto::CertifiedLocal);
+}

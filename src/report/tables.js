@@ -1,0 +1,35 @@
+// Makes tables sortable by a click on the head of a column: numbers by size, all else by name.
+(() => {
+  "use strict";
+  const number = (text) => (/^\s*[-+]?\.?\d/.test(text) ? parseFloat(text) : null);
+  const value = (row, column) => row.cells[column].dataset.value ?? row.cells[column].textContent;
+
+  function order(a, b) {
+    const [x, y] = [number(a), number(b)];
+    if ((x === null) !== (y === null)) return x === null ? 1 : -1; // what has no value comes last
+    return x === null || x === y ? a.localeCompare(b) : x - y;
+  }
+
+  function sortBy(table, column, head) {
+    const down = head.getAttribute("aria-sort") === "ascending";
+    for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    const rows = [...table.tBodies[0].rows].sort((a, b) => order(value(a, column), value(b, column)));
+    table.tBodies[0].append(...(down ? rows.reverse() : rows));
+  }
+
+  for (const table of document.querySelectorAll("table")) {
+    const body = table.tBodies[0];
+    if (table.tHead?.rows.length !== 1 || table.tBodies.length !== 1 || body.rows.length < 2) continue;
+    const heads = [...table.tHead.rows[0].cells];
+    if ([...body.rows].some((row) => row.cells.length !== heads.length)) continue;
+    heads.forEach((head, column) => {
+      if (!head.textContent) return;
+      const button = document.createElement("button");
+      button.type = "button";
+      button.append(...head.childNodes);
+      head.append(button);
+      button.addEventListener("click", () => sortBy(table, column, head));
+    });
+  }
+})();
