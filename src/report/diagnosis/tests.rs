@@ -54,6 +54,7 @@ fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
             "What the declared model leaves",
             "Where it comes from",
             "What it could be",
+            "How it was found",
             "How the parameters moved",
             "What to measure next",
             "Measured and predicted",
