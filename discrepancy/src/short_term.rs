@@ -4,8 +4,9 @@
 use rayon::prelude::*;
 
 use crate::diagnosis::{ExperimentError, WindowErrors};
-use crate::repaired::Calibrated;
-use crate::search::Search;
+use crate::fit::Piece;
+use crate::repaired::{Calibrated, Prognosis};
+use crate::search::{ASTRAY, Search};
 use crate::subject::{Measurement, Series};
 use crate::windows::cut;
 
@@ -33,9 +34,13 @@ impl Search<'_> {
         }
         let windows = cut(index, measurement, self.subject.model.as_ref(), count);
         let mut squares = vec![(0.0, 0_usize); measurement.series.len()];
-        for window in windows {
-            let locals = vec![window.locals.iter().map(|local| local.start).collect()];
-            let (fit, fitted) = self.starts(&model.added, &model.tuners, vec![window], locals, 30)?;
+        let enough = ASTRAY * model.square.sqrt();
+        for (k, window) in windows.iter().enumerate() {
+            let first = window.locals.iter().map(|local| local.start).collect();
+            // The first begins as the record does.
+            let whole = (k == 0).then(|| self.starts_in(&model.experiments[index], window)).flatten();
+            let beginnings = whole.into_iter().chain([first]).collect();
+            let (fit, fitted) = self.begun(&model.added, &model.tuners, window, beginnings, enough)?;
             let mut rest = fitted.residuals[0].as_slice();
             for (series, (sum, samples)) in fit.pieces[0].series.iter().zip(&mut squares) {
                 let (own, others) = rest.split_at(series.times.len());
@@ -53,6 +58,13 @@ impl Search<'_> {
             channels: channels.collect(),
             normalised: (sum / samples.max(1) as f64).sqrt(),
         })
+    }
+
+    /// The start values of a record for a window that begins with it; `None` where one of them is not known.
+    fn starts_in(&self, record: &Prognosis, window: &Piece) -> Option<Vec<f64>> {
+        let parameters = &self.subject.model.interface().parameters;
+        let known = |name: &str| record.starts.iter().find(|(of, _)| of == name).map(|(_, value)| *value);
+        window.locals.iter().map(|local| known(&parameters[local.parameter].variable.name)).collect()
     }
 }
 
