@@ -2,6 +2,7 @@
 
 use mops_core::stream;
 use rand::Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::round::Round;
@@ -10,6 +11,9 @@ use crate::weigh::{Dispersion, criterion};
 
 /// Records that are drawn anew.
 const DRAWS: usize = 1000;
+
+/// Effects, the best first, that are fitted again without an experiment.
+const REFITTED: usize = 5;
 
 /// How the choice of an effect holds where the data change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -20,7 +24,7 @@ pub struct Stability {
     /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
     /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
     pub share: f64,
-    /// Experiments without which another effect would do best.
+    /// Experiments without which another effect would do best, fitted again without them.
     pub hangs_on: Vec<HangsOn>,
 }
 
@@ -64,17 +68,29 @@ pub fn stability(round: &Round<'_>) -> Option<Stability> {
     }
     let mut measurements: Vec<usize> = owner.clone();
     measurements.dedup();
+    let few = &rivals[..rivals.len().min(REFITTED)];
     let without = |&left_out: &usize| {
-        let weights: Vec<f64> = owner.iter().map(|&m| f64::from(u8::from(m != left_out))).collect();
-        let other = rivals[leader(&weights)].added.last()?;
+        let trials: Vec<Trial<'_>> = few.par_iter().filter_map(|t| refitted_without(t, left_out)).collect();
+        let of = Dispersion::of(trials.iter().min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))?);
+        let leader = trials.iter().min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)))?;
+        let (own, other) = (&best.added.last()?.candidate, &leader.added.last()?.candidate);
         let experiment = best.fit.subject.measurements[left_out].name.clone();
-        let own = best.added.last().is_some_and(|a| a.candidate.is(&other.candidate));
-        let (effect, place) = (other.candidate.effect.name().to_owned(), other.candidate.place());
-        (!own).then_some(HangsOn { experiment, effect, place })
+        let (effect, place) = (other.effect.name().to_owned(), other.place());
+        (!own.is(other)).then_some(HangsOn { experiment, effect, place })
     };
     let hangs_on = if measurements.len() > 1 { measurements.iter().filter_map(without).collect() } else { Vec::new() };
     #[allow(clippy::cast_precision_loss)]
     Some(Stability { share: same as f64 / DRAWS as f64, hangs_on })
+}
+
+/// A model that is fitted again without one of the experiments.
+fn refitted_without<'a>(trial: &Trial<'a>, left_out: usize) -> Option<Trial<'a>> {
+    let (mut fit, mut point) = (trial.fit.clone(), trial.fitted.point.clone());
+    let kept: Vec<usize> = (0..fit.pieces.len()).filter(|&k| fit.pieces[k].measurement != left_out).collect();
+    fit.pieces = kept.iter().map(|&k| fit.pieces[k].clone()).collect();
+    point.locals = kept.iter().map(|&k| point.locals[k].clone()).collect();
+    let fitted = fit.solve(point, 20)?;
+    Some(Trial { fit, fitted, ..trial.clone() })
 }
 
 /// Number of blocks that a piece of so many samples is cut into: of at least ten independent samples, and at most 40.

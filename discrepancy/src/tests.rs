@@ -8,5 +8,6 @@ mod pairs;
 mod selection;
 mod sessions;
 mod signs;
+mod stability;
 mod starts;
 mod tangents;

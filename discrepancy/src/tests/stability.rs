@@ -1,0 +1,67 @@
+//! A choice that rests on noise, or on one experiment alone, is told from one that rests on all data.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use mops_core::Effect;
+use mops_models::effects::effects;
+
+use crate::search::{Limits, Search};
+use crate::stability::{Stability, stability};
+use crate::testing::{Record, integrated, subject, white};
+
+const OSCILLATOR: &str = r#"
+states     = { x = "m", v = "m/s" }
+parameters = { k = "1/s2", d = "1/s" }
+der        = { x = "v", v = "v' = -k*x - d*v" }
+"#;
+const NOISE: f64 = 1e-3;
+const BOTH: &[&str] = &["coulomb-friction", "quadratic-stiffness"];
+
+/// A free oscillation with dry friction and a spring that is stiffer to one side.
+fn record(label: &str, dry: f64, bent: f64) -> Record {
+    const STEP: f64 = 0.02;
+    const COUNT: u32 = 300;
+    let force = |x: &[f64; 2]| -20.0 * x[0] - bent * x[0] * x[0] - 0.2 * x[1] - dry * x[1].signum();
+    let rates = |_: f64, x: &[f64; 2]| [x[1], force(x)];
+    let states = integrated(rates, [1.0, 0.0], STEP, COUNT as usize);
+    let times = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
+    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
+    Record { inputs: Vec::new(), times, signals: vec![("x", values, NOISE)] }
+}
+
+/// The best effect of a first round, and its stability.
+fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
+    let count = records.len();
+    let subject = subject(OSCILLATOR, &[20.0, 0.2, 1.0, 0.0], 2, records);
+    let simulations = AtomicUsize::new(0);
+    let some: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| named.contains(&e.name())).collect();
+    let limits = Limits { refits: 10, finalists: 5 };
+    let search = Search { subject: &subject, effects: &some, limits, simulations: &simulations };
+    let declared = search.trial(&[], &subject.start(), vec![vec![1.0, 0.0]; count], 1, 60).expect("it simulates");
+    let round = search.round(&declared).expect("it simulates");
+    let best = round.trials[0].added[0].candidate.effect.name().to_owned();
+    (best, stability(&round).expect("there are rivals"))
+}
+
+#[test]
+fn an_effect_in_all_experiments_is_chosen_whatever_is_drawn() {
+    let (best, stability) = chosen(BOTH, vec![record("one", 0.1, 0.0), record("two", 0.1, 0.0)]);
+    assert_eq!(best, "coulomb-friction");
+    assert!(stability.share > 0.99 && stability.hangs_on.is_empty(), "{stability:?}");
+}
+
+#[test]
+fn an_effect_of_one_experiment_hangs_on_that() {
+    let (best, stability) = chosen(BOTH, vec![record("one", 0.06, 0.0), record("two", 0.0, 0.04)]);
+    assert_eq!(best, "coulomb-friction");
+    let hangs: Vec<&str> = stability.hangs_on.iter().map(|h| h.effect.as_str()).collect();
+    assert_eq!(hangs, ["quadratic-stiffness"], "{stability:?}");
+}
+
+#[test]
+fn what_is_chosen_by_chance_is_not_chosen_again() {
+    let either_way = &["quadratic-stiffness", "sensor-drift"];
+    let (_, stability) = chosen(either_way, vec![record("one", 0.0, 0.0), record("two", 0.0, 0.0)]);
+    assert!(stability.share < 0.95, "{stability:?}");
+}
