@@ -15,8 +15,7 @@ use crate::weigh::{Dispersion, criterion, probabilities};
 pub fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
     let mut ranked: Vec<Ranked> = Vec::new();
     let mut seen: Vec<(String, String)> = Vec::new();
-    let is_added =
-        |t: &Trial<'_>| t.added.last().is_some_and(|a| last.added.iter().any(|b| a.candidate.is(&b.candidate)));
+    let is_added = |t: &Trial<'_>| t.newest().is_some_and(|own| last.added.iter().any(|a| own.is(&a.candidate)));
     for round in rounds {
         let Some(best) = round.trials.first() else { continue };
         // What was tried after the last effect is told by chance, and says nothing.
@@ -83,29 +82,27 @@ pub fn found(
     let a = &last.added[index];
     let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
     let own = ranking.iter().find(|r| r.effect == effect.name() && r.place == place);
-    let round = rounds
-        .iter()
-        .find(|round| round.trials.first().and_then(|t| t.added.last()).is_some_and(|b| b.candidate.is(&a.candidate)));
+    let round = round_of(rounds, effect.name(), &place);
     let mut rivals = Vec::new();
     if let Some(round) = round {
         let best = &round.trials[0];
         let of = Dispersion::of(best);
         let least = criterion(best, &of);
         let screened = |t: &Trial<'_>| -> Option<&Screened> {
-            let last = t.added.last()?;
-            round.screened.iter().find(|s| s.added.candidate.is(&last.candidate))
+            let newest = t.newest()?;
+            round.screened.iter().find(|s| s.added.candidate.is(newest))
         };
         let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &of)).collect();
         let shares = probabilities(&criteria);
         for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
-            let Some(b) = trial.added.last().filter(|_| value - least < 6.0) else { continue };
+            let Some(newest) = trial.newest().filter(|_| value - least < 6.0) else { continue };
             let likeness = match (screened(best), screened(trial)) {
                 (Some(x), Some(y)) => dot(&x.direction, &y.direction).abs(),
                 _ => f64::NAN,
             };
             rivals.push(Rival {
-                effect: b.candidate.effect.name().to_owned(),
-                place: b.candidate.place(),
+                effect: newest.effect.name().to_owned(),
+                place: newest.place(),
                 probability,
                 bic_behind: value - least,
                 likeness,
@@ -129,14 +126,22 @@ pub fn found(
     }
 }
 
+/// Whether the effect that was added last is this.
+fn is_newest(trial: &Trial<'_>, effect: &str, place: &str) -> bool {
+    trial.newest().is_some_and(|c| c.effect.name() == effect && c.place() == place)
+}
+
+/// The round in which an effect did best.
+fn round_of<'r, 'a>(rounds: &'r [Round<'a>], effect: &str, place: &str) -> Option<&'r Round<'a>> {
+    rounds.iter().find(|round| round.trials.first().is_some_and(|best| is_newest(best, effect, place)))
+}
+
 /// The experiment that would best tell an effect found from its nearest rival.
 pub fn next_experiment(rounds: &[Round<'_>], found: &[Found]) -> Option<String> {
-    rounds.iter().zip(found).find_map(|(round, found)| {
+    found.iter().find_map(|found| {
         let rival = found.indistinguishable.first()?;
-        let trial = |t: &&Trial<'_>| {
-            let last = t.added.last();
-            last.is_some_and(|a| a.candidate.effect.name() == rival.effect && a.candidate.place() == rival.place)
-        };
+        let round = round_of(rounds, &found.effect, &found.place)?;
+        let trial = |t: &&Trial<'_>| is_newest(t, &rival.effect, &rival.place);
         let names =
             [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
         separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])

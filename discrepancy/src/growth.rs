@@ -3,9 +3,10 @@
 
 use mops_core::{Mistake, Watch};
 
+use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
-use crate::round::Round;
+use crate::round::{Round, best_first};
 use crate::search::{Search, Trial};
 use crate::variant::Added;
 use crate::weigh::{Dispersion, by_chance, criterion};
@@ -17,7 +18,7 @@ const CLEARLY: f64 = 6.0;
 /// How often effects are held against their rivals at most while a model grows.
 const EXCHANGES: usize = 4;
 
-/// How often a model that has grown is settled at most.
+/// How often the effects of a model that has grown are exchanged at most as it is settled.
 const SETTLINGS: u32 = 3;
 
 /// A model that grew, and how.
@@ -89,7 +90,7 @@ impl<'a> Search<'a> {
         let Some(first) = growth.rounds.first() else { return Vec::new() };
         let mut ways = self.afresh(declared, first);
         ways.extend(first.trials.iter().cloned());
-        ways.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        best_first(&mut ways);
         let mut chosen: Vec<Trial<'a>> = Vec::new();
         for way in ways {
             let is = |a: &Added| way.added[0].candidate.is(&a.candidate);
@@ -167,7 +168,7 @@ impl<'a> Search<'a> {
     pub fn settle(&self, growth: Growth<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
         let mut growth = growth;
         growth.last = self.over_whole(&growth.last).unwrap_or(growth.last);
-        for settling in 0..SETTLINGS {
+        for settling in 0..=SETTLINGS {
             watch.stage("what can be left out", 0.8 + 0.03 * f64::from(settling));
             if let Some(pruned) = self.pruned(&growth.last, options.level) {
                 growth.step("left out", pruned);
@@ -183,7 +184,8 @@ impl<'a> Search<'a> {
             watch.stage("each effect against its rivals", 0.81 + 0.03 * f64::from(settling));
             let exchanged;
             (exchanged, growth.rounds) = self.exchanged(&growth.last);
-            let Some(better) = exchanged else { break };
+            // The last look is for the rivals of what is there.
+            let Some(better) = exchanged.filter(|_| settling < SETTLINGS) else { break };
             // Beside another effect, what was needed may be superfluous.
             growth.step("exchanged", better);
         }
@@ -260,11 +262,8 @@ impl<'a> Search<'a> {
         let of = Dispersion::of(last);
         trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
         for trial in trials {
-            let is_known = |t: &Trial<'a>| match (t.added.last(), trial.added.last()) {
-                (Some(a), Some(b)) => a.candidate.is(&b.candidate),
-                _ => false,
-            };
-            if !round.trials.iter().any(is_known) {
+            let newest = trial.newest();
+            if !round.trials.iter().filter_map(Trial::newest).any(|known| newest.is_some_and(|n| n.is(known))) {
                 round.trials.push(trial);
             }
         }
@@ -274,8 +273,8 @@ impl<'a> Search<'a> {
 
 /// How much better a model must be to take the place of another: what is simpler need not be better clearly.
 fn margin(trial: &Trial<'_>, than: &Trial<'_>) -> f64 {
-    let is_simpler = |a: &Added| than.added.iter().any(|b| a.candidate.is_simpler_than(&b.candidate));
-    if trial.added.last().is_some_and(is_simpler) { 0.0 } else { CLEARLY }
+    let is_simpler = |newest: &Candidate| than.added.iter().any(|b| newest.is_simpler_than(&b.candidate));
+    if trial.newest().is_some_and(is_simpler) { 0.0 } else { CLEARLY }
 }
 
 /// The model of the least criterion.

@@ -29,6 +29,11 @@ pub struct Round<'a> {
 /// Draws of white noise in place of residuals.
 const DRAWS: usize = 40;
 
+/// Sorts by [`Trial::score`].
+pub(crate) fn best_first(trials: &mut [Trial<'_>]) {
+    trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+}
+
 fn white(count: usize) -> Vec<Vec<f64>> {
     let mut random = stream(0, "white");
     (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
@@ -71,16 +76,15 @@ impl<'a> Search<'a> {
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
             let finalists = &trials[..trials.len().min(self.limits.finalists)];
-            let is_simpler = |t: &Trial<'a>, than: &Trial<'a>| match (t.added.last(), than.added.last()) {
-                (Some(a), Some(b)) => a.candidate.is_simpler_than(&b.candidate),
-                _ => false,
-            };
-            let simpler = trials[finalists.len()..].iter().filter(|t| finalists.iter().any(|f| is_simpler(t, f)));
+            let leading = || finalists.iter().filter_map(Trial::newest);
+            let is_simpler =
+                |t: &&Trial<'a>| t.newest().is_some_and(|own| leading().any(|than| own.is_simpler_than(than)));
+            let simpler = trials[finalists.len()..].iter().filter(is_simpler);
             let worth: Vec<&Trial<'a>> = finalists.iter().chain(simpler).collect();
             let wholes: Vec<Trial<'a>> = worth.par_iter().filter_map(|t| self.over_whole(t)).collect();
             if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
                 trials = wholes;
-                trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+                best_first(&mut trials);
             }
         }
         let directions = screened.iter().map(|s| s.directions).sum();
@@ -149,12 +153,12 @@ impl<'a> Search<'a> {
     /// Those that lead after a few steps go on, and the best of them to the end; best first.
     fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
         for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
-            trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+            best_first(&mut trials);
             let rest = trials.split_off(trials.len().min(count));
             trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
             trials.extend(rest);
         }
-        trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        best_first(&mut trials);
         trials
     }
 

@@ -306,6 +306,11 @@ impl<'a> Trial<'a> {
         Some(Self { fitted, ..self }.read())
     }
 
+    /// The effect that was added last; `None` in the declared model.
+    pub fn newest(&self) -> Option<&Candidate> {
+        self.added.last().map(|added| &added.candidate)
+    }
+
     /// Number of unknowns that its effects bring in.
     pub fn unknowns(&self) -> usize {
         self.fitted.point.globals.len() - self.fit.subject.globals.len()
