@@ -16,6 +16,7 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
         "sensor-dead-zone" if strengths.iter().any(|(name, value)| name == "shifts" && *value == 0.0) => {
             vec!["sensor-gap"]
         }
+        "overflow" if strengths.iter().any(|(name, value)| name == "share" && *value > 0.0) => vec!["spill-over"],
         same => vec![same],
     }
 }
@@ -53,7 +54,8 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "wind-gust" => vec![("a", of("amplitude")), ("from", of("from")), ("length", of("length"))],
         "mass-loss" => vec![("r", of("rate"))],
         "leak" => vec![("k", of("flow")), ("hole", of("height"))],
-        "overflow" if of("share") == 0.0 => vec![("level", of("level"))],
+        "overflow" if of("share") > 0.0 => vec![("level", of("level")), ("share", of("share"))],
+        "overflow" => vec![("level", of("level"))],
         "linear-loss" => vec![("k", of("flow"))],
         "radiation-loss" => vec![("k", of("coefficient"))],
         "hidden-thermal-mass" => vec![("k", of("coupling")), ("tau", of("time"))],
