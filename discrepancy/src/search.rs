@@ -91,19 +91,20 @@ impl<'a> Search<'a> {
 
     /// The trial over whole records; `None` where that cannot be simulated.
     pub fn over_whole(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
-        let whole = self.stretched(trial, 1);
-        let left = trial.fitted.normalised();
-        let followed = |whole: &Trial<'a>| whole.fitted.normalised() < ASTRAY * left;
-        if left > WORTH_STRETCHING || whole.as_ref().is_some_and(followed) {
-            return whole;
+        let enough = ASTRAY * trial.fitted.normalised();
+        let mut best = self.stretched(trial, 1);
+        if trial.fitted.normalised() > WORTH_STRETCHING {
+            return best;
         }
-        if trial.windows <= 2 {
-            return whole.map(|whole| self.begun_anew(whole, ASTRAY * left));
+        let mut part = Some(trial.clone());
+        while best.as_ref().is_none_or(|best| best.fitted.normalised() >= enough) {
+            // What fits windows may lie too far from what fits whole records for one step.
+            part = part.filter(|part| part.windows > 2).and_then(|part| self.stretched(&part, part.windows / 2));
+            let Some(part) = &part else { return best.map(|best| self.begun_anew(best, enough)) };
+            let found = best.into_iter().chain(self.stretched(part, 1));
+            best = found.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
         }
-        // What fits windows may lie too far from what fits whole records for one step.
-        let by_half = self.stretched(trial, trial.windows / 2).and_then(|half| self.over_whole(&half));
-        let found = whole.into_iter().chain(by_half);
-        found.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))
+        best
     }
 
     /// The trial over whole records with other start values in the experiments that it leaves more than `enough` of.
@@ -211,7 +212,16 @@ impl<'a> Search<'a> {
                 locals.clone_from(&fitted.point.locals[0]);
             }
         }
-        self.trial(&[], tuners, locals, 1, 40)
+        let whole = self.trial(&[], tuners, locals, 1, 40);
+        let enough = ASTRAY * calibrated.normalised();
+        if whole.as_ref().is_some_and(|whole| whole.fitted.normalised() <= enough) {
+            return whole;
+        }
+        // What fits the calibration data may be out of step in other records.
+        let windows = self.trial(&[], tuners, base::first_locals(&self.pieces(8)), 8, 40);
+        let stretched = |part: Trial<'a>, windows| self.stretched(&part, windows);
+        let anew = windows.and_then(|windows| [4, 2, 1].into_iter().try_fold(windows, stretched));
+        whole.into_iter().chain(anew).min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))
     }
 
     /// Fits a variant to all data that may choose.
