@@ -154,7 +154,7 @@ pub fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
     let one = |s: &Screened| {
         let candidate = &s.added.candidate;
         let strength = &candidate.effect.strengths()[0];
-        let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added));
+        let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added), &[]);
         let parameter = &mops_core::Model::interface(model.model.as_ref()).parameters[model.first[0]];
         Some(Noticeable {
             effect: candidate.effect.name().to_owned(),

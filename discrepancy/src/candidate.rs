@@ -100,6 +100,12 @@ pub fn candidates(
     all
 }
 
+/// Steps up to the largest value that are looked for at most: what is finer is as good as noise.
+const MOST_STEPS: u32 = 24;
+
+/// Sizes tried from one number of steps to the next.
+const PER_STEP: u32 = 4;
+
 /// What the trajectories show at a place: typical sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
@@ -147,10 +153,23 @@ impl Sizes {
                 let highest = (0.5 * std::f64::consts::PI / self.sample).min(120.0 * step);
                 (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
             }
+            Trials::Steps => {
+                let numbers = 1..=PER_STEP * (MOST_STEPS - 1);
+                numbers.map(|n| self.largest() / (1.0 + f64::from(n - 1) / f64::from(PER_STEP))).collect()
+            }
             Trials::Moments(shares) => shares.iter().map(|s| s * self.record).collect(),
         };
         let inside = |v: &f64| v.is_finite() && *v >= bounds[0] && *v <= bounds[1];
         values.into_iter().filter(inside).collect()
+    }
+
+    fn largest(&self) -> f64 {
+        self.range[0].abs().max(self.range[1].abs())
+    }
+
+    /// How far the next smaller size of steps that is tried is from one.
+    pub fn to_next_step(&self, size: f64) -> f64 {
+        size * size / (f64::from(PER_STEP) * self.largest())
     }
 
     /// All combinations of the values tried of an effect's strengths.

@@ -22,9 +22,16 @@ pub struct Global {
     pub log: bool,
     /// Typical size of a change.
     pub scale: f64,
+    /// Whether it is a size of steps, of which slopes tell nothing.
+    pub steps: bool,
 }
 
 impl Global {
+    /// Whether it is looked for by a search of its own, and not by slopes.
+    pub fn is_stepped(&self) -> bool {
+        self.steps && !self.is_pinned()
+    }
+
     /// Whether it has one value only.
     pub fn is_pinned(&self) -> bool {
         self.bounds[0] == self.bounds[1]

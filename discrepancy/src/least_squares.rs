@@ -18,7 +18,8 @@ pub struct Normal {
     chi2: f64,
     residuals: Vec<Vec<f64>>,
     matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
+    /// Half the gradient of the sum of squares.
+    pub(crate) gradient: DVector<f64>,
 }
 
 impl Fit<'_> {
@@ -60,7 +61,8 @@ impl Fit<'_> {
         Some(self.equations(point, all?))
     }
 
-    fn equations(&self, point: &Point, all: Vec<Residuals>) -> Normal {
+    /// The same for residuals and slopes that are known.
+    pub(crate) fn equations(&self, point: &Point, all: Vec<Residuals>) -> Normal {
         let (n, g) = (self.unknowns(), self.globals.len());
         let mut matrix = DMatrix::zeros(n, n);
         let mut gradient = DVector::zeros(n);
@@ -109,7 +111,7 @@ impl Fit<'_> {
     }
 
     /// The point moved by a step in the coordinates of the search, within bounds.
-    fn moved(&self, point: &Point, step: &DVector<f64>) -> Point {
+    pub(crate) fn moved(&self, point: &Point, step: &DVector<f64>) -> Point {
         let mut moved = point.clone();
         for (k, global) in self.globals.iter().enumerate() {
             let value = point.globals[k];
@@ -143,6 +145,13 @@ impl Fit<'_> {
         held
     }
 
+    /// The same with what slopes tell nothing of.
+    pub(crate) fn held_by_slopes(&self, point: &Point, gradient: &DVector<f64>) -> Vec<bool> {
+        let mut held = self.held(point, gradient);
+        self.globals.iter().zip(&mut held).for_each(|(global, held)| *held |= global.is_stepped());
+        held
+    }
+
     /// Levenberg and Marquardt's method within bounds, from a point; `None` where that cannot be simulated.
     ///
     /// Source: J. More, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630
@@ -165,11 +174,17 @@ impl Fit<'_> {
         Some(self.descend(from.point.clone(), normal, iterations))
     }
 
-    fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
+    pub(crate) fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
         fitted.normal.clone().or_else(|| self.normal(&fitted.point).map(Arc::new))
     }
 
     fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
+        let fitted = self.levenberg_marquardt(start, normal, iterations);
+        self.with_steps(fitted, iterations)
+    }
+
+    /// The method from a point with its normal equations; sizes of steps stay as they are.
+    pub(crate) fn levenberg_marquardt(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
         let count = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
         let residuals = normal.residuals.clone();
         let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: None };
@@ -177,7 +192,7 @@ impl Fit<'_> {
         let mut damping = 1e-3;
         let mut total = fitted.chi2 + self.unexpected(&fitted.point);
         for iteration in 1..=iterations {
-            let held = self.held(&fitted.point, &normal.gradient);
+            let held = self.held_by_slopes(&fitted.point, &normal.gradient);
             let mut improved = None;
             for _ in 0..8 {
                 let Some(step) = damped_step(&normal, &held, damping) else {
@@ -246,7 +261,7 @@ fn far(local: &Local, value: f64) -> f64 {
 }
 
 /// `-(M + damping diag M)^-1 g` over the unknowns that are not held.
-fn damped_step(normal: &Normal, held: &[bool], damping: f64) -> Option<DVector<f64>> {
+pub(crate) fn damped_step(normal: &Normal, held: &[bool], damping: f64) -> Option<DVector<f64>> {
     let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k] && normal.matrix[(k, k)] > 0.0).collect();
     let mut step = DVector::zeros(held.len());
     if free.is_empty() {
@@ -286,6 +301,7 @@ pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]))
 }
 
-fn sum_of_squares(all: &[Vec<f64>]) -> f64 {
+/// Sum of the squares of all residuals.
+pub(crate) fn sum_of_squares(all: &[Vec<f64>]) -> f64 {
     all.iter().map(|r| r.iter().map(|r| r * r).sum::<f64>()).sum()
 }

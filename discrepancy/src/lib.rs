@@ -27,6 +27,7 @@ mod screen;
 mod search;
 mod short_term;
 mod stability;
+mod step_search;
 mod stopgap;
 mod subject;
 #[cfg(test)]

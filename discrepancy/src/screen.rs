@@ -30,7 +30,7 @@ pub struct Scene {
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
 const NOTICED: f64 = 21.0;
 
-/// Other values of shapes that no fit moves are fitted too: so many, of which the gain is at least this share of the best.
+/// Other values of shapes that no fit moves, or hardly, are fitted too: so many, of which the gain is at least this share of the best.
 const OTHERS: usize = 2;
 const NEAR: f64 = 0.3;
 
@@ -236,7 +236,8 @@ fn best_of(
     let effect = candidate.effect.as_ref();
     let own: Vec<usize> =
         (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
-    let fixed: Vec<usize> = (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].fixed).collect();
+    let is_fixed = |&k: &usize| effect.strengths()[k].fixed || effect.strengths()[k].trials == Trials::Steps;
+    let fixed: Vec<usize> = (0..effect.strengths().len()).filter(is_fixed).collect();
     let mut found: Vec<Screened> = Vec::new();
     let mut by_chance = vec![0.0_f64; draws.len()];
     let combinations = sizes.combinations(effect);
@@ -268,7 +269,7 @@ fn best_of(
             *best = best.max(gain);
         }
         let (along, factor, gain) = left.against(&scene.residuals, first, group[0][0]);
-        // The best of each shape that no fit moves.
+        // The best of each shape that no fit moves, or hardly.
         let same = |s: &Screened| fixed.iter().all(|&k| s.added.strengths[k] == group[0][k]);
         let before = found.iter().position(same);
         if before.is_some_and(|k| found[k].gain >= gain) {

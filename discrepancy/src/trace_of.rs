@@ -301,6 +301,13 @@ impl<'a> View<'a> {
         let s = &self.piece.series[series];
         let y = &self.along.predicted[series];
         let interpolate = |t: f64| {
+            if let ([t0, t1, t2, ..], [y0, y1, y2, ..]) = (s.times.as_slice(), y.as_slice())
+                && t < *t0
+            {
+                // The parabola through the first samples.
+                let (first, second) = ((y1 - y0) / (t1 - t0), (y2 - y1) / (t2 - t1));
+                return y0 + (t - t0) * (first + (t - t1) * (second - first) / (t2 - t0));
+            }
             let k = s.times.partition_point(|&x| x <= t).clamp(1, s.times.len() - 1);
             let share = ((t - s.times[k - 1]) / (s.times[k] - s.times[k - 1])).clamp(0.0, 1.0);
             y[k - 1] + share * (y[k] - y[k - 1])

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Model, Scope, Strength};
+use mops_core::{Model, Scope, Strength, Trials};
 use mops_models::WithEffects;
 use nalgebra::DMatrix;
 
@@ -38,17 +38,20 @@ pub struct Variant {
     pub first: Vec<usize>,
 }
 
+/// Steps of a simulation beyond which a candidate is too stiff to be worth it: so many for each sample, and a few more.
+const STEPS_PER_SAMPLE: usize = 10;
+const FEW_STEPS: usize = 1000;
+
 impl Variant {
-    /// The declared model with these effects.
+    /// The declared model with these effects, to be simulated over pieces of experiments.
     ///
     /// # Panics
     /// If an effect does not fit its place: candidates do.
-    pub fn new(subject: &Subject, added: &[Added]) -> Self {
+    pub fn new(subject: &Subject, added: &[Added], pieces: &[Piece]) -> Self {
         let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
         let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
-        let samples = |m: &crate::subject::Measurement| m.series.iter().map(|s| s.times.len()).max().unwrap_or(0);
-        let longest = subject.measurements.iter().map(samples).max().unwrap_or(0);
-        let model = model.with_step_limit(4000 + 6 * longest);
+        let longest = pieces.iter().flat_map(|piece| &piece.series).map(|s| s.times.len()).max().unwrap_or(0);
+        let model = model.with_step_limit(FEW_STEPS + STEPS_PER_SAMPLE * longest);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();
         for a in added {
@@ -96,7 +99,7 @@ pub fn problem<'a>(
     held: &[usize],
     simulations: &'a AtomicUsize,
 ) -> (Fit<'a>, Point, Variant) {
-    let variant = Variant::new(subject, added);
+    let variant = Variant::new(subject, added, &pieces);
     let mut all = globals(subject);
     for &k in held {
         all[k].bounds = [tuners[k]; 2];
@@ -121,7 +124,10 @@ pub fn problem<'a>(
                 }
             } else {
                 let log = is_log(strength, value);
-                all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale });
+                let steps = strength.trials == Trials::Steps;
+                // Half way to the next value that was tried.
+                let scale = if steps { 0.5 * a.sizes.to_next_step(value) } else { scale };
+                all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });
                 values.push(value);
             }
         }

@@ -168,6 +168,9 @@ pub enum Trials {
     Plain(&'static [f64]),
     /// Frequencies in rad/s that the record can resolve, from one period in the record on.
     Frequencies,
+    /// The largest value over numbers of steps from one on, so close together that at most every eighth sample of a neighbour is
+    /// a step off.
+    Steps,
     /// Times within the record, at these shares of its length.
     Moments(&'static [f64]),
 }

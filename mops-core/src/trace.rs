@@ -75,12 +75,18 @@ impl Trace {
         &self.knots
     }
 
-    /// This trace, seen later by `time` (s, not negative), up to the same end; before it comes, its first value.
+    /// This trace, seen later by `time` (s, not negative), up to the same end; what is seen of the time before its start goes on
+    /// from there with the slope and the curvature of the start.
     #[must_use]
     pub fn delayed(&self, time: f64) -> Self {
         let (start, end) = (self.start(), self.end());
         let mut late = Self::starting_at(start, self.segments.len() + 1);
-        late.push_polynomial((start + time).min(end), [self.first(), 0.0, 0.0, 0.0, 0.0]);
+        if let (Some(c), Some(knot)) = (self.segments.first(), self.knots.get(1)) {
+            let (h, length) = (knot - start, (start + time).min(end) - start);
+            let (slope, bend) = (c[1] / h, c[2] / (h * h));
+            let before = [c[0] - slope * time + bend * time * time, length * (slope - 2.0 * bend * time)];
+            late.push_polynomial((start + time).min(end), [before[0], before[1], bend * length * length, 0.0, 0.0]);
+        }
         for (segment, c) in self.segments.iter().enumerate() {
             let (from, to) = (self.knots[segment] + time, self.knots[segment + 1] + time);
             if from >= end {
@@ -366,6 +372,21 @@ mod tests {
         for i in 0..=20 {
             let t = 0.1 * f64::from(i);
             assert!((trace.at(t) - f(t)).abs() < 1e-12, "{t}");
+        }
+    }
+
+    #[test]
+    fn what_comes_late_was_on_its_way_before_the_start() {
+        let parabola = |t: f64| 1.0 - 2.0 * t + 3.0 * t * t;
+        let mut trace = Trace::starting_at(0.0, 2);
+        trace.push_polynomial(0.4, [1.0, -0.8, 3.0 * 0.16, 0.0, 0.0]);
+        trace.push_polynomial(1.0, [parabola(0.4), 0.4 * 0.6, 3.0 * 0.36, 0.0, 0.0]);
+        for delay in [0.0, 0.3, 0.7, 5.0] {
+            let late = trace.delayed(delay);
+            assert_eq!((late.start(), late.end()), (0.0, 1.0));
+            for t in [0.0, 0.1, 0.35, 0.72, 1.0] {
+                assert!((late.at(t) - parabola(t - delay)).abs() < 1e-12 * (1.0 + delay * delay), "{delay} {t}");
+            }
         }
     }
 

@@ -54,7 +54,7 @@ fn a_fall_of_the_sum_of_squares_is_worth_less_where_residuals_are_alike() {
             better.chi2 -= 40.0;
             let now = criterion(trial, &dispersion);
             let fitted = better;
-            let (added, variant) = (Vec::new(), crate::variant::Variant::new(trial.fit.subject, &[]));
+            let (added, variant) = (Vec::new(), crate::variant::Variant::new(trial.fit.subject, &[], &[]));
             let fit = crate::fit::Fit {
                 subject: trial.fit.subject,
                 model: trial.fit.model.clone(),

@@ -61,6 +61,7 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
                 sizes,
                 expected: None,
             }],
+            &fit.pieces,
         );
         let mut parameters = TRUTH.to_vec();
         parameters.extend(&strengths);

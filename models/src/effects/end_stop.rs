@@ -1,9 +1,9 @@
-//! Elastic stops at both ends.
+//! Stops at both ends: springs, with dampers that cannot pull.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{ANY, above};
+use super::terms::{ANY, NOT_NEGATIVE, above};
 
 /// `end-stop`.
 pub struct EndStop;
@@ -13,13 +13,14 @@ struct AtStrengths<S> {
     k: S,
     low: S,
     high: S,
+    tau: S,
 }
 
 impl Definition for EndStop {
     const NAME: &'static str = "end-stop";
-    const ABOUT: &'static str = "Elastic stops that push back beyond a lower and an upper position.";
-    const FORMULA: &'static str = "-k max(q - high, 0) + k max(low - q, 0)";
-    const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
+    const ABOUT: &'static str = "Damped stops that push back, and never pull, beyond a lower and an upper position.";
+    const FORMULA: &'static str = "-k max(q - high + tau v, 0) where q > high, k max(low - q - tau v, 0) where q < low";
+    const SOURCE: &'static str = "B. Brogliato, Nonsmooth Mechanics, 3rd edition (Springer 2016), chapter 2";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
@@ -38,15 +39,29 @@ impl Definition for EndStop {
             ANY,
             Trials::Within(&[0.8, 0.95, 1.0]),
         ),
+        Strength::shape(
+            "tau",
+            "damping of the stops over their stiffness",
+            Dimension::TIME,
+            NOT_NEGATIVE,
+            Trials::Plain(&[0.0]),
+        ),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { k: s[0], low: s[1], high: s[2] })
+        Box::new(AtStrengths { k: s[0], low: s[1], high: s[2], tau: s[3] })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        self.k * (above(self.low - at.q) - above(at.q - self.high))
+        let (below, beyond) = (self.low - at.q, at.q - self.high);
+        if beyond.value() > 0.0 {
+            -self.k * above(beyond + self.tau * at.v)
+        } else if below.value() > 0.0 {
+            self.k * above(below - self.tau * at.v)
+        } else {
+            S::from(0.0)
+        }
     }
 }

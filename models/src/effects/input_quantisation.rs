@@ -3,6 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
+use super::terms::quantised;
 
 /// `input-quantisation`.
 pub struct InputQuantisation;
@@ -19,8 +20,7 @@ impl Definition for InputQuantisation {
     const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("step", "step", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.1, 0.2, 0.5]))];
+    const STRENGTHS: &'static [Strength] = &[Strength::positive("step", "step", Dimension::VALUE).tried(Trials::Steps)];
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
@@ -30,6 +30,6 @@ impl Definition for InputQuantisation {
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        if self.step.value() > 0.0 { self.step * (at.value.value() / self.step.value()).round() } else { at.value }
+        quantised(at.value, self.step)
     }
 }

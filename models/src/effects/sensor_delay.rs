@@ -15,7 +15,7 @@ struct AtStrengths<S> {
 impl Definition for SensorDelay {
     const NAME: &'static str = "sensor-delay";
     const ABOUT: &'static str = "What is measured comes late by a constant time.";
-    const FORMULA: &'static str = "y(t - delay)";
+    const FORMULA: &'static str = "y(t - delay); before the start, y goes on with its first slope and curvature";
     const SOURCE: &'static str =
         "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
     const CLASS: EffectClass = EffectClass::DelayLike;

@@ -10,10 +10,17 @@ pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 /// Bounds of a shape that is not negative.
 pub(super) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
-/// The phase of a sine, rad, from quarter to quarter of a turn.
+/// The phase of a sine, rad, tried from quarter to quarter of a turn; it may go a turn beyond, so that no fit stops where the
+/// first turn ends.
 pub(super) const fn phase() -> Strength {
     let quarters = Trials::Plain(&[-FRAC_PI_2, 0.0, FRAC_PI_2, PI]);
-    Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-PI, PI], quarters)
+    Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
+}
+
+/// `x` in steps; a neutral 0 leaves it as it is. Its slope by `x` is that of the stairs seen from afar, 1: on each stair it would
+/// be 0, and tell nothing.
+pub(super) fn quantised<S: Scalar>(x: S, step: S) -> S {
+    if step.value() > 0.0 { x + (step * (x.value() / step.value()).round() - x.value()) } else { x }
 }
 
 /// -1, 0 or 1.

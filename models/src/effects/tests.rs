@@ -119,7 +119,7 @@ fn first_trials_are_few_and_allowed() {
                     count *= values.len();
                 }
                 Trials::Scaled(values) | Trials::Within(values) => count *= values.len(),
-                Trials::Frequencies | Trials::Moments(_) => {}
+                Trials::Frequencies | Trials::Steps | Trials::Moments(_) => {}
             }
         }
         assert!(count <= 44, "{}: {count}", effect.name());

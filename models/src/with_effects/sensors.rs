@@ -14,9 +14,9 @@ impl<S: Opening> Driven<'_, S> {
             let Some(index) = signals.iter().position(|(s, _)| *s == signal) else { continue };
             if let Some(delay) = actor.acting.delay() {
                 let time = delay.value();
-                let rate = recording.response.traces[index].1.derivative().delayed(time);
                 let value = &mut recording.response.traces[index].1;
                 *value = value.delayed(time);
+                let rate = value.derivative();
                 for (tangent, &late) in recording.tangents.iter_mut().zip(delay.tangents()) {
                     let trace = &mut tangent.traces[index].1;
                     *trace = trace.delayed(time).moved(&rate, -late);

@@ -1,0 +1,71 @@
+//! Search over the size of steps, which no slope tells: a value that crosses to the next step jumps.
+
+use crate::fit::{Fit, Fitted, Residuals, Slopes};
+use crate::least_squares::{damped_step, sum_of_squares};
+
+/// How often the stride is halved at most with which a size is looked for, and how often it is looked for on both sides.
+const HALVINGS: i32 = 8;
+const LOOKS: usize = 24;
+
+/// How often sizes and the other unknowns take turns in a fit of at least so many iterations; once in a shorter one.
+const TURNS: usize = 4;
+const LONG: usize = 10;
+
+impl Fit<'_> {
+    /// A fit in which sizes of steps and the other unknowns have taken turns; `iterations` for the others each time.
+    pub(crate) fn with_steps(&self, fitted: Fitted, iterations: usize) -> Fitted {
+        let mut fitted = fitted;
+        let stepped: Vec<usize> = (0..self.globals.len()).filter(|&k| self.globals[k].is_stepped()).collect();
+        if stepped.is_empty() {
+            return fitted;
+        }
+        for _ in 0..if iterations < LONG { 1 } else { TURNS } {
+            let before = fitted.chi2;
+            for &k in &stepped {
+                fitted = self.stepped(&fitted, k).unwrap_or(fitted);
+            }
+            if fitted.chi2 >= before * (1.0 - 1e-3) {
+                break;
+            }
+            let Some(normal) = self.normal_at(&fitted) else { break };
+            fitted = self.levenberg_marquardt(fitted.point, normal, iterations);
+        }
+        fitted
+    }
+
+    /// A fit with the best size of steps that a compass search finds, the others following to first order: they make up for
+    /// most of a wrong size. `None` where the slopes cannot be had.
+    ///
+    /// The share of samples that are a step off, and with it the sum of squares, grows in proportion to the distance from the
+    /// true size. Source of the method: T. G. Kolda, R. M. Lewis, V. Torczon, Optimization by direct search, SIAM Review 45
+    /// (2003) 385.
+    fn stepped(&self, fitted: &Fitted, k: usize) -> Option<Fitted> {
+        let slopes = self.looks(&fitted.point, Slopes::Free)?;
+        let global = &self.globals[k];
+        let mut best = fitted.clone();
+        let mut halvings = 0;
+        for _ in 0..LOOKS {
+            if halvings > HALVINGS {
+                break;
+            }
+            let stride = global.scale * 0.5_f64.powi(halvings);
+            let beside = |by: f64| {
+                let mut point = best.point.clone();
+                point.globals[k] = (point.globals[k] + by).clamp(global.bounds[0], global.bounds[1]);
+                let residuals = self.all(&point)?.into_iter().zip(&slopes);
+                let all = residuals.map(|(r, slopes)| Residuals { r, j: slopes.j.clone() }).collect();
+                let normal = self.equations(&point, all);
+                let step = damped_step(&normal, &self.held_by_slopes(&point, &normal.gradient), 1e-3)?;
+                let point = self.moved(&point, &step);
+                let residuals = self.all(&point)?;
+                Some(Fitted { point, chi2: sum_of_squares(&residuals), residuals, normal: None, count: best.count })
+            };
+            let better = |fitted: &Fitted| fitted.chi2 < best.chi2;
+            match [stride, -stride].into_iter().find_map(|by| beside(by).filter(better)) {
+                Some(moved) => best = moved,
+                None => halvings += 1,
+            }
+        }
+        Some(best)
+    }
+}
