@@ -64,8 +64,13 @@ impl<'a> Search<'a> {
         }
         // Where the best first step led nowhere, another may lead on.
         watch.stage("other ways, as something is left", 0.76);
-        let further: Vec<Trial<'a>> =
-            self.other_ways(declared, &growth).iter().filter_map(|way| self.further(way)).collect();
+        let ways = self.other_ways(declared, &growth);
+        let ways: Vec<Trial<'a>> = ways.iter().map(|way| self.over_or_in_windows(way)).collect();
+        let leads = |way: &&Trial<'a>| way.windows == 1 && way.fitted.normalised() <= UNEXPLAINED;
+        let mut further: Vec<Trial<'a>> = ways.iter().filter(leads).cloned().collect();
+        if further.is_empty() {
+            further = ways.iter().filter_map(|way| self.further(way)).collect();
+        }
         let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
         let Some(way) = way else { return Ok(growth) };
         growth.step("begun otherwise", way.clone());
@@ -79,8 +84,7 @@ impl<'a> Search<'a> {
 
     /// A model with the effect that helps it most, over whole records.
     fn further(&self, way: &Trial<'a>) -> Option<Trial<'a>> {
-        let round = self.round(&self.over_or_in_windows(way))?;
-        self.whole(round.trials.first()?)
+        self.whole(self.round(way)?.trials.first()?)
     }
 
     /// Single effects to begin with again, best first: runners-up of the first round, and what a fit that begins where the
