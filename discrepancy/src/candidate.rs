@@ -168,7 +168,7 @@ impl Sizes {
     }
 
     /// How far the next smaller size of steps that is tried is from one.
-    pub fn to_next_step(&self, size: f64) -> f64 {
+    pub fn gap_to_next_size(&self, size: f64) -> f64 {
         size * size / (f64::from(PER_STEP) * self.largest())
     }
 

@@ -126,7 +126,7 @@ pub fn problem<'a>(
                 let log = is_log(strength, value);
                 let steps = strength.trials == Trials::Steps;
                 // Half way to the next value that was tried.
-                let scale = if steps { 0.5 * a.sizes.to_next_step(value) } else { scale };
+                let scale = if steps { 0.5 * a.sizes.gap_to_next_size(value) } else { scale };
                 all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });
                 values.push(value);
             }
