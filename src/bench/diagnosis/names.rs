@@ -13,17 +13,20 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
         "constant-heat-gain" => vec!["constant-force"],
         // The same formula, for angles and for lengths.
         "cogging" => vec!["cogging", "position-ripple"],
-        "sensor-dead-zone" if strengths.iter().any(|(name, value)| name == "shifts" && *value == 0.0) => {
-            vec!["sensor-gap"]
-        }
-        "overflow" if strengths.iter().any(|(name, value)| name == "share" && *value > 0.0) => vec!["spill-over"],
+        "sensor-dead-zone" if told(strengths, "shifts") == 0.0 => vec!["sensor-gap"],
+        "overflow" if told(strengths, "share") > 0.0 => vec!["spill-over"],
         same => vec![same],
     }
 }
 
+/// A strength by its name in the test bed; not a number where it has none.
+fn told(strengths: &[(String, f64)], wanted: &str) -> f64 {
+    strengths.iter().find(|(name, _)| name == wanted).map_or(f64::NAN, |(_, value)| *value)
+}
+
 /// True strengths under the names of the catalogue, where both have the same meaning.
 pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
-    let of = |name: &str| effect.strengths.iter().find(|(n, _)| n == name).map_or(f64::NAN, |(_, value)| *value);
+    let of = |name: &str| told(&effect.strengths, name);
     match effect.class.as_str() {
         "coulomb-friction" => vec![("c", of("torque"))],
         "stribeck-friction" => {
@@ -86,8 +89,8 @@ mod tests {
     fn every_effect_and_every_strength_of_the_test_bed_is_in_the_catalogue() {
         let catalogue = mops_models::effects::effects();
         for effect in mops_testbed::effects() {
-            for shifts in [0.0, 1.0] {
-                let told = [("shifts".to_owned(), shifts)];
+            for value in [0.0, 1.0] {
+                let told = ["shifts", "share"].map(|name| (name.to_owned(), value));
                 for name in names(effect.name, &told) {
                     let known = catalogue.iter().find(|e| e.name() == name);
                     let known = known.unwrap_or_else(|| panic!("no effect `{name}`"));
@@ -96,7 +99,7 @@ mod tests {
                         formula: String::new(),
                         place: "actuator:u".into(),
                         accepted_places: Vec::new(),
-                        strengths: vec![("share".into(), 0.0)],
+                        strengths: told.to_vec(),
                     };
                     for (strength, _) in strengths(&truth) {
                         assert!(known.strengths().iter().any(|s| s.name == strength), "{name} has no `{strength}`");
