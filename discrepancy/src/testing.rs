@@ -26,6 +26,16 @@ pub struct Record {
     pub signals: Vec<(&'static str, Vec<f64>, f64)>,
 }
 
+impl Record {
+    /// A record without inputs of the first of two states at evenly spaced times, with white noise.
+    pub fn of_first(signal: &'static str, states: &[[f64; 2]], step: f64, noise: f64, label: &str) -> Self {
+        #[allow(clippy::cast_precision_loss)]
+        let times = (0..states.len()).map(|k| k as f64 * step).collect();
+        let values = states.iter().zip(white(label, noise, states.len())).map(|(s, e)| s[0] + e).collect();
+        Self { inputs: Vec::new(), times, signals: vec![(signal, values, noise)] }
+    }
+}
+
 /// A subject with every parameter of the model unknown, those at the end named in `starts` for each record.
 pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Record>) -> Subject {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");

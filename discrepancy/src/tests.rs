@@ -10,4 +10,5 @@ mod sessions;
 mod signs;
 mod stability;
 mod starts;
+mod steps;
 mod tangents;

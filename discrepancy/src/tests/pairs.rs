@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mops_core::{Effect, Role};
 use mops_models::effects::effects;
 
-use crate::testing::{Record, integrated, study, subject, white};
+use crate::testing::{Record, integrated, study, subject};
 use crate::{Diagnosis, Options, diagnose};
 
 /// A pendulum that is declared with viscous friction, and has dry friction and the air instead.
@@ -21,13 +21,11 @@ const NOISE: f64 = 5e-4;
 
 fn swing(label: &str, start: f64) -> Record {
     const STEP: f64 = 0.02;
-    const COUNT: u32 = 400;
+    const COUNT: usize = 400;
     // The motion ends before the friction holds the pendulum for good.
     let rates = |_: f64, x: &[f64; 2]| [x[1], -K * x[0].sin() - DRY * x[1].signum() - AIR * x[1] * x[1].abs()];
-    let states = integrated(rates, [start, 0.0], STEP, COUNT as usize);
-    let times = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
-    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
-    Record { inputs: Vec::new(), times, signals: vec![("q", values, NOISE)] }
+    let states = integrated(rates, [start, 0.0], STEP, COUNT);
+    Record::of_first("q", &states, STEP, NOISE, label)
 }
 
 fn named(names: &[&str]) -> Vec<Arc<dyn Effect>> {

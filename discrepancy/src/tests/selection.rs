@@ -10,7 +10,7 @@ use crate::base;
 use crate::diagnosis::StrengthValue;
 use crate::search::{Limits, Search};
 use crate::subject::Subject;
-use crate::testing::{Record, integrated, study, subject, white};
+use crate::testing::{Record, integrated, study, subject};
 use crate::weigh::{Dispersion, criterion, probabilities};
 use crate::{Diagnosis, Options, diagnose};
 
@@ -27,9 +27,7 @@ fn slide(label: &str, speed: f64, duration: f64) -> Record {
     const COUNT: u32 = 120;
     let step = duration / f64::from(COUNT - 1);
     let states = integrated(|_, x: &[f64; 2]| [x[1], -DRAG * x[1] * x[1].abs()], [0.0, speed], step, COUNT as usize);
-    let times = (0..COUNT).map(|k| f64::from(k) * step).collect();
-    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
-    Record { inputs: Vec::new(), times, signals: vec![("x", values, NOISE)] }
+    Record::of_first("x", &states, step, NOISE, label)
 }
 
 /// Slow slides to calibrate with; a fast one with a role of its own, and one to validate with that is moved by `shift`.

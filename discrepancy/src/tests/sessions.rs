@@ -2,7 +2,7 @@
 
 use mops_core::Role;
 
-use crate::testing::{Record, integrated, study, subject, white};
+use crate::testing::{Record, integrated, study, subject};
 use crate::{Options, diagnose};
 
 const PENDULUM: &str = r#"
@@ -14,11 +14,9 @@ const NOISE: f64 = 2e-3;
 
 fn swing(label: &str, k: f64, b: f64) -> Record {
     const STEP: f64 = 0.02;
-    const COUNT: u32 = 800;
-    let states = integrated(|_, x: &[f64; 2]| [x[1], -k * x[0].sin() - b * x[1]], [1.0, 0.0], STEP, COUNT as usize);
-    let times = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
-    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
-    Record { inputs: Vec::new(), times, signals: vec![("q", values, NOISE)] }
+    const COUNT: usize = 800;
+    let states = integrated(|_, x: &[f64; 2]| [x[1], -k * x[0].sin() - b * x[1]], [1.0, 0.0], STEP, COUNT);
+    Record::of_first("q", &states, STEP, NOISE, label)
 }
 
 #[test]

@@ -8,7 +8,7 @@ use mops_models::effects::effects;
 
 use crate::search::{Limits, Search};
 use crate::stability::{Stability, stability};
-use crate::testing::{Record, integrated, subject, white};
+use crate::testing::{Record, integrated, subject};
 
 const OSCILLATOR: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -21,13 +21,11 @@ const BOTH: &[&str] = &["coulomb-friction", "quadratic-stiffness"];
 /// A free oscillation with dry friction and a spring that is stiffer to one side.
 fn record(label: &str, dry: f64, bent: f64) -> Record {
     const STEP: f64 = 0.02;
-    const COUNT: u32 = 300;
+    const COUNT: usize = 300;
     let force = |x: &[f64; 2]| -20.0 * x[0] - bent * x[0] * x[0] - 0.2 * x[1] - dry * x[1].signum();
     let rates = |_: f64, x: &[f64; 2]| [x[1], force(x)];
-    let states = integrated(rates, [1.0, 0.0], STEP, COUNT as usize);
-    let times = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
-    let values = states.iter().zip(white(label, NOISE, states.len())).map(|(s, e)| s[0] + e).collect();
-    Record { inputs: Vec::new(), times, signals: vec![("x", values, NOISE)] }
+    let states = integrated(rates, [1.0, 0.0], STEP, COUNT);
+    Record::of_first("x", &states, STEP, NOISE, label)
 }
 
 /// The best effect of a first round, and its stability.
