@@ -69,7 +69,8 @@ impl<'a> Search<'a> {
         let leads = |way: &&Trial<'a>| way.windows == 1 && way.fitted.normalised() <= UNEXPLAINED;
         let mut further: Vec<Trial<'a>> = ways.iter().filter(leads).cloned().collect();
         if further.is_empty() {
-            further = ways.iter().filter_map(|way| self.further(way)).collect();
+            // With the effect that helps each most.
+            further = ways.iter().filter_map(|way| self.whole(self.round(way)?.trials.first()?)).collect();
         }
         let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
         let Some(way) = way else { return Ok(growth) };
@@ -80,11 +81,6 @@ impl<'a> Search<'a> {
             growth.last = other.last;
         }
         Ok(growth)
-    }
-
-    /// A model with the effect that helps it most, over whole records.
-    fn further(&self, way: &Trial<'a>) -> Option<Trial<'a>> {
-        self.whole(self.round(way)?.trials.first()?)
     }
 
     /// Single effects to begin with again, best first: runners-up of the first round, and what a fit that begins where the
@@ -282,7 +278,10 @@ fn margin(trial: &Trial<'_>, than: &Trial<'_>) -> f64 {
 }
 
 /// The model of the least criterion.
-fn least<'t, 'a: 't>(trials: impl IntoIterator<Item = &'t Trial<'a>>, of: &Dispersion) -> Option<&'t Trial<'a>> {
+pub(crate) fn least<'t, 'a: 't>(
+    trials: impl IntoIterator<Item = &'t Trial<'a>>,
+    of: &Dispersion,
+) -> Option<&'t Trial<'a>> {
     trials.into_iter().min_by(|a, b| criterion(a, of).total_cmp(&criterion(b, of)))
 }
 

@@ -30,7 +30,8 @@ pub struct Scene {
 /// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
 const NOTICED: f64 = 21.0;
 
-/// Other values of shapes that no fit moves, or hardly, are fitted too: so many, of which the gain is at least this share of the best.
+/// Other values of shapes that no fit moves, or hardly, are fitted too: so many, of which the gain is at least this share of
+/// the best.
 const OTHERS: usize = 2;
 const NEAR: f64 = 0.3;
 

@@ -101,8 +101,7 @@ impl<'a> Search<'a> {
             // What fits windows may lie too far from what fits whole records for one step.
             part = part.filter(|part| part.windows > 2).and_then(|part| self.stretched(&part, part.windows / 2));
             let Some(part) = &part else { return best.map(|best| self.begun_anew(best, enough)) };
-            let found = best.into_iter().chain(self.stretched(part, 1));
-            best = found.min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2));
+            best = closer(best, self.stretched(part, 1));
         }
         best
     }
@@ -221,7 +220,7 @@ impl<'a> Search<'a> {
         let windows = self.trial(&[], tuners, base::first_locals(&self.pieces(8)), 8, 40);
         let stretched = |part: Trial<'a>, windows| self.stretched(&part, windows);
         let anew = windows.and_then(|windows| [4, 2, 1].into_iter().try_fold(windows, stretched));
-        whole.into_iter().chain(anew).min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))
+        closer(whole, anew)
     }
 
     /// Fits a variant to all data that may choose.
@@ -286,6 +285,11 @@ impl<'a> Search<'a> {
         let all = candidates(self.effects, interface, &measured, &calibration);
         all.into_iter().filter(|c| !taken(c)).collect()
     }
+}
+
+/// That of two fits to the same data which leaves less.
+fn closer<'a>(a: Option<Trial<'a>>, b: Option<Trial<'a>>) -> Option<Trial<'a>> {
+    a.into_iter().chain(b).min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))
 }
 
 impl<'a> Trial<'a> {

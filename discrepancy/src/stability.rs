@@ -5,6 +5,7 @@ use rand::Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::growth::least;
 use crate::round::Round;
 use crate::search::Trial;
 use crate::weigh::{Dispersion, criterion};
@@ -72,8 +73,7 @@ pub fn stability(round: &Round<'_>) -> Option<Stability> {
     let without = |&left_out: &usize| {
         let trials: Vec<Trial<'_>> = few.par_iter().filter_map(|t| refitted_without(t, left_out)).collect();
         let of = Dispersion::of(trials.iter().min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))?);
-        let leader = trials.iter().min_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)))?;
-        let (own, other) = (best.newest()?, leader.newest()?);
+        let (own, other) = (best.newest()?, least(&trials, &of)?.newest()?);
         let experiment = best.fit.subject.measurements[left_out].name.clone();
         let (effect, place) = (other.effect.name().to_owned(), other.place());
         (!own.is(other)).then_some(HangsOn { experiment, effect, place })

@@ -168,8 +168,8 @@ pub enum Trials {
     Plain(&'static [f64]),
     /// Frequencies in rad/s that the record can resolve, from one period in the record on.
     Frequencies,
-    /// The largest value over numbers of steps from one on, so close together that at most every eighth sample of a neighbour is
-    /// a step off.
+    /// Sizes of steps: the largest value over numbers of steps from one on, so close together that about every eighth sample of a
+    /// neighbour is a step off.
     Steps,
     /// Times within the record, at these shares of its length.
     Moments(&'static [f64]),
