@@ -51,13 +51,19 @@ const SEARCH: [&str; 4] = ["--solver", "genetic", "--max-evaluations", "600"];
 #[test]
 fn a_run_that_is_resumed_after_its_end_simulates_nothing_and_has_the_same_result() {
     let folder = tempfile::tempdir().unwrap();
-    for (study, more) in [
+    let runs = [
         ("pid-design", &SEARCH[..]),
         ("pid-design", &[]),
         // Residuals and slopes of a least-squares solver.
         ("furuta-calibration", &["--max-evaluations", "40"]),
-    ] {
-        let out = folder.path().join(format!("{study}{}", more.len()));
+        // Points at values of uncertain parameters.
+        ("pid-robust", &["--set", "robust.samples=16", "--set", "robust.starts=1", "--max-evaluations", "400"]),
+        ("pid-worst-case", &["--set", "worst-case.samples=16", "--set", "worst-case.starts=1"]),
+        ("pid-robust", &["--set", "study.task=\"monte-carlo\"", "--set", "monte-carlo.samples=40"]),
+        ("pid-worst-case", &["--set", "study.task=\"sensitivity\"", "--set", "sensitivity.method=\"morris\""]),
+    ];
+    for (index, (study, more)) in runs.into_iter().enumerate() {
+        let out = folder.path().join(index.to_string());
         run(study, &out, more);
         let first = result(&out);
         std::fs::remove_file(out.join("result.json")).unwrap();

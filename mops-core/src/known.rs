@@ -11,7 +11,7 @@ pub type RowValue = (usize, Result<Value, String>);
 /// What one job gave: the values of the rows that read it, or why there are none.
 pub type JobValues = Result<Vec<RowValue>, Failure>;
 
-/// What is known of a point, by jobs. Residuals may be absent: a problem that needs them simulates again.
+/// What is known of a point, by jobs. Rows and residuals may be absent: a problem that needs them simulates again.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Known {
     /// Index of the job, and what it gave.
@@ -19,6 +19,21 @@ pub struct Known {
 }
 
 impl Known {
+    /// Adds what is not known of what was known before.
+    pub fn complete(&mut self, before: &Self) {
+        for (job, then) in &before.jobs {
+            match (self.jobs.iter_mut().find(|(index, _)| index == job), then) {
+                (None, _) => self.jobs.push((*job, then.clone())),
+                (Some((_, Ok(now))), Ok(then)) => {
+                    let missing = then.iter().filter(|(row, _)| !now.iter().any(|(known, _)| known == row));
+                    let missing: Vec<RowValue> = missing.cloned().collect();
+                    now.extend(missing);
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// What a job gave, if it is known.
     pub fn job(&self, job: usize) -> Option<&JobValues> {
         self.jobs.iter().find(|(index, _)| *index == job).map(|(_, values)| values)

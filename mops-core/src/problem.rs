@@ -232,9 +232,17 @@ impl Problem {
 
     /// The evaluation of a point of which something is known already: only the jobs that are not known are run.
     pub fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
-        let tuners = self.tuners_at(point);
+        self.keep(point.to_vec(), self.tuners_at(point), &self.counting, known)
+    }
+
+    /// The same as [`Problem::evaluate_at`], where something is known already.
+    pub fn evaluate_at_keeping(&self, tuners: &[f64], known: Option<Known>) -> Kept {
+        self.keep(self.point_of(tuners), tuners.to_vec(), &self.jobs, known)
+    }
+
+    fn keep(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize], known: Option<Known>) -> Kept {
         let known = known.unwrap_or_default();
-        let values: Vec<(usize, JobValues, bool)> = (self.counting.par_iter())
+        let values: Vec<(usize, JobValues, bool)> = (jobs.par_iter())
             .map(|&job| match known.job(job).filter(|values| self.suffices(job, values)) {
                 Some(values) => (job, values.clone(), false),
                 None => (job, self.run_job(job, &tuners), true),
@@ -245,7 +253,7 @@ impl Problem {
             .map(|(job, values, _)| (*job, if keeps_residuals { values.clone() } else { without_residuals(values) }))
             .collect();
         let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
-        Kept { evaluation: self.judge(point.to_vec(), tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
+        Kept { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
     }
 
     /// The evaluation of a point, of which everything that counts is known; `None` where it is not.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mops_core::file::StudyFile;
-use mops_core::{Diagnostic, Stop, Study, Task, Watch};
+use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
 use super::Trouble;
 use super::run::solves;
@@ -49,10 +49,18 @@ impl From<Refusal> for Trouble {
     }
 }
 
-/// Whether a study asks for points that can be kept: those of a search, or of a sweep. A design against worst cases solves
-/// other studies from round to round.
+/// Whether a study asks for points that can be kept: those of a search, a sweep, or samples of uncertain parameters.
 fn keeps(study: &Study) -> bool {
-    study.task == Task::Sweep || (solves(study) && study.tasks.robust.is_none())
+    solves(study) || study.task == Task::Sweep || samples(study)
+}
+
+/// Whether the task asks for points at values of the uncertain parameters.
+pub(super) fn samples(study: &Study) -> bool {
+    match study.task {
+        Task::Design => study.tasks.robust.is_some(),
+        Task::Sensitivity => study.tasks.sensitivity.method != SensitivityMethod::Local,
+        task => matches!(task, Task::WorstCase | Task::MonteCarlo),
+    }
 }
 
 /// The database of a run that is about to begin; none for a task that evaluates no points.

@@ -46,6 +46,18 @@ pub(super) fn again(catalogue: &Catalogue, folder: &Path) -> Result<Again, Troub
             .with_help("it writes its report when it ends; `mops run --watch` shows one that goes")
             .into());
     }
+    if cut_short(run) && keep::samples(&file.study) {
+        return Err(Diagnostic::new(format!(
+            "the run in {} came to no end, and what it found is not whole",
+            folder.display()
+        ))
+        .with_help(format!(
+            "`mops run {} --out {} --resume` ends it, and simulates no known point again",
+            run.home,
+            folder.display()
+        ))
+        .into());
+    }
     file.study.seed = run.seed;
     let options = options(catalogue, &file.solver, run)?;
     let identity = Identity::of(&file, &file.study, options.solver.kind);

@@ -40,7 +40,7 @@ CREATE TABLE runs (
 CREATE TABLE points (
     id INTEGER PRIMARY KEY,            -- in the order of evaluation
     run INTEGER NOT NULL REFERENCES runs (id),
-    tuners BLOB NOT NULL UNIQUE,       -- values of all tuners, float64 little-endian
+    tuners BLOB NOT NULL UNIQUE,       -- values of all tuners (and uncertain parameters), float64 little-endian
     criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN where there is none
     notes TEXT,                        -- JSON: row -> what a reader must know of its value
     failures TEXT,                     -- JSON: jobs that failed, rows without a value
@@ -204,10 +204,12 @@ impl Database {
         Ok(self.connection.last_insert_rowid())
     }
 
-    /// Writes how a run ended.
-    pub(super) fn end(&self, run: i64, state: RunState, reused: usize) -> rusqlite::Result<()> {
-        let sql = "UPDATE runs SET ended = ?, state = ?, reused = ? WHERE id = ?";
-        self.connection.execute(sql, params![now(), state.name(), integer(reused), run])?;
+    /// Writes how a run ended; of one without a search, its points are those that were known or simulated.
+    pub(super) fn end(&self, run: i64, state: RunState, reused: usize, simulated: usize) -> rusqlite::Result<()> {
+        let sql = "UPDATE runs SET ended = ?, state = ?, reused = ?, \
+                   evaluations = CASE WHEN evaluations = 0 THEN ? ELSE evaluations END WHERE id = ?";
+        let both = integer(reused + simulated);
+        self.connection.execute(sql, params![now(), state.name(), integer(reused), both, run])?;
         // One file, which can be read where nothing can be written; while somebody reads it stays as it is.
         let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         Ok(())
@@ -259,6 +261,14 @@ impl Database {
             points.insert(bytes::key(&key), known(row, study, intern)?);
         }
         Ok(points)
+    }
+
+    /// Removes points at which more than so many tuners have values: those at uncertain parameters that are others now.
+    pub(super) fn forget_beyond(&self, tuners: usize) -> rusqlite::Result<()> {
+        let most = integer(8 * tuners);
+        self.connection.execute("DELETE FROM points WHERE length(tuners) > ?", [most])?;
+        self.connection.execute("DELETE FROM slopes WHERE length(tuners) > ?", [most])?;
+        Ok(())
     }
 
     /// All derivatives.
@@ -369,7 +379,7 @@ fn columns(known: &Known, rows: usize) -> Columns {
     )
 }
 
-/// What the columns of a point say; a job is known if it failed, or each of its rows has a value or none for a reason.
+/// What the columns of a point say; a job is known if it failed, or as far as its rows have a value or none for a reason.
 fn known(row: &Row<'_>, study: &Study, intern: &mut dyn FnMut(&str) -> &'static str) -> rusqlite::Result<Known> {
     let criteria = bytes::numbers(row.get_ref(1)?.as_blob()?);
     let json = |column: usize| -> rusqlite::Result<serde_json::Value> {
@@ -397,8 +407,8 @@ fn known(row: &Row<'_>, study: &Study, intern: &mut dyn FnMut(&str) -> &'static 
             Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note }))
         };
         let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
-        let values: Option<Vec<_>> = rows.map(|index| Some((index, value(index)?))).collect();
-        if let Some(values) = values {
+        let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();
+        if !values.is_empty() {
             known.jobs.push((job, JobValues::Ok(values)));
         }
     }

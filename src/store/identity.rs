@@ -18,6 +18,8 @@ pub(crate) struct Identity {
     tuners: Vec<String>,
     /// Names of the rows, in their order.
     rows: Vec<String>,
+    /// Names and units of the uncertain parameters, in their order.
+    uncertain: Vec<String>,
     /// The solver of the run.
     solver: String,
     /// The seed of the run.
@@ -53,6 +55,7 @@ impl Identity {
             data: file.data.clone(),
             tuners: study.tuners.iter().map(|tuner| tuner.name.clone()).collect(),
             rows: study.rows.iter().map(|row| study.key(row)).collect(),
+            uncertain: study.tasks.uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
             solver: solver.to_owned(),
             seed: study.seed,
         }
@@ -72,6 +75,11 @@ impl Identity {
     pub fn has_coordinates_of(&self, now: &Self) -> bool {
         let of = |identity: &Self, table: &str| identity.study.get(table).cloned();
         ["tuners", "cases", "experiments"].iter().all(|table| of(self, table) == of(now, table))
+    }
+
+    /// Whether values of the uncertain parameters mean the same.
+    pub fn has_uncertain_of(&self, now: &Self) -> bool {
+        self.uncertain == now.uncertain
     }
 
     fn differences(&self, now: &Self) -> Vec<Difference> {
@@ -106,6 +114,7 @@ impl Difference {
             ["data", ..] => return "a data file is another".to_owned(),
             ["tuners", ..] => return "the tuners are others".to_owned(),
             ["rows", ..] => return "the criteria are others".to_owned(),
+            ["uncertain", ..] => return "the uncertain parameters are others".to_owned(),
             ["mops"] => "the version of mops".to_owned(),
             _ => path.join("."),
         };

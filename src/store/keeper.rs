@@ -115,8 +115,13 @@ impl Keeper {
             Start::Reuse(from) => {
                 let source = reused(from, identity)?;
                 if same_folder(from, folder) {
+                    let alike = before(&source, from)?.has_uncertain_of(identity);
                     drop(source);
-                    Some(opened(folder, true)?)
+                    let database = opened(folder, true)?;
+                    if !alike {
+                        database.forget_beyond(study.tuners.len()).map_err(|error| trouble(folder, &error))?;
+                    }
+                    Some(database)
                 } else {
                     known = Some(source);
                     note = put_away(folder)?;
@@ -199,7 +204,8 @@ impl Drop for End<'_> {
 impl Opened {
     /// Enters how the run ended.
     pub fn end(self, state: RunState) -> Option<String> {
-        let ended = self.database.end(self.run, state, self.reused).err().map(|error| error.to_string());
+        let ended =
+            self.database.end(self.run, state, self.reused, self.simulated).err().map(|error| error.to_string());
         self.trouble.or(ended)
     }
 
@@ -229,10 +235,14 @@ fn read(database: &Database, study: &Study, identity: &Identity) -> rusqlite::Re
     let mut notes: HashMap<String, &'static str> = HashMap::new();
     // Notes are sentences of the program, a handful: each is made again once.
     let mut intern = |note: &str| *notes.entry(note.to_owned()).or_insert_with(|| note.to_owned().leak());
-    let points = database.points(study, &mut intern)?;
+    let mut points = database.points(study, &mut intern)?;
     let before = database.last_run()?.and_then(|run| serde_json::from_str::<Identity>(&run.identity).ok());
-    let alike = before.is_some_and(|before| before.has_coordinates_of(identity));
-    let slopes = if alike { database.slopes()? } else { Slopes::new() };
+    let alike = before.as_ref().is_some_and(|before| before.has_coordinates_of(identity));
+    let mut slopes = if alike { database.slopes()? } else { Slopes::new() };
+    if before.is_none_or(|before| !before.has_uncertain_of(identity)) {
+        points.retain(|key, _| key.len() == study.tuners.len());
+        slopes.retain(|(key, _), _| key.len() == study.tuners.len());
+    }
     Ok((points, slopes))
 }
 
@@ -324,6 +334,9 @@ fn trouble(folder: &Path, error: &rusqlite::Error) -> Refusal {
 fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     let mut best: Option<(Merit, &Vec<u64>, Vec<f64>)> = None;
     for (key, known) in points {
+        if key.len() != problem.study().tuners.len() {
+            continue;
+        }
         let tuners: Vec<f64> = key.iter().map(|&bits| f64::from_bits(bits)).collect();
         let Some(found) = problem.known(&tuners, known).filter(|found| found.scaled.is_some()) else { continue };
         // Of equals the one with the smaller key, whatever the order of a map.

@@ -1,6 +1,5 @@
 //! What a run knows from before, and the way of what it learns to the writer.
 
-use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{PoisonError, RwLock};
@@ -75,9 +74,7 @@ impl Store for Memory {
             return;
         };
         self.simulated.fetch_add(1, Ordering::Relaxed);
-        let fresh: HashSet<usize> = new.jobs.iter().map(|(job, _)| *job).collect();
-        new.jobs
-            .extend(known.into_iter().flat_map(|known| &known.jobs).filter(|(job, _)| !fresh.contains(job)).cloned());
+        known.into_iter().for_each(|known| new.complete(known));
         if !self.takes(values(&new).map(|value| value.residuals.len()).sum()) {
             new.jobs.iter_mut().filter_map(|(_, values)| values.as_mut().ok()).flatten().for_each(|(_, value)| {
                 if let Ok(value) = value {

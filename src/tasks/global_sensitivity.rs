@@ -9,8 +9,9 @@ use mops_core::{
 };
 
 use super::batches::{Stage, each};
+use super::copies::{Copies, evaluate_at};
 use crate::report::significant;
-use crate::solve::Solved;
+use crate::solve::{Options, Solved};
 
 /// Trajectories of Morris, and samples of Sobol, where nothing is said.
 const TRAJECTORIES: usize = 20;
@@ -21,10 +22,11 @@ const LEVEL: f64 = 0.95;
 const REPLICATES: usize = 500;
 
 /// The effects at the design that was found; the points of a sample stay together.
-pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
+pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
     let task = solved.problem.study().tasks.sensitivity;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
     let problem = Problem::new(Arc::clone(&over));
+    let store = Copies::of(options, solved.problem.study(), &over, &[]);
     let inputs = over.tasks.uncertain.len();
     let first = over.tuners.len() - inputs;
     let mut random = stream(over.seed, "global-sensitivity");
@@ -43,14 +45,14 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
         for ((value, uncertain), &u) in tuners[first..].iter_mut().zip(&over.tasks.uncertain).zip(u) {
             *value = uncertain.quantile(u);
         }
-        problem.evaluate_at(&tuners).readings.iter().map(|reading| reading.map(|r| r.value)).collect()
+        evaluate_at(&problem, &tuners, store.as_ref()).readings.iter().map(|reading| reading.map(|r| r.value)).collect()
     };
     let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
     let answers = each(&points, stage, watch, |of_sample| of_sample.iter().map(evaluate).collect::<Vec<_>>());
     if answers.len() < points.len() {
         solved.outcome.stop = Stop::Interrupted;
     }
-    let nominal = problem.evaluate_at(&over.start());
+    let nominal = evaluate_at(&problem, &over.start(), store.as_ref());
     let simulations = (answers.iter().map(Vec::len).sum::<usize>() + 1) * over.jobs.len();
     solved.outcome.simulations += simulations;
     let sound = |row: usize| {

@@ -1,6 +1,7 @@
 //! What a study can be for: a line for every task, and a file for each that is more than a search.
 
 mod batches;
+mod copies;
 pub(crate) mod diagnosis;
 mod excitation;
 mod global_sensitivity;

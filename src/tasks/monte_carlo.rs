@@ -10,6 +10,7 @@ use mops_core::{
 
 use super::at;
 use super::batches::{Stage, each};
+use super::copies::{Copies, evaluate_at};
 use crate::report::significant;
 use crate::solve::{Options, Solved, Unsuitable};
 
@@ -18,6 +19,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let mut solved = at(task.at, study, options, watch)?;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
     let problem = Problem::new(Arc::clone(&over));
+    let store = Copies::of(options, solved.problem.study(), &over, &[]);
     let uncertain = &over.tasks.uncertain;
     let first = over.tuners.len() - uncertain.len();
     let mut random = stream(over.seed, "monte-carlo");
@@ -28,7 +30,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let evaluate = |values: &Vec<f64>| {
         let mut tuners = over.start();
         tuners[first..].copy_from_slice(values);
-        problem.evaluate_at(&tuners)
+        evaluate_at(&problem, &tuners, store.as_ref())
     };
     let nominal = evaluate(&over.tuners[first..].iter().map(|tuner| tuner.start).collect());
     let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };

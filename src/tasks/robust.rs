@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use mops_core::{
     AddedReport, Budget, Ending, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask, RoundReport, Run,
-    RunState, Scenario, Stop, Study, Usage, Watch, conclude, uncertain_reports,
+    RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
 use super::batches::Stage;
+use super::copies::Copies;
 use super::worst_case::{NO_GUARANTEE, Question, Region, Worst, sentence};
 use crate::report::significant;
-use crate::solve::{Options, Solved, Unsuitable, search};
+use crate::solve::{Keeping, Options, Solved, Unsuitable, search};
 
 /// Outer approximation: solve for the cases at hand, search the box for worse ones, add them, and so on. The worst over the
 /// cases at hand is what no design can do better in, as far as the solver finds the optimum; the worst that is found in the
@@ -22,16 +23,19 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let task = study.tasks.robust.clone().expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
     let mut left = options.max_evaluations;
-    let (mut stop, mut archive, mut simulations) = (Stop::Stalled, Vec::new(), 0);
+    let (mut stop, mut archive, mut simulations, mut reused) = (Stop::Stalled, Vec::new(), 0, 0);
     let mut last: Option<Solved>;
     loop {
         let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len() };
-        let solved = search(rounds.to_solve(), &Options { max_evaluations: left, ..options.clone() }, &designing)?;
+        let study = rounds.to_solve();
+        let keeping = rounds.keeping(&study, options);
+        let solved = search(study, &Options { max_evaluations: left, keeping, ..options.clone() }, &designing)?;
+        reused += solved.outcome.reused.unwrap_or(0);
         left = left.saturating_sub(solved.outcome.evaluations);
         simulations += solved.outcome.simulations;
         archive.extend(solved.archive.iter().cloned());
         let interrupted = solved.outcome.stop == Stop::Interrupted || watch.wants_stop();
-        let more = !interrupted && solved.best.scaled.is_some() && rounds.search(&solved, watch);
+        let more = !interrupted && solved.best.scaled.is_some() && rounds.search(&solved, options, watch);
         simulations += rounds.done.last().map_or(0, |round| round.simulations);
         last = Some(solved);
         if interrupted || watch.wants_stop() {
@@ -53,6 +57,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let last = last.expect("there is a first round");
     let mut solved = rounds.conclude(last, options, stop);
     (solved.outcome.evaluations, solved.outcome.simulations) = (archive.len(), simulations);
+    solved.outcome.reused = options.keeping.as_ref().and_then(|keeping| keeping.begin.as_ref()).map(|_| reused);
     // Cases are added at the end: what a round did not know has no value.
     let rows = solved.problem.study().rows.len();
     archive.iter_mut().for_each(|record: &mut Record| record.values.resize(rows, f64::NAN));
@@ -107,11 +112,21 @@ impl Rounds {
         study
     }
 
+    /// Where the points of a round are kept: with those of the study. The first begins where the run does, the others at the
+    /// design of the round before.
+    fn keeping(&self, study: &Study, options: &Options) -> Option<Keeping> {
+        let store: Arc<dyn Store> = Arc::new(Copies::of(options, &self.study, study, &self.scenarios)?);
+        let begin = options.keeping.as_ref().and_then(|keeping| keeping.begin.clone());
+        let here = || Problem::new(Arc::new(study.clone())).start();
+        let begin = begin.map(|begin| if self.done.is_empty() { begin } else { here() });
+        Some(Keeping { study: study.clone(), store, begin })
+    }
+
     /// Searches the box around a design, and adds what is worse than the cases at hand; whether there is any.
-    fn search(&mut self, solved: &Solved, watch: &dyn Watch) -> bool {
+    fn search(&mut self, solved: &Solved, options: &Options, watch: &dyn Watch) -> bool {
         let question = Question { samples: self.task.samples, starts: self.task.starts };
         let counts = |row: &mops_core::Row| row.usage != Usage::Monitor;
-        let region = Region::new(&self.study, &solved.best.tuners, counts, question);
+        let region = Region::new(&self.study, &solved.best.tuners, counts, question).keeping(options, &self.study);
         let what = format!("round {}: searching the worst cases", self.done.len() + 1);
         let (worst, simulations) = region.search(watch, Stage { what: &what, from: 0.0, to: 1.0 });
         let merit = solved.best.merit;

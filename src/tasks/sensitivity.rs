@@ -11,7 +11,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let task = study.tasks.sensitivity;
     let mut solved = at(task.at, study, options, watch)?;
     if task.method != SensitivityMethod::Local {
-        global_sensitivity::add(&mut solved, watch);
+        global_sensitivity::add(&mut solved, options, watch);
         return Ok(solved);
     }
     // A calibration has found it already.

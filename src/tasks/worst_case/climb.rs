@@ -2,36 +2,42 @@
 
 use std::sync::Arc;
 
-use mops_core::{Budget, Demand, Evaluation, Oracle, Problem, Quiet, Run, Solver, SolverOptions, Study, Usage, Watch};
+use mops_core::{
+    Budget, Demand, Evaluation, Oracle, Problem, Quiet, Run, Solver, SolverOptions, Store, Study, Usage, Watch,
+};
 use mops_solvers::cma_es::CmaEsOptions;
 use mops_solvers::pattern_search::PatternSearchOptions;
 use mops_solvers::sqp::SqpOptions;
+
+use crate::tasks::copies::Copies;
 
 /// What a search of a criterion in one direction is: upwards, or downwards for the other side of an equality.
 pub(super) struct Goal {
     pub row: usize,
     pub problem: Problem,
     pub upwards: bool,
+    store: Option<Copies>,
 }
 
 impl Goal {
     /// The row of a study over its uncertain parameters, upwards or downwards.
-    pub(super) fn new(study: &Study, row: usize, upwards: bool) -> Self {
+    pub(super) fn new(study: &Study, row: usize, upwards: bool, store: Option<&Copies>) -> Self {
         let mut only = study.rows[row].clone();
         (only.usage, only.weight) = (Usage::Minimise, 1.0);
         if upwards {
             only.demand = reversed(only.demand);
         }
         let study = Study { rows: vec![only], ..study.clone() };
-        Self { row, problem: Problem::new(Arc::new(study)), upwards }
+        let store = store.map(|store| store.of_row(row));
+        Self { row, problem: Problem::new(Arc::new(study)), upwards, store }
     }
 
     /// Searches for the worst of all rows: every one upwards, equalities downwards too.
-    pub(super) fn all(study: &Study) -> Vec<Self> {
+    pub(super) fn all(study: &Study, store: Option<&Copies>) -> Vec<Self> {
         let rows = study.rows.iter().enumerate();
         rows.flat_map(|(i, row)| {
-            let down = (row.usage == Usage::Equality).then(|| Self::new(study, i, false));
-            std::iter::once(Self::new(study, i, true)).chain(down)
+            let down = (row.usage == Usage::Equality).then(|| Self::new(study, i, false, store));
+            std::iter::once(Self::new(study, i, true, store)).chain(down)
         })
         .collect()
     }
@@ -90,7 +96,8 @@ fn search_once(
     end: &mut End,
 ) {
     let quiet = Quiet(watch);
-    let mut run = Run::new(&goal.problem, Budget { evaluations }, &quiet);
+    let store = goal.store.as_ref().map(|store| store as &dyn Store);
+    let mut run = Run::new(&goal.problem, Budget { evaluations }, &quiet).keeping(store);
     run.solve(solver, from);
     end.simulations += (run.archive().len() + run.linearisations()) * goal.problem.simulations();
     let why = run.failures().first().map_or_else(String::new, |failure| failure.first.to_string());

@@ -31,7 +31,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         None => none_counts || row.usage != Usage::Monitor,
     };
     let question = Question { samples: task.samples, starts: task.starts };
-    let region = Region::new(study, &solved.best.tuners, wanted, question);
+    let region = Region::new(study, &solved.best.tuners, wanted, question).keeping(options, study);
     let stage = Stage { what: "searching the worst cases", from: 0.0, to: 0.9 };
     let (worst, simulations) = region.search(watch, stage);
     let mut criteria: Vec<WorstReport> = worst.iter().map(|worst| worst.report.clone()).collect();

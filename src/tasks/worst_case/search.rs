@@ -12,7 +12,9 @@ use mops_core::{
 };
 
 use super::climb::{End, Goal, local, whole};
+use crate::solve::Options;
 use crate::tasks::batches::{Stage, each};
+use crate::tasks::copies::{Copies, evaluate};
 
 /// Corners of the box are all looked at up to this dimension.
 const MOST_CORNERS: usize = 8;
@@ -37,6 +39,7 @@ pub(in crate::tasks) struct Question {
 pub(in crate::tasks) struct Region {
     /// The study over its uncertain parameters, with the rows that are searched.
     study: Study,
+    store: Option<Copies>,
     /// Number of tuners that are not uncertain parameters.
     fixed: usize,
     question: Question,
@@ -80,7 +83,13 @@ impl Region {
         let keep: Vec<bool> = over.rows.iter().map(|row| wanted(row) && counts(row, &over)).collect();
         let mut keep = keep.into_iter();
         over.rows.retain(|_| keep.next().expect("one for every row"));
-        Self { fixed: over.tuners.len() - over.tasks.uncertain.len(), study: over, question }
+        Self { fixed: over.tuners.len() - over.tasks.uncertain.len(), study: over, store: None, question }
+    }
+
+    /// The same, which keeps its points with those of the study that it was made from.
+    pub fn keeping(mut self, options: &Options, study: &Study) -> Self {
+        self.store = Copies::of(options, study, &self.study, &[]);
+        self
     }
 
     /// The study over its uncertain parameters.
@@ -110,12 +119,13 @@ impl Region {
         let every = self.every();
         let points = self.points(&every);
         let middle = stage.from + 0.2 * (stage.to - stage.from);
-        let seen = each(&points, Stage { to: middle, ..stage }, watch, |point| every.evaluate(point));
+        let seen =
+            each(&points, Stage { to: middle, ..stage }, watch, |point| evaluate(&every, point, self.store.as_ref()));
         let shared = seen.len() * every.simulations();
         if seen.len() < points.len() {
             return (Vec::new(), shared);
         }
-        let goals = Goal::all(&self.study);
+        let goals = Goal::all(&self.study, self.store.as_ref());
         // The first search for each goal goes over the whole box, from the worst point seen.
         let searches: Vec<(usize, bool, Vec<f64>)> = goals
             .iter()

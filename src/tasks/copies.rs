@@ -1,0 +1,142 @@
+//! The store of a study, for a problem that was made from it: its simulations are those of the study, some of them at values of
+//! the uncertain parameters.
+
+use std::sync::Arc;
+
+use mops_core::{Evaluation, Kept, Known, Problem, RowSlopes, Scenario, Store, Study};
+
+use crate::solve::Options;
+
+/// A store in which a point goes by the values of all tuners and, where they are set, of the uncertain parameters after them.
+#[derive(Clone)]
+pub(super) struct Copies {
+    store: Arc<dyn Store>,
+    /// Values of uncertain parameters that are no tuners of the problem; none for what the study has itself.
+    parts: Vec<Vec<f64>>,
+    /// Of every job of the problem its part, and its index in the study.
+    jobs: Vec<(usize, usize)>,
+    /// Of every row of the problem its part, and its index in the study.
+    rows: Vec<(usize, usize)>,
+    /// Whether the coordinates of the unit box are those of the study, so that derivatives are.
+    same_coordinates: bool,
+}
+
+impl Copies {
+    /// The store that the options name, for a problem with the study `made`, which was made from `study` and has these
+    /// scenarios; `None` where nothing is kept, or not of this study.
+    pub fn of(options: &Options, study: &Study, made: &Study, scenarios: &[Scenario]) -> Option<Self> {
+        let keeping = options.keeping.as_ref().filter(|keeping| keeping.study.measures_as(study))?;
+        let mut parts: Vec<Vec<f64>> = Vec::new();
+        let mut jobs = Vec::new();
+        for job in &made.jobs {
+            let scenario = job.case.checked_sub(study.cases.len()).map(|index| &scenarios[index]);
+            let case = scenario.map_or(job.case, |scenario| scenario.case);
+            let values = scenario.map_or_else(Vec::new, |scenario| scenario.values.clone());
+            let part = parts.iter().position(|part| *part == values).unwrap_or(parts.len());
+            if part == parts.len() {
+                parts.push(values);
+            }
+            jobs.push((part, study.jobs.iter().position(|of| (of.model, of.case) == (job.model, case))?));
+        }
+        let rows = made.rows.iter().map(|row| {
+            let (part, job) = jobs[row.job];
+            let of = |of: &mops_core::Row| of.job == job && of.name == row.name;
+            Some((part, study.rows.iter().position(of)?))
+        });
+        let rows = rows.collect::<Option<_>>()?;
+        let same_coordinates = made.tuners.len() == study.tuners.len();
+        Some(Self { store: Arc::clone(&keeping.store), parts, jobs, rows, same_coordinates })
+    }
+
+    /// The same for a problem with one of the rows alone.
+    pub fn of_row(&self, row: usize) -> Self {
+        Self { rows: vec![self.rows[row]], ..self.clone() }
+    }
+
+    fn key(&self, tuners: &[f64], part: usize) -> Vec<f64> {
+        [tuners, &self.parts[part]].concat()
+    }
+
+    /// The row of the problem that is this row of the study in a part.
+    fn row(&self, part: usize, origin: usize) -> Option<usize> {
+        self.rows.iter().position(|row| *row == (part, origin))
+    }
+
+    /// What is known of a part, as the problem numbers it.
+    fn made(&self, part: usize, known: &Known) -> Known {
+        let of = |(job, &(_, origin)): (usize, &(usize, usize))| {
+            let values = known.job(origin)?.as_ref().map_err(Clone::clone).map(|values| {
+                values.iter().filter_map(|(row, value)| Some((self.row(part, *row)?, value.clone()))).collect()
+            });
+            Some((job, values))
+        };
+        let jobs = self.jobs.iter().enumerate().filter(|(_, (of, _))| *of == part);
+        Known { jobs: jobs.filter_map(of).collect() }
+    }
+
+    /// What was learned of a part, as the study numbers it.
+    fn original(&self, part: usize, learned: &Known) -> Option<Known> {
+        let of_part = learned.jobs.iter().filter(|(job, _)| self.jobs[*job].0 == part);
+        let of = |(job, values): &(usize, mops_core::JobValues)| {
+            let values = values.as_ref().map_err(Clone::clone);
+            let values = values.map(|values| values.iter().map(|(row, v)| (self.rows[*row].1, v.clone())).collect());
+            (self.jobs[*job].1, values)
+        };
+        let jobs: Vec<_> = of_part.map(of).collect();
+        (!jobs.is_empty()).then_some(Known { jobs })
+    }
+}
+
+impl Store for Copies {
+    fn known(&self, tuners: &[f64]) -> Option<Known> {
+        let of = |part: usize| Some(self.made(part, &self.store.known(&self.key(tuners, part))?));
+        let jobs: Vec<_> = (0..self.parts.len()).filter_map(of).flat_map(|known| known.jobs).collect();
+        (!jobs.is_empty()).then_some(Known { jobs })
+    }
+
+    fn answered(&self, tuners: &[f64], learned: Option<Known>) {
+        for part in 0..self.parts.len() {
+            let learned = learned.as_ref().and_then(|learned| self.original(part, learned));
+            self.store.answered(&self.key(tuners, part), learned);
+        }
+    }
+
+    fn known_slopes(&self, tuners: &[f64], reach: f64) -> Option<Option<RowSlopes>> {
+        let of = |part: usize| {
+            let known = self.store.known_slopes(&self.key(tuners, part), reach)?;
+            let made = |(row, slopes)| Some((self.row(part, row)?, slopes));
+            Some(known.map(|rows| rows.into_iter().filter_map(made).collect::<RowSlopes>()))
+        };
+        let parts: Vec<Option<RowSlopes>> =
+            if self.same_coordinates { (0..self.parts.len()).map(of).collect::<Option<_>>()? } else { return None };
+        Some(parts.into_iter().collect::<Option<Vec<RowSlopes>>>().map(|parts| parts.concat()))
+    }
+
+    fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
+        for part in (0..self.parts.len()).filter(|_| self.same_coordinates) {
+            let of_part = |rows: &RowSlopes| {
+                let of_part = rows.iter().filter(|(row, _)| self.rows[*row].0 == part);
+                of_part.map(|(row, slopes)| (self.rows[*row].1, slopes.clone())).collect()
+            };
+            self.store.learned_slopes(&self.key(tuners, part), reach, slopes.as_ref().map(of_part));
+        }
+    }
+}
+
+/// Evaluates given values of all tuners in every case, as far as they are not known.
+pub(super) fn evaluate_at(problem: &Problem, tuners: &[f64], store: Option<&Copies>) -> Evaluation {
+    kept(tuners, store, |known| problem.evaluate_at_keeping(tuners, known))
+}
+
+/// Evaluates a point of the unit box, as far as it is not known.
+pub(super) fn evaluate(problem: &Problem, point: &[f64], store: Option<&Copies>) -> Evaluation {
+    kept(&problem.tuners_at(point), store, |known| problem.evaluate_keeping(point, known))
+}
+
+fn kept(tuners: &[f64], store: Option<&Copies>, evaluate: impl FnOnce(Option<Known>) -> Kept) -> Evaluation {
+    let Kept { evaluation, learned } = evaluate(store.and_then(|store| store.known(tuners)));
+    if let Some(store) = store {
+        store.answered(tuners, learned);
+    }
+    evaluation
+}
