@@ -47,7 +47,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, Mistake> {
     let subject = Subject::new(study)?;
     let simulations = AtomicUsize::new(0);
-    let limits = Limits { refits: 10, finalists: 5 };
+    let limits = Limits::at(options.level);
     let search = Search { subject: &subject, effects, limits, simulations: &simulations };
     let lost = || {
         Mistake::new("tuners", "the declared model cannot be simulated from anywhere near the start values")

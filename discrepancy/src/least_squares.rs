@@ -159,28 +159,29 @@ impl Fit<'_> {
     /// methods, SIAM J. Control Optim. 20 (1982)).
     pub fn solve(&self, start: Point, iterations: usize) -> Option<Fitted> {
         let normal = Arc::new(self.normal(&start)?);
-        Some(self.descend(start, normal, iterations))
+        Some(self.descend(start, normal, iterations, 0))
     }
 
     /// The same where much of the start is known.
     pub fn solve_beside(&self, start: Point, known: &Known, iterations: usize) -> Option<Fitted> {
         let normal = Arc::new(self.normal_beside(&start, known)?);
-        Some(self.descend(start, normal, iterations))
+        Some(self.descend(start, normal, iterations, known.point.globals.len()))
     }
 
     /// The same from where a fit of this problem ended.
     pub fn resume(&self, from: &Fitted, iterations: usize) -> Option<Fitted> {
         let normal = self.normal_at(from)?;
-        Some(self.descend(from.point.clone(), normal, iterations))
+        Some(self.descend(from.point.clone(), normal, iterations, self.globals.len()))
     }
 
     pub(crate) fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
         fitted.normal.clone().or_else(|| self.normal(&fitted.point).map(Arc::new))
     }
 
-    fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
+    /// Where the fit is a short one, sizes of steps before the global `first` stay as they are.
+    fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize, first: usize) -> Fitted {
         let fitted = self.levenberg_marquardt(start, normal, iterations);
-        self.with_steps(fitted, iterations)
+        self.with_steps(fitted, iterations, first)
     }
 
     /// The method from a point with its normal equations; sizes of steps stay as they are.

@@ -5,10 +5,13 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::base;
+use crate::candidate::Candidate;
+use crate::diagnose::UNEXPLAINED;
 use crate::fit::{Known, dot};
 use crate::screen::{Scene, Screened, screen};
 use crate::search::{NEARLY_LINEAR, Search, Trial};
 use crate::variant::{Added, problem};
+use crate::weigh::{Dispersion, by_chance};
 
 /// Candidates of one round: as screened, and the best of them as fitted.
 pub struct Round<'a> {
@@ -28,6 +31,15 @@ pub struct Round<'a> {
 
 /// Draws of white noise in place of residuals.
 const DRAWS: usize = 40;
+
+/// Iterations with which every candidate begins: the first needs no slopes but its own.
+const LOOK: usize = 2;
+
+/// How many times more than its screening says, to first order, a candidate may gain.
+const AMPLE: f64 = 2.0;
+
+/// How many times more than a model that explains the data one may leave that still goes on beside it.
+const FAR: f64 = 2.0;
 
 /// Sorts by [`Trial::score`].
 pub(crate) fn best_first(trials: &mut [Trial<'_>]) {
@@ -67,12 +79,26 @@ impl<'a> Search<'a> {
             }
         }
         let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
-        let start = |i: usize| {
-            let shapes = std::iter::once(&screened[i].added).chain(&screened[i].others);
-            let fits = shapes.filter_map(|added| self.beside(from, &known, &[self.neutral_start(added)], 5));
-            fits.min_by(|a, b| a.score().total_cmp(&b.score()))
+        let directions = screened.iter().map(|s| s.directions).sum();
+        // Beside effects that explain the data a race tells nothing that its screening does not.
+        let over = !from.added.is_empty() && {
+            let best = screened.first().map_or(0.0, |s| s.gain) / Dispersion::of(from).weight();
+            by_chance(AMPLE * best, directions) > self.limits.level
         };
-        let mut trials = self.race(chosen.into_par_iter().filter_map(start).collect());
+        let entered = if over { Vec::new() } else { chosen };
+        let shapes = entered.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
+        let shapes: Vec<&Added> = shapes.collect();
+        let look = |added: &&Added| self.beside(from, &known, &[self.neutral_start(added)], LOOK);
+        let mut looked: Vec<Trial<'a>> = shapes.par_iter().filter_map(look).collect();
+        best_first(&mut looked);
+        let mut trials: Vec<Trial<'a>> = Vec::new();
+        for trial in looked {
+            // Of every candidate the best shape.
+            if !trials.iter().any(|t| trial.newest().is_some_and(|own| t.newest().is_some_and(|n| n.is(own)))) {
+                trials.push(trial);
+            }
+        }
+        let mut trials = self.race(trials);
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
             let finalists = &trials[..trials.len().min(self.limits.finalists)];
@@ -87,7 +113,6 @@ impl<'a> Search<'a> {
                 best_first(&mut trials);
             }
         }
-        let directions = screened.iter().map(|s| s.directions).sum();
         let independent = independent.unwrap_or(directions);
         Some(Round { screened, trials, directions, independent, before: from.score(), known })
     }
@@ -144,18 +169,31 @@ impl<'a> Search<'a> {
         let started: Vec<Trial<'a>> = chosen
             .into_par_iter()
             .filter_map(|(i, j)| {
-                self.beside(from, &round.known, &[&few[i], &few[j]].map(|s| self.neutral_start(&s.added)), 6)
+                self.beside(from, &round.known, &[&few[i], &few[j]].map(|s| self.neutral_start(&s.added)), LOOK + 1)
             })
             .collect();
         self.race(started)
     }
 
     /// Those that lead after a few steps go on, and the best of them to the end; best first.
+    ///
+    /// Source: K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and hyperparameter optimization, AISTATS
+    /// (2016), for halving; here of every place one stays for the first heat.
     fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
-        for (count, iterations) in [(self.limits.finalists, 8), (3, 40)] {
+        let few = self.limits.finalists;
+        for (count, iterations) in [(2 * few, 3), (few, 8), (3, 40)] {
             best_first(&mut trials);
-            let rest = trials.split_off(trials.len().min(count));
-            trials = trials.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
+            let mut places: Vec<String> = Vec::new();
+            let least = trials.first().map_or(f64::INFINITY, |best| best.fitted.normalised());
+            let (mut on, mut rest) = (Vec::new(), Vec::new());
+            for trial in trials {
+                let place = trial.newest().map_or_else(String::new, Candidate::place);
+                let leads = on.len() < count || (count > few && !places.contains(&place));
+                let is_far = count < few && least <= UNEXPLAINED && trial.fitted.normalised() > FAR * least;
+                places.push(place);
+                if leads && !is_far { on.push(trial) } else { rest.push(trial) }
+            }
+            trials = on.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
             trials.extend(rest);
         }
         best_first(&mut trials);

@@ -43,8 +43,17 @@ pub struct Trial<'a> {
 pub struct Limits {
     /// Candidates that are fitted in each round.
     pub refits: usize,
-    /// Those of them that are fitted to the end.
+    /// Those of them that are fitted nearly to the end.
     pub finalists: usize,
+    /// Probability of adding an effect where nothing is missing.
+    pub level: f64,
+}
+
+impl Limits {
+    /// The usual ones.
+    pub fn at(level: f64) -> Self {
+        Self { refits: 10, finalists: 5, level }
+    }
 }
 
 /// The search in a subject.

@@ -3,26 +3,35 @@
 use crate::fit::{Fit, Fitted, Residuals, Slopes};
 use crate::least_squares::{damped_step, sum_of_squares};
 
-/// How often the stride is halved at most with which a size is looked for, and how often it is looked for on both sides.
-const HALVINGS: i32 = 8;
-const LOOKS: usize = 24;
+/// How thoroughly sizes are looked for.
+struct Effort {
+    /// How often the stride is halved at most.
+    halvings: i32,
+    /// How often a size is looked for on both sides of the best.
+    looks: usize,
+    /// How often sizes and the other unknowns take turns.
+    turns: usize,
+}
 
-/// How often sizes and the other unknowns take turns in a fit of at least so many iterations; once in a shorter one.
-const TURNS: usize = 4;
+/// In a fit of at least so many iterations, and in a shorter one.
 const LONG: usize = 10;
+const THOROUGH: Effort = Effort { halvings: 8, looks: 24, turns: 4 };
+const BRIEF: Effort = Effort { halvings: 2, looks: 6, turns: 1 };
 
 impl Fit<'_> {
-    /// A fit in which sizes of steps and the other unknowns have taken turns; `iterations` for the others each time.
-    pub(crate) fn with_steps(&self, fitted: Fitted, iterations: usize) -> Fitted {
+    /// A fit in which sizes of steps and the other unknowns have taken turns; `iterations` for the others each time. In a short
+    /// one the sizes before the global `first` stay as they are.
+    pub(crate) fn with_steps(&self, fitted: Fitted, iterations: usize, first: usize) -> Fitted {
         let mut fitted = fitted;
-        let stepped: Vec<usize> = (0..self.globals.len()).filter(|&k| self.globals[k].is_stepped()).collect();
+        let (effort, first) = if iterations < LONG { (BRIEF, first) } else { (THOROUGH, 0) };
+        let stepped: Vec<usize> = (first..self.globals.len()).filter(|&k| self.globals[k].is_stepped()).collect();
         if stepped.is_empty() {
             return fitted;
         }
-        for _ in 0..if iterations < LONG { 1 } else { TURNS } {
+        for _ in 0..effort.turns {
             let before = fitted.chi2;
             for &k in &stepped {
-                fitted = self.stepped(&fitted, k).unwrap_or(fitted);
+                fitted = self.stepped(&fitted, k, &effort).unwrap_or(fitted);
             }
             if fitted.chi2 >= before * (1.0 - 1e-3) {
                 break;
@@ -39,13 +48,13 @@ impl Fit<'_> {
     /// The share of samples that are a step off, and with it the sum of squares, grows in proportion to the distance from the
     /// true size. Source of the method: T. G. Kolda, R. M. Lewis, V. Torczon, Optimization by direct search, SIAM Review 45
     /// (2003) 385.
-    fn stepped(&self, fitted: &Fitted, k: usize) -> Option<Fitted> {
+    fn stepped(&self, fitted: &Fitted, k: usize, effort: &Effort) -> Option<Fitted> {
         let slopes = self.looks(&fitted.point, Slopes::Free)?;
         let global = &self.globals[k];
         let mut best = fitted.clone();
         let mut halvings = 0;
-        for _ in 0..LOOKS {
-            if halvings > HALVINGS {
+        for _ in 0..effort.looks {
+            if halvings > effort.halvings {
                 break;
             }
             let stride = global.scale * 0.5_f64.powi(halvings);

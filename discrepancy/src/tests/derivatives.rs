@@ -76,7 +76,7 @@ fn by_outputs(record: Record) -> String {
     let named: Vec<Arc<dyn Effect>> =
         effects().into_iter().filter(|e| TERMS.iter().any(|(name, _)| *name == e.name())).collect();
     assert_eq!(named.len(), TERMS.len());
-    let limits = Limits { refits: 10, finalists: 5 };
+    let limits = Limits::at(0.01);
     let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
     let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
     screened[0].added.candidate.effect.name().to_owned()

@@ -49,7 +49,7 @@ fn explained(hold: Hold) -> f64 {
     let simulations = AtomicUsize::new(0);
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let named: Vec<Arc<dyn Effect>> = effects();
-    let limits = Limits { refits: 10, finalists: 5 };
+    let limits = Limits::at(0.01);
     let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
     let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
     let left: f64 = scene.residuals.iter().map(|r| r * r).sum();

@@ -70,7 +70,7 @@ fn dry_friction_alone_would_want_a_negative_viscous_coefficient() {
     subject.measurements[0].locals[0].start = 2.4;
     let simulations = std::sync::atomic::AtomicUsize::new(0);
     let effects = named(&["coulomb-friction"]);
-    let limits = crate::search::Limits { refits: 10, finalists: 5 };
+    let limits = crate::search::Limits::at(0.01);
     let search = crate::search::Search { subject: &subject, effects: &effects, limits, simulations: &simulations };
     let declared = search.trial(&[], &subject.start(), vec![vec![2.4, 0.0]], 1, 60).expect("it simulates");
     // Along the tangent it would have to drive the pendulum, which no friction does.

@@ -53,7 +53,7 @@ fn diagnosis(subject: &Subject) -> Diagnosis {
 /// Effects with their probabilities, best first; and what calibration data alone say of the strength of the best.
 fn weighed(subject: &Subject) -> (Vec<(String, f64)>, StrengthValue) {
     let simulations = AtomicUsize::new(0);
-    let (named, limits) = (named(), Limits { refits: 10, finalists: 5 });
+    let (named, limits) = (named(), Limits::at(0.01));
     let search = Search { subject, effects: &named, limits, simulations: &simulations };
     let calibrated = base::fit(subject, 1, &simulations).expect("it simulates");
     let declared = search.declared(&calibrated).expect("it simulates");

@@ -34,7 +34,7 @@ fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
     let subject = subject(OSCILLATOR, &[20.0, 0.2, 1.0, 0.0], 2, records);
     let simulations = AtomicUsize::new(0);
     let some: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| named.contains(&e.name())).collect();
-    let limits = Limits { refits: 10, finalists: 5 };
+    let limits = Limits::at(0.01);
     let search = Search { subject: &subject, effects: &some, limits, simulations: &simulations };
     let declared = search.trial(&[], &subject.start(), vec![vec![1.0, 0.0]; count], 1, 60).expect("it simulates");
     let round = search.round(&declared).expect("it simulates");

@@ -41,7 +41,7 @@ fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let subject = subject(LAG, &[1.2, 1.0, 0.5], 1, vec![record]);
     let simulations = AtomicUsize::new(0);
     let all: Vec<Arc<dyn Effect>> = effects();
-    let limits = Limits { refits: 10, finalists: 5 };
+    let limits = Limits::at(0.01);
     let search = Search { subject: &subject, effects: &all, limits, simulations: &simulations };
     let declared = search.trial(&[], &subject.start(), vec![vec![0.5]], 1, 60).expect("it simulates");
     let round = search.round(&search.over_or_in_windows(&declared)).expect("it simulates");
