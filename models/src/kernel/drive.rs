@@ -16,6 +16,8 @@ pub struct Drive<'a, S = f64> {
     slope: f64,
     /// The first of the samples after `since`.
     after: usize,
+    /// The first of those that are held and differ from the one before.
+    change: usize,
     /// What goes on top of the value in place of a straight line.
     curve: Option<Curve>,
 }
@@ -49,14 +51,14 @@ impl Curve {
 impl<S: Scalar> Drive<'_, S> {
     /// A drive that stays at a value.
     pub fn held(value: S) -> Self {
-        Self { input: None, since: 0.0, value, slope: 0.0, after: 0, curve: None }
+        Self { input: None, since: 0.0, value, slope: 0.0, after: 0, change: 0, curve: None }
     }
 }
 
 impl<'a, S: Scalar> Drive<'a, S> {
     /// A drive at time 0; nothing drives where `input` is absent.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, curve: None };
+        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, change: 0, curve: None };
         drive.pass_break(0.0);
         drive
     }
@@ -78,11 +80,10 @@ impl<'a, S: Scalar> Drive<'a, S> {
     /// The next time after `t` at which the value or its slope jumps; samples that are held and repeat themselves do not.
     pub fn next_break(&self, t: f64) -> f64 {
         let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
-        let mut after = self.first_after(times, t);
-        while after > 0 && after < times.len() && values[after] == values[after - 1] {
-            after += 1;
-        }
-        times.get(after).copied().unwrap_or(f64::INFINITY)
+        let after = self.first_after(times, t);
+        let is_ahead = (self.after..=self.change).contains(&after);
+        let change = if is_ahead { self.change } else { first_change(values, after) };
+        times.get(change).copied().unwrap_or(f64::INFINITY)
     }
 
     /// The same with all samples.
@@ -142,11 +143,18 @@ impl<'a, S: Scalar> Drive<'a, S> {
             }
             Input::Sampled { times, values, hold: Hold::Zero } => {
                 self.after = self.first_after(times, t);
+                self.change = first_change(values, self.after);
                 self.value = S::from(values[self.after.saturating_sub(1)]);
             }
             _ => self.value = S::from(input.at(t)),
         }
     }
+}
+
+/// The first of the values from `after` on that differs from the one before.
+fn first_change(values: &[f64], after: usize) -> usize {
+    let same = |k: &usize| *k > 0 && values[*k] == values[*k - 1];
+    (after..values.len()).find(|k| !same(k)).unwrap_or(values.len())
 }
 
 #[cfg(test)]
