@@ -39,11 +39,17 @@ const LOOK: usize = 2;
 const AMPLE: f64 = 2.0;
 
 /// How many times more than a model that explains the data one may leave that still goes on beside it.
-const FAR: f64 = 2.0;
+const FAR: f64 = 3.0;
 
 /// Sorts by [`Trial::score`].
 pub(crate) fn best_first(trials: &mut [Trial<'_>]) {
     trials.sort_by(|a, b| a.score().total_cmp(&b.score()));
+}
+
+/// Which models may still rival the best one: where that explains the data, those that do not leave much more.
+fn nearness(best: Option<&Trial<'_>>) -> impl Fn(&Trial<'_>) -> bool + use<> {
+    let least = best.map_or(f64::INFINITY, |best| best.fitted.normalised());
+    move |trial| least > UNEXPLAINED || trial.fitted.normalised() <= FAR * least
 }
 
 fn white(count: usize) -> Vec<Vec<f64>> {
@@ -80,13 +86,12 @@ impl<'a> Search<'a> {
         }
         let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
         let directions = screened.iter().map(|s| s.directions).sum();
-        // Beside effects that explain the data a race tells nothing that its screening does not.
-        let over = !from.added.is_empty() && {
-            let best = screened.first().map_or(0.0, |s| s.gain) / Dispersion::of(from).weight();
-            by_chance(AMPLE * best, directions) > self.limits.level
-        };
-        let entered = if over { Vec::new() } else { chosen };
-        let shapes = entered.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
+        if !from.added.is_empty() {
+            // Beside others an effect matters only where it may be added.
+            let weight = Dispersion::of(from).weight();
+            chosen.retain(|&i| by_chance(AMPLE * screened[i].gain / weight, directions) <= self.limits.level);
+        }
+        let shapes = chosen.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
         let shapes: Vec<&Added> = shapes.collect();
         let look = |added: &&Added| self.beside(from, &known, &[self.neutral_start(added)], LOOK);
         let mut looked: Vec<Trial<'a>> = shapes.par_iter().filter_map(look).collect();
@@ -106,7 +111,8 @@ impl<'a> Search<'a> {
             let is_simpler =
                 |t: &&Trial<'a>| t.newest().is_some_and(|own| leading().any(|than| own.is_simpler_than(than)));
             let simpler = trials[finalists.len()..].iter().filter(is_simpler);
-            let worth: Vec<&Trial<'a>> = finalists.iter().chain(simpler).collect();
+            let near = nearness(trials.first());
+            let worth: Vec<&Trial<'a>> = finalists.iter().chain(simpler).filter(|t| near(t)).collect();
             let wholes: Vec<Trial<'a>> = worth.par_iter().filter_map(|t| self.over_whole(t)).collect();
             if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
                 trials = wholes;
@@ -184,14 +190,13 @@ impl<'a> Search<'a> {
         for (count, iterations) in [(2 * few, 3), (few, 8), (3, 40)] {
             best_first(&mut trials);
             let mut places: Vec<String> = Vec::new();
-            let least = trials.first().map_or(f64::INFINITY, |best| best.fitted.normalised());
+            let near = nearness(trials.first());
             let (mut on, mut rest) = (Vec::new(), Vec::new());
             for trial in trials {
                 let place = trial.newest().map_or_else(String::new, Candidate::place);
                 let leads = on.len() < count || (count > few && !places.contains(&place));
-                let is_far = count < few && least <= UNEXPLAINED && trial.fitted.normalised() > FAR * least;
                 places.push(place);
-                if leads && !is_far { on.push(trial) } else { rest.push(trial) }
+                if leads && (count >= few || near(&trial)) { on.push(trial) } else { rest.push(trial) }
             }
             trials = on.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
             trials.extend(rest);
