@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
+use crate::quantum::quantum;
+
 /// An effect at a place.
 #[derive(Clone)]
 pub struct Candidate {
@@ -103,6 +105,9 @@ pub fn candidates(
 /// Steps up to the largest value that are looked for at most: what is finer is as good as noise.
 const MOST_STEPS: u32 = 24;
 
+/// The finest steps, in units of the noise, that samples tell.
+const NOISES_PER_STEP: f64 = 4.0;
+
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
 
@@ -125,6 +130,8 @@ pub struct Sizes {
     pub record: f64,
     /// Time between samples, s.
     pub sample: f64,
+    /// Size of the steps in which samples come, finer than [`MOST_STEPS`]; `None` where they do not, or nobody looked.
+    pub quantum: Option<f64>,
 }
 
 impl Sizes {
@@ -155,12 +162,19 @@ impl Sizes {
             }
             Trials::Steps => {
                 let numbers = 1..=PER_STEP * (MOST_STEPS - 1);
-                numbers.map(|n| self.largest() / (1.0 + f64::from(n - 1) / f64::from(PER_STEP))).collect()
+                let sizes = numbers.map(|n| self.largest() / (1.0 + f64::from(n - 1) / f64::from(PER_STEP)));
+                sizes.chain(self.quantum).collect()
             }
             Trials::Moments(shares) => shares.iter().map(|s| s * self.record).collect(),
         };
         let inside = |v: &f64| v.is_finite() && *v >= bounds[0] && *v <= bounds[1];
         values.into_iter().filter(inside).collect()
+    }
+
+    /// The same where the samples themselves tell the size of finer steps.
+    pub fn with_quantum_of(self, samples: &[f64], noise: f64) -> Self {
+        let quantum = quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS));
+        Self { quantum, ..self }
     }
 
     fn largest(&self) -> f64 {

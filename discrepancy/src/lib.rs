@@ -19,6 +19,7 @@ mod locate;
 #[cfg(test)]
 mod locate_tests;
 mod plan;
+mod quantum;
 mod reduced;
 mod removed;
 mod repaired;

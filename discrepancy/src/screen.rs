@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Piece, Residuals, dot};
-use crate::trace_of::{View, sizes};
+use crate::trace_of::{View, sizes, sizes_with_steps};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -160,6 +160,8 @@ pub fn screen(
     let looked: Vec<(Option<Screened>, Vec<f64>)> = candidates
         .par_iter()
         .filter_map(|candidate| {
+            let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
+            let sizes = if steps { sizes_with_steps } else { sizes };
             let sizes = sizes(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
             best_of(candidate, &sizes, fit, model, scene, draws)
         })

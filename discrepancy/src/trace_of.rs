@@ -89,6 +89,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 range: range(moments().map(|m| m.x[q])),
                 record,
                 sample,
+                quantum: None,
             }
         }
         Spot::Process(w, s) => {
@@ -106,6 +107,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 range: range(moments().map(|m| m.x[s])),
                 record,
                 sample,
+                quantum: None,
             }
         }
         Spot::Actuator(input) => {
@@ -122,6 +124,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 range: range(moments().map(|m| m.u[input])),
                 record,
                 sample,
+                quantum: None,
             }
         }
         Spot::Sensor(_) => {
@@ -142,10 +145,29 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 range: range(values()),
                 record,
                 sample,
+                quantum: None,
             }
         }
     };
     Some(Sizes { output: positive(sizes.output), ..sizes })
+}
+
+/// The same for an effect that comes in steps, whose size samples may tell.
+pub fn sizes_with_steps(
+    place: &Port,
+    model: &WithEffects,
+    pieces: &[Piece],
+    trajectories: &[Trajectory],
+) -> Option<Sizes> {
+    let sizes = sizes(place, model, pieces, trajectories)?;
+    let series = |piece: &'_ Piece| match spot(place, model, piece) {
+        Some(Spot::Sensor(series)) => Some(series),
+        _ => None,
+    };
+    let measured = pieces.iter().filter_map(|piece| Some(&piece.series[series(piece)?]));
+    let (samples, noise) = measured
+        .fold((Vec::new(), 0.0_f64), |(all, noise), s| ([all.as_slice(), &s.values].concat(), noise.max(s.noise)));
+    Some(if samples.is_empty() { sizes } else { sizes.with_quantum_of(&samples, noise) })
 }
 
 /// A candidate's place in a piece, and what it sees there.

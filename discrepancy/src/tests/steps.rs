@@ -57,6 +57,13 @@ fn an_input_in_steps_is_found_with_the_size_of_its_steps() {
 }
 
 #[test]
+fn fine_steps_of_a_measurement_are_found_with_their_size() {
+    let (name, size, left) = found(0.0, 0.031);
+    assert_eq!(name, "sensor-quantisation");
+    assert!((size - 0.031).abs() < 1e-4 && left < 1.1, "{size} {left}");
+}
+
+#[test]
 fn a_measurement_in_steps_is_found_with_the_size_of_its_steps() {
     let (name, size, left) = found(0.0, 0.37);
     assert_eq!(name, "sensor-quantisation");

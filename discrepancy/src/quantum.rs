@@ -1,0 +1,73 @@
+//! The quantum of measured values: the size of the steps in which they come.
+//!
+//! Source: D. G. Kendall, Hunting quanta, Philosophical Transactions of the Royal Society A 276 (1974) 231: the cosine
+//! quantogram, here the mean of the cosines.
+
+use std::f64::consts::TAU;
+
+/// The mean cosine from which values count as multiples of a quantum: that of values which scatter about them by a fifth.
+const CLEAR: f64 = 0.45;
+
+/// Of a quantum and its fractions, which do nearly as well, the largest is taken: the first of at least this share of the best.
+const NEARLY: f64 = 0.8;
+
+/// Values of the frequency in the width of a peak, and most of them in all.
+const PER_PEAK: f64 = 6.0;
+const MOST: f64 = 1e4;
+
+/// The quantum between the finest and the coarsest that is asked for; `None` where the values are multiples of none.
+pub fn quantum(values: &[f64], finest: f64, coarsest: f64) -> Option<f64> {
+    let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    let (lowest, highest) = (1.0 / coarsest, 1.0 / finest);
+    let step = 1.0 / (PER_PEAK * reach);
+    let count = (highest - lowest) / step;
+    if !(count > 0.0 && count <= MOST) {
+        return None;
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let mean = |frequency: f64| values.iter().map(|v| (TAU * frequency * v).cos()).sum::<f64>() / values.len() as f64;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let frequencies: Vec<f64> = (0..=count as u32).map(|k| lowest + f64::from(k) * step).collect();
+    let means: Vec<f64> = frequencies.iter().map(|&frequency| mean(frequency)).collect();
+    let best = means.iter().copied().fold(0.0, f64::max);
+    let is_peak = |k: usize| (k == 0 || means[k] >= means[k - 1]) && (k + 1 == means.len() || means[k] > means[k + 1]);
+    let first = (0..means.len()).find(|&k| is_peak(k) && means[k] >= NEARLY * best && means[k] > CLEAR)?;
+    Some(1.0 / highest_near(mean, frequencies[first], step))
+}
+
+/// The place of a maximum within a step of a frequency, by ternary search.
+fn highest_near(mean: impl Fn(f64) -> f64, frequency: f64, step: f64) -> f64 {
+    let [mut low, mut high] = [frequency - step, frequency + step];
+    for _ in 0..40 {
+        let third = (high - low) / 3.0;
+        let (a, b) = (low + third, high - third);
+        if mean(a) < mean(b) { low = a } else { high = b }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::white;
+
+    fn wave(size: f64, noise: f64) -> Vec<f64> {
+        let of = |(k, e): (usize, f64)| size * ((0.021 * k as f64).sin() * 0.9 / size).round() + e;
+        white("quantum", noise, 700).into_iter().enumerate().map(of).collect()
+    }
+
+    #[test]
+    fn the_size_of_steps_is_told_by_the_values_alone() {
+        for (size, noise) in [(0.017, 1e-3), (0.017, 2.5e-3), (0.0093, 0.0), (0.05, 1e-3)] {
+            let found = quantum(&wave(size, noise), 3e-3, 0.06).expect("they are multiples");
+            assert!((found / size - 1.0).abs() < 3e-3, "{found} of {size}");
+        }
+    }
+
+    #[test]
+    fn values_that_come_in_no_steps_have_none() {
+        let smooth: Vec<f64> = (0..700).map(|k| 0.9 * (0.021 * f64::from(k)).sin()).collect();
+        assert!(quantum(&smooth, 3e-3, 0.06).is_none());
+        assert!(quantum(&wave(0.004, 3e-3), 3e-3, 0.06).is_none(), "noise hides them");
+    }
+}
