@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Processor time of NSGA-II on ZDT1 (100 members, 250 generations): mops as a ratio to pymoo, both in this run.
+
+    pip install pymoo
+    cargo build --release
+    python3 solvers/benches/beside_pymoo.py target/release/mops
+
+pymoo: J. Blank, K. Deb, pymoo: Multi-Objective Optimization in Python, IEEE Access 8 (2020) 89497.
+"""
+
+import argparse
+import json
+import resource
+import statistics
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy
+import pymoo
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.indicators.hv import HV
+from pymoo.optimize import minimize
+from pymoo.problems import get_problem
+
+MEMBERS, GENERATIONS = 100, 250
+
+
+def of_children():
+    """Processor time of the processes that have ended, s."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def of_mops(program, problem, seeds):
+    """Processor time of a run, its hypervolume and its evaluations, in the mean; the whole process counts."""
+    with tempfile.TemporaryDirectory() as folder:
+        before = of_children()
+        command = [program, "bench", "zdt", "--problems", problem, "--solver", "nsga2", "--quiet"]
+        subprocess.run(
+            command + ["--seeds", str(seeds), "--jobs", "1", "--out", folder], check=True, stdout=subprocess.DEVNULL
+        )
+        seconds = (of_children() - before) / seeds
+        rows = json.loads((Path(folder) / "results.json").read_text())["rows"]
+    volumes = [row["front"]["hypervolume"] for row in rows]
+    return seconds, statistics.mean(volumes), statistics.mean(row["evaluations"] for row in rows)
+
+
+def of_pymoo(problem, seeds):
+    """The same of pymoo; the import and the hypervolume do not count."""
+    volume = HV(ref_point=numpy.array([1.1, 1.1]))
+    seconds, volumes = [], []
+    for seed in range(1, seeds + 1):
+        before = time.process_time()
+        found = minimize(get_problem(problem.lower()), NSGA2(pop_size=MEMBERS), ("n_gen", GENERATIONS), seed=seed)
+        seconds.append(time.process_time() - before)
+        volumes.append(volume(found.F))
+    return statistics.mean(seconds), statistics.mean(volumes), MEMBERS * GENERATIONS
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("mops", help="the program, as cargo build --release leaves it")
+    parser.add_argument("--problem", default="ZDT1", help="a problem of the suite zdt")
+    parser.add_argument("--seeds", type=int, default=5, help="runs of each")
+    arguments = parser.parse_args()
+    rows = [
+        ("mops", *of_mops(arguments.mops, arguments.problem, arguments.seeds)),
+        (f"pymoo {pymoo.__version__}", *of_pymoo(arguments.problem, arguments.seeds)),
+    ]
+    print(f"{arguments.problem}, NSGA-II, {MEMBERS} members, {GENERATIONS} generations, mean of {arguments.seeds} seeds")
+    print(f"{'':14}{'CPU s':>9}{'volume':>9}{'evaluations':>13}")
+    for name, seconds, volume, evaluations in rows:
+        print(f"{name:14}{seconds:9.3f}{volume:9.4f}{evaluations:13.0f}")
+    print(f"mops takes 1/{rows[1][1] / rows[0][1]:.1f} of the processor time of pymoo")
+
+
+if __name__ == "__main__":
+    main()
