@@ -3,6 +3,7 @@
 //! Objectives are minimised and stand in one array, `m` per point. A point dominates another if it is worse in no objective
 //! and better in one.
 
+mod divide;
 mod hypervolume;
 mod read_outs;
 mod sort;
@@ -66,7 +67,9 @@ pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &
 
 /// The order by the first objective, then the second, and so on.
 pub(crate) fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
-    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+    // Zeros of either sign are equal, as they are to who asks which is less.
+    let order = |(a, b): (&f64, &f64)| a.partial_cmp(b).unwrap_or_else(|| a.total_cmp(b));
+    a.iter().zip(b).map(order).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
 }
 
 #[cfg(test)]

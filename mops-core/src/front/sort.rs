@@ -1,24 +1,23 @@
 //! Non-dominated sorting.
 
 use super::compare;
+use super::divide::Divide;
 
 /// Sorts points into fronts: rank 0 is dominated by none, rank 1 only by those of rank 0, and so on. Keeps its memory between
 /// calls.
 ///
 /// Two objectives take `O(n log n)`: the points are swept in the order of the first, and each front remembers the least
-/// second objective so far. More take the efficient non-dominated sort with binary search: at worst `O(m n^2)`, and
-/// `O(m n log n)` where there are few fronts of few points.
+/// second objective so far. More take `O(n log^(m-1) n)` by divide and conquer.
 ///
-/// Source: M. T. Jensen, IEEE Transactions on Evolutionary Computation 7 (2003) 503-515 (two objectives); X. Zhang, Y. Tian,
-/// R. Cheng, Y. Jin, IEEE Transactions on Evolutionary Computation 19 (2015) 201-213.
+/// Source: M. T. Jensen, IEEE Transactions on Evolutionary Computation 7 (2003) 503-515.
 #[derive(Debug, Clone, Default)]
 pub struct FrontSorter {
     order: Vec<u32>,
     ranks: Vec<u32>,
     /// The least second objective of every front.
     tails: Vec<f64>,
-    /// Members of every front, in the order of the sweep.
-    fronts: Vec<Vec<u32>>,
+    /// Objectives of the different points, in lexicographic order.
+    different: Vec<f64>,
 }
 
 impl FrontSorter {
@@ -44,9 +43,19 @@ impl FrontSorter {
         match m {
             0 => {}
             2 => self.sweep(objectives),
-            _ => self.search(objectives, m),
+            1 => self.levels(objectives),
+            _ => self.divide(objectives, m),
         }
         &self.ranks
+    }
+
+    /// Of one objective: equal points share a rank.
+    fn levels(&mut self, objectives: &[f64]) {
+        let mut rank = 0;
+        for pair in self.order.windows(2) {
+            rank += u32::from(objectives[pair[0] as usize] < objectives[pair[1] as usize]);
+            self.ranks[pair[1] as usize] = rank;
+        }
     }
 
     #[allow(clippy::cast_possible_truncation)]
@@ -74,38 +83,23 @@ impl FrontSorter {
         }
     }
 
+    /// Divides the points, of equal ones the first.
     #[allow(clippy::cast_possible_truncation)]
-    fn search(&mut self, objectives: &[f64], m: usize) {
-        self.fronts.iter_mut().for_each(Vec::clear);
-        let mut used = 0;
-        for &i in &self.order {
-            let here = &objectives[i as usize * m..(i as usize + 1) * m];
-            let dominated = |front: &[u32]| {
-                front.iter().rev().any(|&j| dominates(&objectives[j as usize * m..(j as usize + 1) * m], here))
-            };
-            let rank = self.fronts[..used].partition_point(|front| dominated(front));
-            if rank == used {
-                used += 1;
-                if used > self.fronts.len() {
-                    self.fronts.push(Vec::new());
-                }
+    fn divide(&mut self, objectives: &[f64], m: usize) {
+        let row = |i: u32| &objectives[i as usize * m..(i as usize + 1) * m];
+        self.different.clear();
+        let mut places = Vec::with_capacity(self.order.len());
+        for (at, &i) in self.order.iter().enumerate() {
+            if at == 0 || row(self.order[at - 1]) != row(i) {
+                self.different.extend_from_slice(row(i));
             }
-            self.fronts[rank].push(i);
-            self.ranks[i as usize] = rank as u32;
+            places.push(self.different.len() / m - 1);
+        }
+        let ranks = Divide::ranked(&self.different, m);
+        for (&i, place) in self.order.iter().zip(places) {
+            self.ranks[i as usize] = ranks[place];
         }
     }
-}
-
-/// Whether `a` dominates `b`.
-fn dominates(a: &[f64], b: &[f64]) -> bool {
-    let mut better = false;
-    for (a, b) in a.iter().zip(b) {
-        if a > b {
-            return false;
-        }
-        better |= a < b;
-    }
-    better
 }
 
 #[cfg(test)]
@@ -113,6 +107,18 @@ mod tests {
     use rand::Rng;
 
     use super::*;
+
+    /// Whether `a` dominates `b`.
+    fn dominates(a: &[f64], b: &[f64]) -> bool {
+        let mut better = false;
+        for (a, b) in a.iter().zip(b) {
+            if a > b {
+                return false;
+            }
+            better |= a < b;
+        }
+        better
+    }
 
     /// By the definition: peel off what nothing left dominates.
     fn peeled(objectives: &[f64], m: usize) -> Vec<u32> {
@@ -142,6 +148,17 @@ mod tests {
                 let points: Vec<f64> = (0..m * count).map(|_| f64::from(random.random_range(0..12))).collect();
                 assert_eq!(sorter.sort(&points, m), peeled(&points, m), "{m} objectives, {count} points");
             }
+            // Near a sphere, as a search has them at its end; some with a zero of the other sign.
+            let near = |_| {
+                let point: Vec<f64> = (0..m).map(|_| random.random()).collect();
+                let far = 1.0 + 0.05 * f64::from(random.random_range(0..3));
+                let length = point.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let zero = random.random_range(0..8 * m);
+                let to = |(k, x): (usize, f64)| if k == zero { [0.0, -0.0][k % 2] } else { x * far / length };
+                point.into_iter().enumerate().map(to).collect::<Vec<f64>>()
+            };
+            let points: Vec<f64> = (0..600).flat_map(near).collect();
+            assert_eq!(sorter.sort(&points, m), peeled(&points, m), "{m} objectives, near a sphere");
         }
     }
 }

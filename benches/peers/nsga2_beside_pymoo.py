@@ -3,7 +3,7 @@
 
     pip install pymoo
     cargo build --release
-    python3 solvers/benches/beside_pymoo.py target/release/mops
+    python3 benches/peers/nsga2_beside_pymoo.py target/release/mops
 
 pymoo: J. Blank, K. Deb, pymoo: Multi-Objective Optimization in Python, IEEE Access 8 (2020) 89497.
 """
