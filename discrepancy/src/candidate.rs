@@ -102,11 +102,11 @@ pub fn candidates(
     all
 }
 
-/// Steps up to the largest value that are looked for at most: what is finer is as good as noise.
+/// Steps up to the largest value of which all sizes are tried: what is finer is read from samples, or as good as noise.
 const MOST_STEPS: u32 = 24;
 
-/// The finest steps, in units of the noise, that samples tell.
-const NOISES_PER_STEP: f64 = 4.0;
+/// The finest steps, in units of the noise, that samples tell: there the mean cosine is `exp(-2 pi^2/5^2)`, 0.45.
+const NOISES_PER_STEP: f64 = 5.0;
 
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;

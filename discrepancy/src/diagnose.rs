@@ -55,6 +55,7 @@ pub fn diagnose(
     };
     watch.stage("fit of the declared model", 0.02);
     let calibrated = base::fit(&subject, options.seed, &simulations).ok_or_else(lost)?;
+    subject.take_pace(&calibrated.point.globals);
     let declared = search.declared(&calibrated).ok_or_else(lost)?;
     let before = search.calibrate(&declared, &[]).ok_or_else(lost)?;
     let base = search.over_or_in_windows(&declared);
@@ -63,7 +64,7 @@ pub fn diagnose(
     let located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
 
     let growth = search.grow(&base, options, watch)?;
-    let growth = search.settle(growth, options, watch);
+    let growth = search.settle(growth, watch);
     let (last, held) = search.without_declared(growth.last);
     watch.stage("the repaired model", 0.9);
     let after = search.calibrate(&last, &held).ok_or_else(lost)?;

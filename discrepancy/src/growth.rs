@@ -121,7 +121,7 @@ impl<'a> Search<'a> {
                 // Of the screening itself: its gains are those of single directions.
                 growth.p_value = round.screened.first().map_or(1.0, |s| by_chance(s.gain, round.independent));
             }
-            let likely = |trial: &&Trial<'a>| chance(&growth.last, trial, round.directions) <= options.level;
+            let likely = |trial: &&Trial<'a>| chance(&growth.last, trial, round.directions) <= self.limits.level;
             let single = round.trials.first().filter(likely);
             let left = single.unwrap_or(&growth.last).fitted.normalised();
             let pairs = if count == 0 && most > 1 && left > UNEXPLAINED {
@@ -165,12 +165,12 @@ impl<'a> Search<'a> {
     }
 
     /// The same over whole records, without what is superfluous, each effect held against its rivals.
-    pub fn settle(&self, growth: Growth<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
+    pub fn settle(&self, growth: Growth<'a>, watch: &dyn Watch) -> Growth<'a> {
         let mut growth = growth;
         growth.last = self.over_whole(&growth.last).unwrap_or(growth.last);
         for settling in 0..=SETTLINGS {
             watch.stage("what can be left out", 0.8 + 0.03 * f64::from(settling));
-            if let Some(pruned) = self.pruned(&growth.last, options.level) {
+            if let Some(pruned) = self.pruned(&growth.last, self.limits.level) {
                 growth.step("left out", pruned);
             }
             while growth.last.added.len() > 1 && growth.last.windows == 1 {

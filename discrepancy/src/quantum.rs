@@ -11,17 +11,19 @@ const CLEAR: f64 = 0.45;
 /// Of a quantum and its fractions, which do nearly as well, the largest is taken: the first of at least this share of the best.
 const NEARLY: f64 = 0.8;
 
-/// Values of the frequency in the width of a peak, and most of them in all.
+/// Values of the frequency in the width of a peak, and most of them in all: beyond, steps are finer than is looked for.
 const PER_PEAK: f64 = 6.0;
 const MOST: f64 = 1e4;
 
 /// The quantum between the finest and the coarsest that is asked for; `None` where the values are multiples of none.
 pub fn quantum(values: &[f64], finest: f64, coarsest: f64) -> Option<f64> {
+    // What rests at 0 is a multiple of everything.
+    let values: Vec<f64> = values.iter().copied().filter(|v| v.abs() >= finest).collect();
     let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-    let (lowest, highest) = (1.0 / coarsest, 1.0 / finest);
+    let (lowest, highest) = (1.0 / coarsest.min(reach), 1.0 / finest);
     let step = 1.0 / (PER_PEAK * reach);
-    let count = (highest - lowest) / step;
-    if !(count > 0.0 && count <= MOST) {
+    let count = ((highest - lowest) / step).min(MOST);
+    if count.is_nan() || count <= 0.0 {
         return None;
     }
     #[allow(clippy::cast_precision_loss)]
@@ -30,7 +32,7 @@ pub fn quantum(values: &[f64], finest: f64, coarsest: f64) -> Option<f64> {
     let frequencies: Vec<f64> = (0..=count as u32).map(|k| lowest + f64::from(k) * step).collect();
     let means: Vec<f64> = frequencies.iter().map(|&frequency| mean(frequency)).collect();
     let best = means.iter().copied().fold(0.0, f64::max);
-    let is_peak = |k: usize| (k == 0 || means[k] >= means[k - 1]) && (k + 1 == means.len() || means[k] > means[k + 1]);
+    let is_peak = |k: usize| k > 0 && means[k] >= means[k - 1] && (k + 1 == means.len() || means[k] > means[k + 1]);
     let first = (0..means.len()).find(|&k| is_peak(k) && means[k] >= NEARLY * best && means[k] > CLEAR)?;
     Some(1.0 / highest_near(mean, frequencies[first], step))
 }
@@ -62,6 +64,15 @@ mod tests {
             let found = quantum(&wave(size, noise), 3e-3, 0.06).expect("they are multiples");
             assert!((found / size - 1.0).abs() < 3e-3, "{found} of {size}");
         }
+    }
+
+    #[test]
+    fn values_at_rest_tell_nothing_and_a_wide_range_is_looked_at_as_far_as_it_goes() {
+        let rests: Vec<f64> = wave(0.017, 1e-3).into_iter().chain(white("rest", 1e-3, 3000)).collect();
+        let found = quantum(&rests, 5e-3, 0.06).expect("those that move are multiples");
+        assert!((found / 0.017 - 1.0).abs() < 3e-3, "{found}");
+        let found = quantum(&wave(0.017, 0.0), 1e-6, 30.0).expect("they are multiples");
+        assert!((found / 0.017 - 1.0).abs() < 1e-3, "{found}");
     }
 
     #[test]

@@ -86,8 +86,8 @@ impl<'a> Search<'a> {
         }
         let known = Known { point: from.fitted.point.clone(), all: scene.slopes };
         let directions = screened.iter().map(|s| s.directions).sum();
-        if !from.added.is_empty() {
-            // Beside others an effect matters only where it may be added.
+        if !from.added.is_empty() && from.fitted.normalised() <= UNEXPLAINED {
+            // Beside others that explain the data an effect matters only where it may be added.
             let weight = Dispersion::of(from).weight();
             chosen.retain(|&i| by_chance(AMPLE * screened[i].gain / weight, directions) <= self.limits.level);
         }
@@ -112,7 +112,7 @@ impl<'a> Search<'a> {
                 |t: &&Trial<'a>| t.newest().is_some_and(|own| leading().any(|than| own.is_simpler_than(than)));
             let simpler = trials[finalists.len()..].iter().filter(is_simpler);
             let near = nearness(trials.first());
-            let worth: Vec<&Trial<'a>> = finalists.iter().chain(simpler).filter(|t| near(t)).collect();
+            let worth: Vec<&Trial<'a>> = finalists.iter().filter(|t| near(t)).chain(simpler).collect();
             let wholes: Vec<Trial<'a>> = worth.par_iter().filter_map(|t| self.over_whole(t)).collect();
             if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
                 trials = wholes;
@@ -184,19 +184,22 @@ impl<'a> Search<'a> {
     /// Those that lead after a few steps go on, and the best of them to the end; best first.
     ///
     /// Source: K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and hyperparameter optimization, AISTATS
-    /// (2016), for halving; here of every place one stays for the first heat.
+    /// (2016), for halving; here of every place one stays for the first heat, and what is simpler than one that goes on.
     fn race(&self, mut trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
         let few = self.limits.finalists;
-        for (count, iterations) in [(2 * few, 3), (few, 8), (3, 40)] {
+        for (heat, (count, iterations)) in [(2 * few, 3), (few, 8), (3, 40)].into_iter().enumerate() {
+            let (is_first, is_last) = (heat == 0, heat == 2);
             best_first(&mut trials);
             let mut places: Vec<String> = Vec::new();
             let near = nearness(trials.first());
             let (mut on, mut rest) = (Vec::new(), Vec::new());
             for trial in trials {
                 let place = trial.newest().map_or_else(String::new, Candidate::place);
-                let leads = on.len() < count || (count > few && !places.contains(&place));
+                let is_simpler =
+                    |than: &Trial<'a>| trial.newest().zip(than.newest()).is_some_and(|(a, b)| a.is_simpler_than(b));
+                let leads = on.len() < count || (is_first && !places.contains(&place)) || on.iter().any(is_simpler);
                 places.push(place);
-                if leads && (count >= few || near(&trial)) { on.push(trial) } else { rest.push(trial) }
+                if leads && (!is_last || near(&trial)) { on.push(trial) } else { rest.push(trial) }
             }
             trials = on.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
             trials.extend(rest);

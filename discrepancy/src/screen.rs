@@ -161,8 +161,8 @@ pub fn screen(
         .par_iter()
         .filter_map(|candidate| {
             let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
-            let sizes = if steps { sizes_with_steps } else { sizes };
-            let sizes = sizes(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
+            let of_place = if steps { sizes_with_steps } else { sizes };
+            let sizes = of_place(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
             best_of(candidate, &sizes, fit, model, scene, draws)
         })
         .collect();

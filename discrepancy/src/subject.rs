@@ -1,8 +1,8 @@
 //! What is diagnosed: the model, its unknowns, and the experiments, taken from a study.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use mops_core::{Case, Dual, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
+use mops_core::{Case, Dual, Job, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
 
 use crate::hygiene::{noise_of, without_spikes};
 
@@ -67,6 +67,8 @@ pub struct Subject {
     pub measurements: Vec<Measurement>,
     /// What a reader should know of the data.
     pub notes: Vec<String>,
+    /// Steps that a simulation of the declared model takes in a second of its time, once that is calibrated.
+    pub pace: OnceLock<f64>,
 }
 
 impl Subject {
@@ -160,7 +162,27 @@ impl Subject {
             return Err(Mistake::new("experiments", "no experiment is for calibration")
                 .with_help("give one the role \"calibration\""));
         }
-        Ok(Self { study: Arc::new(study.clone()), model: Arc::clone(model), globals, measurements, notes })
+        Ok(Self {
+            study: Arc::new(study.clone()),
+            model: Arc::clone(model),
+            globals,
+            measurements,
+            notes,
+            pace: OnceLock::new(),
+        })
+    }
+
+    /// Notes how many steps the declared model takes with these globals: candidates are allowed as many, and more.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn take_pace(&self, globals: &[f64]) {
+        let of = |(index, m): (usize, &Measurement)| {
+            let parameters = self.parameters(index, globals);
+            let job = Job { case: &m.case, parameters: &parameters, signals: &[], horizon: m.horizon };
+            let analysis = self.model.analyse(&job).ok()?;
+            Some(analysis.response()?.work.steps as f64 / m.horizon)
+        };
+        let fastest = self.measurements.iter().enumerate().filter_map(of).fold(0.0, f64::max);
+        self.pace.get_or_init(|| fastest);
     }
 
     /// Start values of the global unknowns.

@@ -1,7 +1,7 @@
 //! Subjects for tests: a model from text, and records that the test computes by itself.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, OnceLock};
 
 use mops_core::{
     Case, Channel, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale,
@@ -98,7 +98,14 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         warnings: Vec::new(),
         notes: Vec::new(),
     };
-    Subject { study: Arc::new(study), model, globals: (0..globals).collect(), measurements, notes: Vec::new() }
+    Subject {
+        study: Arc::new(study),
+        model,
+        globals: (0..globals).collect(),
+        measurements,
+        notes: Vec::new(),
+        pace: OnceLock::new(),
+    }
 }
 
 /// The study that a subject could have been taken from, with a seed of its own.

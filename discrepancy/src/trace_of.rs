@@ -160,13 +160,13 @@ pub fn sizes_with_steps(
     trajectories: &[Trajectory],
 ) -> Option<Sizes> {
     let sizes = sizes(place, model, pieces, trajectories)?;
-    let series = |piece: &'_ Piece| match spot(place, model, piece) {
-        Some(Spot::Sensor(series)) => Some(series),
-        _ => None,
-    };
-    let measured = pieces.iter().filter_map(|piece| Some(&piece.series[series(piece)?]));
-    let (samples, noise) = measured
-        .fold((Vec::new(), 0.0_f64), |(all, noise), s| ([all.as_slice(), &s.values].concat(), noise.max(s.noise)));
+    let (mut samples, mut noise) = (Vec::new(), 0.0_f64);
+    for piece in pieces {
+        if let Some(Spot::Sensor(series)) = spot(place, model, piece) {
+            samples.extend_from_slice(&piece.series[series].values);
+            noise = noise.max(piece.series[series].noise);
+        }
+    }
     Some(if samples.is_empty() { sizes } else { sizes.with_quantum_of(&samples, noise) })
 }
 

@@ -38,9 +38,11 @@ pub struct Variant {
     pub first: Vec<usize>,
 }
 
-/// Steps of a simulation beyond which a candidate is too stiff to be worth it: so many for each sample, and a few more.
-const STEPS_PER_SAMPLE: usize = 10;
-const FEW_STEPS: usize = 1000;
+/// Steps of a simulation beyond which a candidate is too stiff to be worth it: so many for each sample, so many times those of the
+/// declared model, and a few more.
+const STEPS_PER_SAMPLE: f64 = 10.0;
+const TIMES_DECLARED: f64 = 3.0;
+const FEW_STEPS: f64 = 1000.0;
 
 impl Variant {
     /// The declared model with these effects, to be simulated over pieces of experiments.
@@ -51,7 +53,11 @@ impl Variant {
         let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
         let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
         let longest = pieces.iter().flat_map(|piece| &piece.series).map(|s| s.times.len()).max().unwrap_or(0);
-        let model = model.with_step_limit(FEW_STEPS + STEPS_PER_SAMPLE * longest);
+        let horizon = pieces.iter().map(|piece| piece.horizon).fold(0.0, f64::max);
+        let declared = subject.pace.get().map_or(0.0, |pace| pace * horizon);
+        #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let limit = (FEW_STEPS + STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared) as usize;
+        let model = model.with_step_limit(limit);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();
         for a in added {
