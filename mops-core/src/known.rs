@@ -61,7 +61,8 @@ pub struct KeptSlopes<S> {
 
 /// Where a run keeps what it learns, and finds what is known already. Points go by the values of all tuners, bit by bit.
 ///
-/// A run asks it from many threads and tells it from one, in the order of its points. Answers must be what the problem
+/// A search asks it from many threads and tells it from one, in the order of its points; samples and searches for worst cases
+/// tell it from many. Answers must be what the problem
 /// would give itself: then they change no bit of the run, whatever is known.
 pub trait Store: Send + Sync {
     /// What is known of a point.

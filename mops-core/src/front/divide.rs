@@ -47,7 +47,7 @@ impl<'a> Divide<'a> {
                 self.compare(&points[..at], j, k);
             }
         } else if k == 2 {
-            self.sweep(&[], points);
+            self.sweep_among(points);
         } else {
             let middle = self.median(points.iter(), k);
             let [less, equal, more] = self.split(points, middle, k);
@@ -104,7 +104,16 @@ impl<'a> Divide<'a> {
         self.ranks[j as usize] = rank;
     }
 
-    /// Ranks points by their first two objectives: after those that are known or, where there are none, among each other.
+    /// Ranks points among each other by their first two objectives.
+    fn sweep_among(&mut self, points: &[u32]) {
+        for &j in points {
+            self.follow(j);
+            self.enter(j);
+        }
+        self.clear(points);
+    }
+
+    /// Ranks points after those that are known by their first two objectives.
     fn sweep(&mut self, known: &[u32], points: &[u32]) {
         let mut before = known.iter().copied().peekable();
         for &j in points {
@@ -112,17 +121,24 @@ impl<'a> Divide<'a> {
             while let Some(i) = before.next_if(|&i| i < j) {
                 self.enter(i);
             }
-            let mut place = self.seconds[j as usize] + 1;
-            while place > 0 {
-                let rank = &mut self.ranks[j as usize];
-                *rank = (*rank).max(self.tree[place as usize]);
-                place &= place - 1;
-            }
-            if known.is_empty() {
-                self.enter(j);
-            }
+            self.follow(j);
         }
-        for &i in if known.is_empty() { points } else { known } {
+        self.clear(known);
+    }
+
+    /// Ranks a point after those that the tree holds.
+    fn follow(&mut self, j: u32) {
+        let rank = &mut self.ranks[j as usize];
+        let mut place = self.seconds[j as usize] + 1;
+        while place > 0 {
+            *rank = (*rank).max(self.tree[place as usize]);
+            place &= place - 1;
+        }
+    }
+
+    /// Empties the tree of these points.
+    fn clear(&mut self, points: &[u32]) {
+        for &i in points {
             let mut place = self.seconds[i as usize] as usize + 1;
             while place < self.tree.len() {
                 self.tree[place] = 0;

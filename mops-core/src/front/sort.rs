@@ -3,8 +3,8 @@
 use super::compare;
 use super::divide::Divide;
 
-/// Sorts points into fronts: rank 0 is dominated by none, rank 1 only by those of rank 0, and so on. Keeps its memory between
-/// calls.
+/// Sorts points into fronts: rank 0 is dominated by none, rank 1 only by those of rank 0, and so on. Objectives may be infinite,
+/// and no NaN. Of one and two it keeps its memory between calls.
 ///
 /// Two objectives take `O(n log n)`: the points are swept in the order of the first, and each front remembers the least
 /// second objective so far. More take `O(n log^(m-1) n)` by divide and conquer.
@@ -30,7 +30,8 @@ impl FrontSorter {
         self.order.extend(0..count as u32);
         if m == 2 {
             // In the order of the first objective; equal ones by the second.
-            let key = |i: u32| (objectives[2 * i as usize], objectives[2 * i as usize + 1]);
+            // Zeros of either sign are equal.
+            let key = |i: u32| (objectives[2 * i as usize] + 0.0, objectives[2 * i as usize + 1] + 0.0);
             self.order.sort_unstable_by(|&a, &b| {
                 let ((a0, a1), (b0, b1)) = (key(a), key(b));
                 a0.total_cmp(&b0).then(a1.total_cmp(&b1)).then(a.cmp(&b))
