@@ -52,9 +52,8 @@ pub(super) fn again(catalogue: &Catalogue, folder: &Path) -> Result<Again, Troub
             folder.display()
         ))
         .with_help(format!(
-            "`mops run {} --out {} --resume` ends it, and simulates no known point again",
-            run.home,
-            folder.display()
+            "`{} --resume` ends it, and simulates no known point again",
+            run.command.replace(" --resume", "")
         ))
         .into());
     }

@@ -196,7 +196,9 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Some(page) = page {
         page.finish(&folder);
     }
-    if let Some(trouble) = opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop))) {
+    if let Some(trouble) =
+        opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop), solved.outcome.evaluations))
+    {
         let _ = writeln!(std::io::stderr(), "warning: not every evaluation could be kept: {trouble}");
     }
     let plain = without_settings(&file.source.text, &settings);

@@ -14,7 +14,7 @@ use super::bytes;
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
 
 /// Version of the tables.
-const FORMAT: i32 = 1;
+const FORMAT: i32 = 2;
 
 const TABLES: &str = "
 CREATE TABLE runs (
@@ -204,12 +204,11 @@ impl Database {
         Ok(self.connection.last_insert_rowid())
     }
 
-    /// Writes how a run ended; of one without a search, its points are those that were known or simulated.
-    pub(super) fn end(&self, run: i64, state: RunState, reused: usize, simulated: usize) -> rusqlite::Result<()> {
+    /// Writes how a run ended; the number of its points where it told of none before.
+    pub(super) fn end(&self, run: i64, state: RunState, reused: usize, points: usize) -> rusqlite::Result<()> {
         let sql = "UPDATE runs SET ended = ?, state = ?, reused = ?, \
                    evaluations = CASE WHEN evaluations = 0 THEN ? ELSE evaluations END WHERE id = ?";
-        let both = integer(reused + simulated);
-        self.connection.execute(sql, params![now(), state.name(), integer(reused), both, run])?;
+        self.connection.execute(sql, params![now(), state.name(), integer(reused), integer(points), run])?;
         // One file, which can be read where nothing can be written; while somebody reads it stays as it is.
         let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         Ok(())
@@ -269,6 +268,11 @@ impl Database {
         self.connection.execute("DELETE FROM points WHERE length(tuners) > ?", [most])?;
         self.connection.execute("DELETE FROM slopes WHERE length(tuners) > ?", [most])?;
         Ok(())
+    }
+
+    /// Removes all derivatives: those along the coordinates of another unit box.
+    pub(super) fn forget_slopes(&self) -> rusqlite::Result<()> {
+        self.connection.execute("DELETE FROM slopes", []).map(|_| ())
     }
 
     /// All derivatives.

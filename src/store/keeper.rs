@@ -115,11 +115,14 @@ impl Keeper {
             Start::Reuse(from) => {
                 let source = reused(from, identity)?;
                 if same_folder(from, folder) {
-                    let alike = before(&source, from)?.has_uncertain_of(identity);
+                    let before = before(&source, from)?;
                     drop(source);
                     let database = opened(folder, true)?;
-                    if !alike {
+                    if !before.has_uncertain_of(identity) {
                         database.forget_beyond(study.tuners.len()).map_err(|error| trouble(folder, &error))?;
+                    }
+                    if !before.has_coordinates_of(identity) {
+                        database.forget_slopes().map_err(|error| trouble(folder, &error))?;
                     }
                     Some(database)
                 } else {
@@ -202,10 +205,9 @@ impl Drop for End<'_> {
 }
 
 impl Opened {
-    /// Enters how the run ended.
-    pub fn end(self, state: RunState) -> Option<String> {
-        let ended =
-            self.database.end(self.run, state, self.reused, self.simulated).err().map(|error| error.to_string());
+    /// Enters how the run ended, and how many points it has.
+    pub fn end(self, state: RunState, evaluations: usize) -> Option<String> {
+        let ended = self.database.end(self.run, state, self.reused, evaluations).err().map(|error| error.to_string());
         self.trouble.or(ended)
     }
 

@@ -83,7 +83,7 @@ impl Store for Memory {
             });
         }
         points.insert(key.clone(), new.clone());
-        drop(points);
+        // Before somebody else adds to the point: what is written last is what is known last.
         self.send(Message::Point(PointRow { tuners: key, known: new }));
     }
 

@@ -96,24 +96,33 @@ impl Store for Copies {
 
     fn answered(&self, tuners: &[f64], learned: Option<Known>) {
         for part in 0..self.parts.len() {
-            let learned = learned.as_ref().and_then(|learned| self.original(part, learned));
-            self.store.answered(&self.key(tuners, part), learned);
+            let (key, learned) = (self.key(tuners, part), learned.as_ref().and_then(|l| self.original(part, l)));
+            // Nothing may have been asked of a part.
+            if learned.is_some() || self.store.known(&key).is_some() {
+                self.store.answered(&key, learned);
+            }
         }
     }
 
     fn known_slopes(&self, tuners: &[f64], reach: f64) -> Option<Option<RowSlopes>> {
+        if !self.same_coordinates {
+            return None;
+        }
         let of = |part: usize| {
             let known = self.store.known_slopes(&self.key(tuners, part), reach)?;
             let made = |(row, slopes)| Some((self.row(part, row)?, slopes));
             Some(known.map(|rows| rows.into_iter().filter_map(made).collect::<RowSlopes>()))
         };
-        let parts: Vec<Option<RowSlopes>> =
-            if self.same_coordinates { (0..self.parts.len()).map(of).collect::<Option<_>>()? } else { return None };
+        let parts: Vec<Option<RowSlopes>> = (0..self.parts.len()).map(of).collect::<Option<_>>()?;
         Some(parts.into_iter().collect::<Option<Vec<RowSlopes>>>().map(|parts| parts.concat()))
     }
 
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
-        for part in (0..self.parts.len()).filter(|_| self.same_coordinates) {
+        // Where there are none, nobody knows in which of several parts.
+        if !self.same_coordinates || (slopes.is_none() && self.parts.len() > 1) {
+            return;
+        }
+        for part in 0..self.parts.len() {
             let of_part = |rows: &RowSlopes| {
                 let of_part = rows.iter().filter(|(row, _)| self.rows[*row].0 == part);
                 of_part.map(|(row, slopes)| (self.rows[*row].1, slopes.clone())).collect()
