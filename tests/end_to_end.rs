@@ -269,7 +269,7 @@ fn a_new_study_checks_and_runs() {
     mops(&["check", "mine/study.toml"]).current_dir(&folder).assert().code(0);
     mops(&["new", "copy", "--from", "furuta-swing"]).current_dir(&folder).assert().code(0);
     mops(&["run", "copy", "--quiet", "--max-evaluations", "40"]).current_dir(&folder).assert().code(0);
-    assert!(folder.path().join("results/furuta-swing/report.html").exists());
+    assert!(folder.path().join("results/copy/report.html").exists());
 }
 
 #[test]

@@ -28,17 +28,27 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             .with_help("give a folder that does not exist; nothing was written")
             .into());
     }
+    let called = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "study".into());
+    let called = called.replace(['"', '\\'], "-");
     let files: Vec<(&str, Vec<u8>)> = match from {
         Some(name) => {
             let names = catalogue.studies.iter().map(|study| study.name);
             let study = catalogue.studies.iter().find(|study| study.name == name).ok_or_else(|| {
                 Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names))
             })?;
-            study.files.iter().map(|(path, bytes)| (*path, bytes.to_vec())).collect()
+            let own = |bytes: &[u8]| match std::str::from_utf8(bytes) {
+                Ok(text) => text
+                    .replacen(&format!("name = \"{}\"", study.name), &format!("name = \"{called}\""), 1)
+                    .into_bytes(),
+                Err(_) => bytes.to_vec(),
+            };
+            let of = |&(path, bytes): &(&'static str, &[u8])| {
+                (path, if path == "study.toml" { own(bytes) } else { bytes.to_vec() })
+            };
+            study.files.iter().map(of).collect()
         }
         None => {
-            let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "study".into());
-            vec![("study.toml", TEMPLATE.replace("{name}", &name.replace(['"', '\\'], "-")).into_bytes())]
+            vec![("study.toml", TEMPLATE.replace("{name}", &called).into_bytes())]
         }
     };
     let schema = ("study.schema.json", schema::text(catalogue).into_bytes());

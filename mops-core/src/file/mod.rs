@@ -125,7 +125,8 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
     }
     draft.tasks = tasks::read(&root, catalogue)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
-    let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
+    let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
+    study.notes.extend(tasks::unused(&root, study.task));
     let (content, data) = (content::of(root.value()), files.digests());
     Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()), content, data })
 }

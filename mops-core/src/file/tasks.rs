@@ -10,7 +10,7 @@ use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::study::{
     AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, ParetoTask, Place, RegressionDraft, SensitivityMethod,
-    SensitivityTask, SweepDraft, TasksDraft,
+    SensitivityTask, SweepDraft, Task, TasksDraft,
 };
 use crate::unit::Quantity;
 
@@ -140,6 +140,19 @@ pub(super) const TABLES: [&str; 10] = [
     "monte-carlo",
     "uncertainty",
 ];
+
+/// What a reader should know of tables of other tasks than that of the study: they do nothing.
+pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
+    let is_of = |table: &str| match table {
+        "uncertain" => true,
+        "robust" => task == Task::Design,
+        "uncertainty" => task == Task::Calibration,
+        own => serde_json::to_value(task).is_ok_and(|task| task == own),
+    };
+    let unused = TABLES.iter().filter(|table| root.child(table).is_some() && !is_of(table));
+    let word = serde_json::to_value(task).expect("a task is a word");
+    unused.map(|table| format!("[{table}] does nothing in a study with the task {word}")).collect()
+}
 
 /// Reads the tables of all tasks; what is absent has its defaults.
 pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {

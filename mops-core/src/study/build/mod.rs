@@ -111,8 +111,18 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     study.tasks = tasks::build(draft.tasks, &study)?;
-    if study.task == Task::Design && !study.tasks.uncertain.is_empty() && study.tasks.robust.is_none() {
-        let fact = "the design takes no notice of [uncertain]: a table [robust] makes it one against the worst cases";
+    let is_sure = match study.task {
+        Task::Design => study.tasks.robust.is_none(),
+        Task::Pareto | Task::Calibration | Task::Sweep => true,
+        _ => false,
+    };
+    if is_sure && !study.tasks.uncertain.is_empty() {
+        let fact = match study.task {
+            Task::Design => {
+                "the design takes no notice of [uncertain]: a table [robust] makes it one against the worst cases"
+            }
+            _ => "this task takes no notice of [uncertain]",
+        };
         study.notes.push(fact.to_owned());
     }
     Ok(study)
