@@ -192,9 +192,12 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
             format!("worst scaled value {now} (start {start}); ")
         }
     };
+    // What uncertainty makes of it is told below.
+    let nominal = outcome.found.worst_case.is_some() || outcome.found.monte_carlo.is_some();
+    let nominal = if nominal { "without uncertainty: " } else { "" };
     let stop = if solved { stop } else { "nothing was solved: looked at the start values".to_owned() };
     text += &format!(
-        "\n{constraints}{demands}{reached}{stop} after {} evaluations, {} simulations, {:.2} s\n",
+        "\n{nominal}{constraints}{demands}{reached}{stop} after {} evaluations, {} simulations, {:.2} s\n",
         outcome.evaluations, outcome.simulations, outcome.seconds
     );
     text

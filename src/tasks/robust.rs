@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use mops_core::{
-    AddedReport, Budget, Ending, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask, RoundReport, Run,
-    RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
+    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask,
+    RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
 use super::batches::Stage;
@@ -26,7 +26,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let (mut stop, mut archive, mut simulations, mut reused) = (Stop::Stalled, Vec::new(), 0, 0);
     let mut last: Option<Solved>;
     loop {
-        let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len() };
+        let before = options.max_evaluations - left;
+        let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len(), before };
         let study = rounds.to_solve();
         let keeping = rounds.keeping(&study, options);
         let solved = search(study, &Options { max_evaluations: left, keeping, ..options.clone() }, &designing)?;
@@ -65,11 +66,13 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     Ok(solved)
 }
 
-/// Shows a round's search for a design as a stage: its points are no share of the whole.
+/// Shows a round's search for a design as a stage: its points are no share of the whole, and count all the same.
 struct Designing<'a> {
     watch: &'a dyn Watch,
     round: usize,
     cases: usize,
+    /// Points of the rounds before.
+    before: usize,
 }
 
 impl Watch for Designing<'_> {
@@ -77,8 +80,14 @@ impl Watch for Designing<'_> {
         self.watch.wants_stop()
     }
 
+    fn improved(&self, best: &Evaluation) {
+        self.watch.improved(best);
+    }
+
     #[allow(clippy::cast_precision_loss)]
     fn evaluated(&self, state: &RunState) {
+        let (evaluations, budget) = (self.before + state.evaluations, self.before + state.budget);
+        self.watch.evaluated(&RunState { evaluations, budget, ..*state });
         let what = format!(
             "round {}: designing with {} worst cases, best {}",
             self.round,
@@ -255,10 +264,15 @@ fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
         (false, _) => format!("the search still found worse cases after {rounds} rounds"),
     };
     let mut words = vec![format!("{added} worst cases were added; {end}.")];
-    let violated = if round.violation_found > FEASIBLE {
-        format!(", and a constraint is violated there by {} of its demand", number(round.violation_found))
-    } else {
-        String::new()
+    let violated = match number(round.violation_found) {
+        _ if round.violation_found <= FEASIBLE => String::new(),
+        by if round.violation_found <= report.tolerance => {
+            format!(
+                ", and a constraint is missed there by {by} of its demand, which the tolerance of {} allows",
+                number(report.tolerance)
+            )
+        }
+        by => format!(", and a constraint is violated there by {by} of its demand"),
     };
     if round.found.is_finite() {
         words.push(format!(
