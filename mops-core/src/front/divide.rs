@@ -139,18 +139,21 @@ impl<'a> Divide<'a> {
     /// Empties the tree of these points.
     fn clear(&mut self, points: &[u32]) {
         for &i in points {
-            let mut place = self.seconds[i as usize] as usize + 1;
-            while place < self.tree.len() {
-                self.tree[place] = 0;
-                place += place & place.wrapping_neg();
-            }
+            self.change(i, |_| 0);
         }
     }
 
+    /// Adds a point to the tree.
     fn enter(&mut self, i: u32) {
+        let rank = self.ranks[i as usize] + 1;
+        self.change(i, |most| most.max(rank));
+    }
+
+    /// Changes every node of the tree that holds a point.
+    fn change(&mut self, i: u32, to: impl Fn(u32) -> u32) {
         let mut place = self.seconds[i as usize] as usize + 1;
         while place < self.tree.len() {
-            self.tree[place] = self.tree[place].max(self.ranks[i as usize] + 1);
+            self.tree[place] = to(self.tree[place]);
             place += place & place.wrapping_neg();
         }
     }
