@@ -107,9 +107,7 @@ impl<'a> Search<'a> {
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
             let finalists = &trials[..trials.len().min(self.limits.finalists)];
-            let leading = || finalists.iter().filter_map(Trial::newest);
-            let is_simpler =
-                |t: &&Trial<'a>| t.newest().is_some_and(|own| leading().any(|than| own.is_simpler_than(than)));
+            let is_simpler = |t: &&Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
             let simpler = trials[finalists.len()..].iter().filter(is_simpler);
             let near = nearness(trials.first());
             let worth: Vec<&Trial<'a>> = finalists.iter().filter(|t| near(t)).chain(simpler).collect();
@@ -195,9 +193,9 @@ impl<'a> Search<'a> {
             let (mut on, mut rest) = (Vec::new(), Vec::new());
             for trial in trials {
                 let place = trial.newest().map_or_else(String::new, Candidate::place);
-                let is_simpler =
-                    |than: &Trial<'a>| trial.newest().zip(than.newest()).is_some_and(|(a, b)| a.is_simpler_than(b));
-                let leads = on.len() < count || (is_first && !places.contains(&place)) || on.iter().any(is_simpler);
+                let leads = on.len() < count
+                    || (is_first && !places.contains(&place))
+                    || on.iter().any(|than| trial.is_simpler_than(than));
                 places.push(place);
                 if leads && (!is_last || near(&trial)) { on.push(trial) } else { rest.push(trial) }
             }

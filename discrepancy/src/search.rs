@@ -334,6 +334,11 @@ impl<'a> Trial<'a> {
         self.added.last().map(|added| &added.candidate)
     }
 
+    /// Whether its newest effect is simpler than that of another.
+    pub(crate) fn is_simpler_than(&self, than: &Self) -> bool {
+        self.newest().zip(than.newest()).is_some_and(|(own, other)| own.is_simpler_than(other))
+    }
+
     /// Number of unknowns that its effects bring in.
     pub fn unknowns(&self) -> usize {
         self.fitted.point.globals.len() - self.fit.subject.globals.len()
