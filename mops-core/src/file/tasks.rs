@@ -143,14 +143,14 @@ pub(super) const TABLES: [&str; 10] = [
 
 /// What a reader should know of tables of other tasks than that of the study: they do nothing.
 pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
+    let word = serde_json::to_value(task).expect("a task is a word");
     let is_of = |table: &str| match table {
         "uncertain" => true,
         "robust" => task == Task::Design,
         "uncertainty" => task == Task::Calibration,
-        own => serde_json::to_value(task).is_ok_and(|task| task == own),
+        own => word == own,
     };
     let unused = TABLES.iter().filter(|table| root.child(table).is_some() && !is_of(table));
-    let word = serde_json::to_value(task).expect("a task is a word");
     unused.map(|table| format!("[{table}] does nothing in a study with the task {word}")).collect()
 }
 
