@@ -91,9 +91,11 @@ impl Solver for Auto {
         }
         let local = choose(oracle, start)?;
         let mut global = Multistart::new(local, self.options.starts);
-        if oracle.shape().residuals > 0 {
-            global = global.until_nothing_changes();
-        }
+        global = if oracle.shape().residuals > 0 {
+            global.until_nothing_changes()
+        } else {
+            global.with_second(PatternSearchOptions::default().build())
+        };
         global.begin(oracle, start)?;
         self.stage = Some(Stage::Global(global));
         Ok(())

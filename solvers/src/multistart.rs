@@ -8,6 +8,9 @@ use crate::start::{best_of, latin_hypercube};
 /// A local solver with a list of starts.
 pub struct Multistart {
     local: Box<dyn Solver>,
+    /// What goes on from where the first run ends, and whether it does now.
+    second: Option<Box<dyn Solver>>,
+    in_second: bool,
     /// Starts after the first.
     extra: usize,
     /// Starts that are left, the next one last; `None` before the first run has ended.
@@ -23,7 +26,7 @@ pub struct Multistart {
     /// Rounds around the best point that were begun, rounds in a row that found nothing, and the objective before.
     round: Round,
     /// The best that the present run has seen itself.
-    own: Merit,
+    own: Option<Evaluation>,
     /// The same of the runs that have ended.
     ends: Vec<Merit>,
 }
@@ -47,6 +50,8 @@ impl Multistart {
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
         Self {
             local,
+            second: None,
+            in_second: false,
             extra: starts.saturating_sub(1),
             left: None,
             best: None,
@@ -54,9 +59,15 @@ impl Multistart {
             reach: &[0.15, 0.05],
             gain: 1e-3,
             round: Round::NONE,
-            own: Merit::FAILED,
+            own: None,
             ends: Vec::new(),
         }
+    }
+
+    /// Another solver goes on from the best point of the first run, before the other starts.
+    #[must_use]
+    pub fn with_second(self, second: Box<dyn Solver>) -> Self {
+        Self { second: Some(second), ..self }
     }
 
     /// Goes on around the best point until two rounds of restarts, a wide and a narrow one, improve it by less than a
@@ -104,10 +115,8 @@ impl Multistart {
     }
 
     fn begin_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        let mut seen = Seen { oracle, best: Merit::FAILED };
-        let begun = self.local.begin(&mut seen, start);
-        self.own = seen.best;
-        begun
+        self.own = None;
+        self.local.begin(&mut Own { oracle, best: &mut self.own }, start)
     }
 
     /// An iteration of the present run, or the beginning of the next.
@@ -115,13 +124,22 @@ impl Multistart {
     /// # Errors
     /// The run is over.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let mut seen = Seen { oracle: &mut *oracle, best: self.own };
-        let progress = self.local.step(&mut seen)?;
-        self.own = seen.best;
+        let mut own = Own { oracle: &mut *oracle, best: &mut self.own };
+        let solver = self.second.as_mut().filter(|_| self.in_second).unwrap_or(&mut self.local);
+        let progress = solver.step(&mut own)?;
         if progress == Progress::Continue {
             return Ok(progress);
         }
-        self.ends.push(self.own);
+        if !self.in_second
+            && let Some(second) = &mut self.second
+            && let Some(start) = own.best().map(|best| best.point.clone())
+        {
+            second.begin(&mut own, &start)?;
+            self.in_second = true;
+            return Ok(Progress::Continue);
+        }
+        (self.second, self.in_second) = (None, false);
+        self.ends.push(self.own.as_ref().map_or(Merit::FAILED, |best| best.merit));
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
             self.best = Some((found, progress));
@@ -175,13 +193,13 @@ impl Multistart {
     }
 }
 
-/// An oracle that remembers the best it has answered.
-struct Seen<'a> {
+/// The oracle of one run: its best is the best of that run.
+struct Own<'a> {
     oracle: &'a mut dyn Oracle,
-    best: Merit,
+    best: &'a mut Option<Evaluation>,
 }
 
-impl Oracle for Seen<'_> {
+impl Oracle for Own<'_> {
     fn shape(&self) -> &Shape {
         self.oracle.shape()
     }
@@ -189,8 +207,8 @@ impl Oracle for Seen<'_> {
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
         let answers = self.oracle.evaluate(points)?;
         for answer in &answers {
-            if answer.merit.is_better_than(&self.best) {
-                self.best = answer.merit;
+            if self.best.as_ref().is_none_or(|best| answer.merit.is_better_than(&best.merit)) {
+                *self.best = Some(answer.clone());
             }
         }
         Ok(answers)
@@ -201,7 +219,7 @@ impl Oracle for Seen<'_> {
     }
 
     fn best(&self) -> Option<&Evaluation> {
-        self.oracle.best()
+        self.best.as_ref()
     }
 
     fn stream(&self, label: &str) -> Stream {

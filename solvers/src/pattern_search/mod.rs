@@ -10,7 +10,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::epigraph::Rows;
+use crate::sqp::SqpOptions;
 use crate::start::usable_start;
+use crate::texture::{Texture, texture};
 use least::Aim;
 use models::Models;
 use pattern::Pattern;
@@ -22,6 +24,9 @@ use pattern::Pattern;
 /// Before it polls, it searches: every row has a quadratic model of its own through the points around the best one, and the
 /// point where the largest of the models is least is tried, inside a trust region. So the kink where two criteria meet is
 /// seen. Constraints enter by an exact penalty, which grows while the search ends at infeasible points.
+///
+/// Where neither models nor pattern lead on although the models promise much, a row has kinks of its own: unless its values
+/// are noise, slopes by differences are followed from there (as `sqp` does), as long as they lead on.
 ///
 /// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); turned patterns: M. A. Abramson, C. Audet,
 /// J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N. Vicente,
@@ -81,6 +86,12 @@ struct State {
     curvatures: Vec<DMatrix<f64>>,
     /// Whether the first pattern has been polled.
     polled: bool,
+    /// What follows a kink inside a row, while it does.
+    slopes: Option<Box<dyn Solver>>,
+    /// What the best point was worth when slopes were last followed; infinite while they were not.
+    followed_from: f64,
+    /// What the rows are like; `None` while nobody wanted to know.
+    texture: Option<Texture>,
 }
 
 impl Solver for PatternSearch {
@@ -110,6 +121,9 @@ impl Solver for PatternSearch {
             spacing: oracle.shape().spacing.clone(),
             curvatures: vec![DMatrix::zeros(n, n); none.len()],
             polled: false,
+            slopes: None,
+            followed_from: f64::INFINITY,
+            texture: None,
         });
         Ok(())
     }
@@ -119,6 +133,10 @@ impl Solver for PatternSearch {
         if state.best.point.is_empty() {
             return Ok(Progress::Converged);
         }
+        if state.slopes.is_some() {
+            state.follow(oracle)?;
+            return Ok(Progress::Continue);
+        }
         state.forget();
         if state.polled && state.search(oracle)? {
             return Ok(Progress::Continue);
@@ -126,7 +144,7 @@ impl Solver for PatternSearch {
         let batch = if state.polled { self.options.batch } else { 0 };
         let better = state.poll(oracle, batch)?;
         state.polled = true;
-        if better {
+        if better || state.meets_kink(oracle)? {
             return Ok(Progress::Continue);
         }
         if state.radius > self.options.tolerance && !state.is_on_finest_grid() {
@@ -155,6 +173,12 @@ const SHRINK: f64 = 0.25;
 
 /// A promise at the end, relative to what the best point is worth, that tells of a kink.
 const KEPT: f64 = 1e-10;
+
+/// The same while the search goes on.
+const BROKEN: f64 = 1e-4;
+
+/// First radius of the steps along slopes, in those of the pattern.
+const FOLLOWED: f64 = 4.0;
 
 /// Times that the search begins again because of a kink.
 const RESTARTS: i32 = 4;
@@ -287,6 +311,41 @@ impl State {
             }
             before = here;
         }
+    }
+
+    /// Begins to follow slopes where the models promise what the problem does not keep; `false` where that is not so, where
+    /// slopes led nowhere the last time, and where they would tell of noise.
+    fn meets_kink(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        let worth = self.worth(oracle.shape(), &self.best);
+        let promising = self.promised > BROKEN * worth.abs();
+        let led_on = self.followed_from - worth > BROKEN * worth.abs();
+        if !promising || !led_on || self.spacing.iter().any(|&spacing| spacing > 0.0) {
+            return Ok(false);
+        }
+        if self.texture.is_none() {
+            self.texture = Some(texture(oracle, &self.best.point)?);
+        }
+        if self.texture == Some(Texture::Noisy) {
+            return Ok(false);
+        }
+        let mut slopes = SqpOptions { radius: FOLLOWED * self.radius, ..Default::default() }.build();
+        slopes.begin(oracle, &self.best.point)?;
+        self.slopes = Some(slopes);
+        self.followed_from = worth;
+        Ok(true)
+    }
+
+    /// A step along slopes.
+    fn follow(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
+        let Some(slopes) = &mut self.slopes else { return Ok(()) };
+        if slopes.step(oracle)? != Progress::Continue {
+            self.slopes = None;
+        }
+        let Some(best) = oracle.best().cloned() else { return Ok(()) };
+        if self.worth(oracle.shape(), &best) < self.worth(oracle.shape(), &self.best) {
+            self.best = best;
+        }
+        Ok(())
     }
 
     fn shrink(&mut self) {
