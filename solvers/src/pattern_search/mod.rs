@@ -39,7 +39,7 @@ pub struct PatternSearchOptions {
     pub size: f64,
     /// Distance at which the search ends.
     pub tolerance: f64,
-    /// Points of a pattern that are evaluated at once; 0 for all.
+    /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
     pub batch: usize,
 }
 
@@ -80,6 +80,8 @@ struct State {
     penalty: f64,
     unit: f64,
     pattern: Pattern,
+    /// Points that are evaluated at once; 0 for whole patterns.
+    batch: usize,
     random: Stream,
     spacing: Vec<f64>,
     /// Curvature of every row as the last models have it, per unit of the box.
@@ -117,6 +119,7 @@ impl Solver for PatternSearch {
             restarts: 0,
             penalty: 10.0,
             pattern: Pattern::straight(n),
+            batch: self.options.batch,
             random: oracle.stream("pattern-search"),
             spacing: oracle.shape().spacing.clone(),
             curvatures: vec![DMatrix::zeros(n, n); none.len()],
@@ -141,8 +144,7 @@ impl Solver for PatternSearch {
         if state.polled && state.search(oracle)? {
             return Ok(Progress::Continue);
         }
-        let batch = if state.polled { self.options.batch } else { 0 };
-        let better = state.poll(oracle, batch)?;
+        let better = state.poll(oracle)?;
         state.polled = true;
         if better || state.meets_kink(oracle)? {
             return Ok(Progress::Continue);
@@ -178,7 +180,7 @@ const KEPT: f64 = 1e-10;
 const BROKEN: f64 = 1e-4;
 
 /// First radius of the steps along slopes, in those of the pattern.
-const FOLLOWED: f64 = 4.0;
+const FOLLOWED: f64 = 3.0;
 
 /// Times that the search begins again because of a kink.
 const RESTARTS: i32 = 4;
@@ -203,7 +205,7 @@ impl State {
         let mut gained = 0.0;
         for answer in answers {
             if let Some(scaled) = &answer.scaled
-                && !self.known.iter().any(|(point, _)| *point == answer.point)
+                && !self.knows(&answer.point)
             {
                 self.known.push((answer.point.clone(), scaled.clone()));
             }
@@ -224,7 +226,8 @@ impl State {
         }
     }
 
-    /// Tries where the models are least; `true` while that is worth going on with, `false` when it is time to poll.
+    /// Tries where the models are least, and beside it as much of the pattern as fills a batch; `true` while that is worth
+    /// going on with, `false` when it is time to poll.
     fn search(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         if self.spacing.iter().all(|&spacing| spacing > 0.0) {
             return Ok(false);
@@ -242,7 +245,8 @@ impl State {
         if promised <= floor || point == self.best.point {
             return self.mend(oracle, &near, &models);
         }
-        let gained = self.visit(oracle, &[point])?;
+        let points = self.with_pattern(shape, &models, point);
+        let gained = self.visit(oracle, &points)?;
         let ratio = gained / promised;
         if gained > 0.0 {
             self.failures = 0;
@@ -267,28 +271,22 @@ impl State {
         let [up, down] = [1.0, -1.0].map(|side| &direction * side);
         let point = if aim.worth(&models.values(&up)) <= aim.worth(&models.values(&down)) { up } else { down };
         let point = self.at(&point);
-        if point == self.best.point || self.known.iter().any(|(known, _)| *known == point) {
+        if self.knows(&point) {
             return Ok(false);
         }
         let count = self.known.len();
-        self.visit(oracle, &[point])?;
+        let points = self.with_pattern(oracle.shape(), models, point);
+        self.visit(oracle, &points)?;
         Ok(self.known.len() > count)
     }
 
     /// Polls the pattern, what looks best first; `true` when a point was better.
-    fn poll(&mut self, oracle: &mut dyn Oracle, batch: usize) -> Result<bool, Halt> {
+    fn poll(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         self.failures = 0;
-        let mut points = self.pattern.points(&self.best.point, self.radius, &self.spacing);
-        if let Some(models) = self.models(&self.near()) {
-            let aim = self.aim(oracle.shape());
-            let worth = |point: &Vec<f64>| {
-                let y = DVector::from_fn(point.len(), |j, _| (point[j] - self.best.point[j]) / self.radius);
-                aim.worth(&models.values(&y))
-            };
-            let mut ordered: Vec<(f64, Vec<f64>)> = points.into_iter().map(|point| (worth(&point), point)).collect();
-            ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
-            points = ordered.into_iter().map(|(_, point)| point).collect();
-        }
+        let models = self.models(&self.near());
+        let points = self.pattern(oracle.shape(), models.as_ref());
+        // The first pattern is what the first models go through.
+        let batch = if self.polled { self.batch } else { 0 };
         let batch = if batch == 0 { points.len().max(1) } else { batch };
         for points in points.chunks(batch) {
             let before = self.best.point.clone();
@@ -300,13 +298,44 @@ impl State {
         Ok(false)
     }
 
+    /// A point, and what looks best of the pattern: a batch.
+    fn with_pattern(&self, shape: &Shape, models: &Models, point: Vec<f64>) -> Vec<Vec<f64>> {
+        let beside = self.pattern(shape, Some(models)).into_iter().take(self.batch.saturating_sub(1));
+        std::iter::once(point).chain(beside).collect()
+    }
+
+    /// Unknown points of the pattern around the best one, what looks best to the models first.
+    fn pattern(&self, shape: &Shape, models: Option<&Models>) -> Vec<Vec<f64>> {
+        let mut points = self.pattern.points(&self.best.point, self.radius, &self.spacing);
+        points.retain(|point| !self.knows(point));
+        let Some(models) = models else { return points };
+        let aim = self.aim(shape);
+        let worth = |point: &Vec<f64>| {
+            let y = DVector::from_fn(point.len(), |j, _| (point[j] - self.best.point[j]) / self.radius);
+            aim.worth(&models.values(&y))
+        };
+        let mut ordered: Vec<(f64, Vec<f64>)> = points.into_iter().map(|point| (worth(&point), point)).collect();
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ordered.into_iter().map(|(_, point)| point).collect()
+    }
+
+    fn knows(&self, point: &[f64]) -> bool {
+        self.known.iter().any(|(known, _)| known == point)
+    }
+
     /// Goes on in the direction of a success, twice as far each time, while that is better.
     fn run_on(&mut self, oracle: &mut dyn Oracle, mut before: Vec<f64>) -> Result<(), Halt> {
         loop {
             let here = self.best.point.clone();
-            let step = DVector::from_fn(here.len(), |j, _| 2.0 * (here[j] - before[j]) / self.radius);
-            let point = self.at(&step);
-            if point == here || self.visit(oracle, &[point])? == 0.0 {
+            let mut step = DVector::from_fn(here.len(), |j, _| 2.0 * (here[j] - before[j]) / self.radius);
+            let mut points: Vec<Vec<f64>> = Vec::new();
+            for _ in 0..self.batch.max(1) {
+                points.push(self.at(&step));
+                step *= 2.0;
+            }
+            points.retain(|point| *point != here);
+            points.dedup();
+            if points.is_empty() || self.visit(oracle, &points)? == 0.0 {
                 return Ok(());
             }
             before = here;

@@ -68,12 +68,7 @@ pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn W
         let rivals = relative::rivals(catalogue);
         let mut rivalling: Vec<Task<'_>> = Vec::new();
         for &subject in &subjects {
-            rivalling.extend(rivals.iter().map(|solver| Task {
-                solver,
-                subject,
-                seed: 1,
-                slope: Slope::Differences,
-            }));
+            rivalling.extend(rivals.iter().map(|solver| Task { solver, subject, seed: 1, slope: Slope::Differences }));
         }
         let others = done(&rivalling);
         relative::judge(&mut found, &others, plan.suite.accuracy);

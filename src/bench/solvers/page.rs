@@ -2,7 +2,7 @@
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
-use crate::report::{Curve, Ink, Plot};
+use crate::report::{Curve, CurveStyle, Ink, Plot, Upright, significant};
 
 /// The page, from the tables as text, and from the results with their names.
 pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
@@ -16,10 +16,61 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
         let data = [data(all, rough, ROUGH), data(all, fine, accuracy)];
         data.into_iter().chain([performance(all, rough, ROUGH), performance(all, fine, accuracy)]).collect()
     };
-    let plots: Vec<Option<Plot>> = if of_fronts { Vec::new() } else { profiles() };
+    let plots: Vec<Option<Plot>> = if of_fronts { vec![volumes(all)] } else { profiles() };
     let title = format!("Benchmark of solvers: {suite}");
     let pictures: Vec<String> = plots.iter().flatten().map(Plot::svg).collect();
-    super::super::page::page(&title, "Profiles", &pictures, tables, "results.json")
+    let heading = if of_fronts { "Hypervolume" } else { "Profiles" };
+    super::super::page::page(&title, heading, &pictures, tables, "results.json")
+}
+
+/// Hypervolume of every run in parts of that of the true front: an axis for every problem, a dot for every seed.
+#[allow(clippy::cast_precision_loss)]
+fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
+    let mut problems: Vec<&str> = Vec::new();
+    let rows = all.iter().flat_map(|(_, results)| &results.rows);
+    let shares: Vec<f64> = rows
+        .filter_map(|row| {
+            if !problems.contains(&row.problem.as_str()) {
+                problems.push(&row.problem);
+            }
+            row.front.map(|front| front.hypervolume / front.known)
+        })
+        .collect();
+    // All axes begin at the same round share.
+    let least = shares.iter().copied().fold(1.0, f64::min);
+    let from = [0.99, 0.95, 0.9, 0.8, 0.5].into_iter().find(|from| *from <= least).unwrap_or(0.0);
+    let height = |share: f64| (share - from) / (1.0 - from);
+    let names = all
+        .iter()
+        .flat_map(|(name, results)| results.solvers().into_iter().map(move |solver| (name, *results, solver)));
+    let names: Vec<_> = names.collect();
+    let curve = |(index, (name, results, solver)): (usize, &(&String, &Results, &str))| {
+        // Solvers stand beside each other.
+        let aside = 0.12 * (index as f64 - 0.5 * (names.len() as f64 - 1.0));
+        let point = |row: &Row| {
+            let at = problems.iter().position(|problem| *problem == row.problem)?;
+            let front = row.front?;
+            Some((at as f64 + aside, height(front.hypervolume / front.known)))
+        };
+        Curve {
+            name: if name.is_empty() { (*solver).to_owned() } else { format!("{solver}, {name}") },
+            points: results.of(solver).filter_map(point).collect(),
+            style: CurveStyle::Dots,
+            ink: Ink::Series(index),
+            ..Curve::default()
+        }
+    };
+    let ends = [-0.3, problems.len() as f64 - 0.7];
+    let rule = |y: f64| Curve { points: ends.map(|x| (x, y)).to_vec(), ink: Ink::Grid, ..Curve::default() };
+    let upright = |name: &&str| Upright { name: (*name).to_owned(), ends: [significant(from, 3), "1".to_owned()] };
+    (!shares.is_empty()).then(|| Plot {
+        title: "Hypervolume in parts of that of the true front".into(),
+        x_label: "problem".into(),
+        y_label: "one dot for every seed".into(),
+        uprights: problems.iter().map(upright).collect(),
+        curves: [0.0, 1.0].map(rule).into_iter().chain(names.iter().enumerate().map(curve)).collect(),
+        ..Plot::default()
+    })
 }
 
 /// The solvers of all results, with their names and scores.
