@@ -7,11 +7,15 @@ fn problems(suite: &str) -> Vec<Problem> {
     (suite.problems)()
 }
 
-fn sqp(problem: &Problem, slope: Slope) -> Measured {
+fn solve(kind: &str, problem: &Problem, slope: Slope, budget: usize) -> Measured {
     let posed = Posed::new(problem, slope);
-    let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "sqp").expect("sqp is a kind");
+    let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
     let mut solver = kind.default_choice().make();
-    measure(&problem.answer, &posed, &posed.start(), solver.as_mut(), 1000 * (problem.dimension() + 1))
+    measure(&problem.answer, &posed, &posed.start(), solver.as_mut(), budget * (problem.dimension() + 1))
+}
+
+fn sqp(problem: &Problem, slope: Slope) -> Measured {
+    solve("sqp", problem, slope, 1000)
 }
 
 fn check(suite: &str, names: &[&str], accuracy: f64) {
@@ -32,6 +36,17 @@ fn min_max_problems_are_solved() {
 fn problems_with_constraints_are_solved() {
     let names = ["HS5", "HS7", "HS19", "HS23", "HS32", "HS43", "HS71", "HS86", "HS100", "HS109", "HS113", "HS118"];
     check("hock-schittkowski", &names, 1e-6);
+}
+
+/// The sum of absolute residuals has kinks that no row shows. All residuals vanish at the solutions of these problems.
+#[test]
+fn a_pattern_search_follows_kinks_inside_a_row() {
+    for name in ["5 n3 m3", "15 n6 m6"] {
+        let all = problems("more-wild-piecewise");
+        let problem = all.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
+        let found = solve("pattern-search", problem, Slope::Differences, 100);
+        assert!(found.best.objective < 1e-4, "{name}: {:?}", found.best);
+    }
 }
 
 /// A definition with a wrong number in it has another optimum than the published one.

@@ -212,10 +212,35 @@ mod tests {
         }
     }
 
+    /// The minimisers solve the normal equations, or are those that the paper names.
+    #[test]
+    fn least_values_are_reached_and_not_undercut_nearby() {
+        let minimisers: [(u32, usize, usize, &[f64]); 5] = [
+            (5, 3, 3, &[1.0, 0.0, 0.0]),
+            (6, 4, 4, &[0.0; 4]),
+            (12, 3, 10, &[1.0, 10.0, 1.0]),
+            (20, 5, 5, &[1.0; 5]),
+            (16, 10, 10, &[1.0; 10]),
+        ];
+        for (function, n, m, x) in minimisers {
+            let value = smooth(function, n).functions.values(x)[0];
+            assert!((value - least(function, n, m).unwrap()).abs() < 1e-20, "{function}: {value}");
+        }
+        // Rank one: any x with sum of j x_j = 3 / (2 m + 1).
+        let (n, m) = (7, 35);
+        let mut x = [0.0; 7];
+        x[0] = 3.0 / (2.0 * 35.0 + 1.0);
+        let value = smooth(2, n).functions.values(&x)[0];
+        assert!((value - least(2, n, m).unwrap()).abs() < 1e-10, "{value}");
+        x[0] += 1e-4;
+        assert!(smooth(2, n).functions.values(&x)[0] > value);
+    }
+
     /// Source: More, Garbow, Hillstrom (1981): the sum of squares at x = 0 of the linear function of full rank is m + n, and
     /// (-1, .., -1) gives m - n.
     #[test]
     fn the_linear_function_has_its_least_value_at_minus_one() {
         assert!((smooth(1, 9).functions.values(&[-1.0; 9])[0] - 36.0).abs() < 1e-12);
+        assert_eq!(least(1, 9, 45), Some(36.0));
     }
 }
