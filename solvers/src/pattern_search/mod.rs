@@ -370,9 +370,11 @@ impl State {
         if slopes.step(oracle)? != Progress::Continue {
             self.slopes = None;
         }
-        let Some(best) = oracle.best().cloned() else { return Ok(()) };
-        if self.worth(oracle.shape(), &best) < self.worth(oracle.shape(), &self.best) {
-            self.best = best;
+        let shape = oracle.shape();
+        if let Some(best) = oracle.best()
+            && self.worth(shape, best) < self.worth(shape, &self.best)
+        {
+            self.best = best.clone();
         }
         Ok(())
     }

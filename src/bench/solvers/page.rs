@@ -1,4 +1,4 @@
-//! The page of a benchmark of solvers: profiles as pictures, and what the terminal says.
+//! The page of a benchmark of solvers: profiles, or hypervolumes of fronts, as pictures, and what the terminal says.
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
@@ -53,7 +53,7 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
             Some((at as f64 + aside, height(front.hypervolume / front.known)))
         };
         Curve {
-            name: if name.is_empty() { (*solver).to_owned() } else { format!("{solver}, {name}") },
+            name: named(solver, name),
             points: results.of(solver).filter_map(point).collect(),
             style: CurveStyle::Dots,
             ink: Ink::Series(index),
@@ -73,11 +73,15 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
     })
 }
 
+/// A solver of the results of a name.
+fn named(solver: &str, name: &str) -> String {
+    if name.is_empty() { solver.to_owned() } else { format!("{solver}, {name}") }
+}
+
 /// The solvers of all results, with their names and scores.
 fn scored(all: &[(String, &Results)], count: impl Fn(&Row) -> Option<usize> + Copy) -> Vec<(String, Vec<Score>)> {
     let of = |(name, results): &(String, &Results)| -> Vec<(String, Vec<Score>)> {
-        let named = |solver: &str| if name.is_empty() { solver.to_owned() } else { format!("{solver}, {name}") };
-        results.solvers().into_iter().map(|solver| (named(solver), Score::of(results, solver, count))).collect()
+        results.solvers().into_iter().map(|solver| (named(solver, name), Score::of(results, solver, count))).collect()
     };
     all.iter().flat_map(of).collect()
 }

@@ -212,9 +212,8 @@ mod tests {
         }
     }
 
-    /// The minimisers solve the normal equations, or are those that the paper names.
     #[test]
-    fn least_values_are_reached_and_not_undercut_nearby() {
+    fn least_values_are_those_at_known_minimisers() {
         let minimisers: [(u32, usize, usize, &[f64]); 5] = [
             (5, 3, 3, &[1.0, 0.0, 0.0]),
             (6, 4, 4, &[0.0; 4]),
