@@ -149,7 +149,7 @@ impl Screening {
     }
 }
 
-/// Screens candidates, and the same on draws of white noise in place of the residuals.
+/// Screens candidates, and the same on draws of white noise in place of the residuals, of which the unknowns absorb as much.
 pub fn screen(
     candidates: &[Candidate],
     fit: &Fit<'_>,
@@ -157,13 +157,14 @@ pub fn screen(
     scene: &Scene,
     draws: &[Vec<f64>],
 ) -> Screening {
+    let draws: Vec<Vec<f64>> = draws.iter().map(|draw| scene.project(draw)).collect();
     let looked: Vec<(Option<Screened>, Vec<f64>)> = candidates
         .par_iter()
         .filter_map(|candidate| {
             let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
             let of_place = if steps { sizes_with_steps } else { sizes };
             let sizes = of_place(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
-            best_of(candidate, &sizes, fit, model, scene, draws)
+            best_of(candidate, &sizes, fit, model, scene, &draws)
         })
         .collect();
     let mut by_chance = vec![0.0_f64; draws.len()];
