@@ -1,5 +1,7 @@
 //! The account of a diagnosis: candidates by probability, what is said of each effect found, how the parameters moved.
 
+use std::sync::Arc;
+
 use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue};
 use crate::fit::dot;
 use crate::plan::separating;
@@ -12,7 +14,7 @@ use crate::subject::Subject;
 use crate::weigh::{Dispersion, criterion, probabilities};
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
-pub fn ranking(rounds: &[Round<'_>], last: &Trial<'_>) -> Vec<Ranked> {
+pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
     let mut ranked: Vec<Ranked> = Vec::new();
     let mut seen: Vec<(String, String)> = Vec::new();
     let is_added = |t: &Trial<'_>| t.newest().is_some_and(|own| last.added.iter().any(|a| own.is(&a.candidate)));
@@ -75,7 +77,7 @@ pub fn found(
     index: usize,
     last: &Trial<'_>,
     after: &Calibrated,
-    rounds: &[Round<'_>],
+    rounds: &[Arc<Round<'_>>],
     ranking: &[Ranked],
     dispersion: &Dispersion,
 ) -> Found {
@@ -132,12 +134,13 @@ fn is_newest(trial: &Trial<'_>, effect: &str, place: &str) -> bool {
 }
 
 /// The round in which an effect did best.
-fn round_of<'r, 'a>(rounds: &'r [Round<'a>], effect: &str, place: &str) -> Option<&'r Round<'a>> {
-    rounds.iter().find(|round| round.trials.first().is_some_and(|best| is_newest(best, effect, place)))
+fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], effect: &str, place: &str) -> Option<&'r Round<'a>> {
+    let best_is = |round: &&Arc<Round<'a>>| round.trials.first().is_some_and(|best| is_newest(best, effect, place));
+    rounds.iter().find(best_is).map(Arc::as_ref)
 }
 
 /// The experiment that would best tell an effect found from its nearest rival.
-pub fn next_experiment(rounds: &[Round<'_>], found: &[Found]) -> Option<String> {
+pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<String> {
     found.iter().find_map(|found| {
         let rival = found.indistinguishable.first()?;
         let round = round_of(rounds, &found.effect, &found.place)?;
@@ -149,7 +152,7 @@ pub fn next_experiment(rounds: &[Round<'_>], found: &[Found]) -> Option<String> 
 }
 
 /// The smallest strengths that would have been noticed, of the effects whose size is one number.
-pub fn noticeable(rounds: &[Round<'_>], subject: &Subject) -> Vec<Noticeable> {
+pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject) -> Vec<Noticeable> {
     let Some(round) = rounds.first() else { return Vec::new() };
     let one = |s: &Screened| {
         let candidate = &s.added.candidate;

@@ -48,7 +48,7 @@ pub fn diagnose(
     let subject = Subject::new(study)?;
     let simulations = AtomicUsize::new(0);
     let limits = Limits::at(options.level);
-    let search = Search { subject: &subject, effects, limits, simulations: &simulations };
+    let search = Search::new(&subject, effects, limits, &simulations);
     let lost = || {
         Mistake::new("tuners", "the declared model cannot be simulated from anywhere near the start values")
             .with_help("`mops simulate` shows what happens there; start nearer to what is plausible")

@@ -140,6 +140,7 @@ impl Fitted {
 }
 
 /// What is known at the point of another fit, which has the first of the unknowns of this one.
+#[derive(Clone)]
 pub struct Known {
     /// The point.
     pub point: Point,

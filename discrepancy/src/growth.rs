@@ -1,6 +1,8 @@
 //! Growth: effects are added one at a time, or two at once, as long as chance would not do as well; then what the others
 //! make superfluous goes, and each is held against its rivals.
 
+use std::sync::Arc;
+
 use mops_core::{Mistake, Watch};
 
 use crate::candidate::Candidate;
@@ -26,7 +28,7 @@ pub struct Growth<'a> {
     /// Where it ended.
     pub last: Trial<'a>,
     /// What was tried: first for the first effect, and so on, or for each effect with the others in.
-    pub rounds: Vec<Round<'a>>,
+    pub rounds: Vec<Arc<Round<'a>>>,
     /// The models on the way.
     pub steps: Vec<Step>,
     /// Probability of a residual as structured as the declared model's if nothing were missing.
@@ -107,8 +109,6 @@ impl<'a> Search<'a> {
     fn onward(&self, begun: Growth<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
         let mut growth = begun;
         let mut exchanges = EXCHANGES;
-        // The round after the present one, where it was looked at already.
-        let mut ahead: Option<Round<'a>> = None;
         let most = options.max_effects;
         while growth.last.added.len() < most {
             let count = growth.last.added.len();
@@ -116,7 +116,7 @@ impl<'a> Search<'a> {
                 return Err(Mistake::here("the diagnosis was interrupted"));
             }
             watch.stage(&format!("search for effect {}", count + 1), 0.1 + 0.7 * count as f64 / most as f64);
-            let Some(round) = ahead.take().or_else(|| self.round(&growth.last)) else { break };
+            let Some(round) = self.round(&growth.last) else { break };
             if count == 0 {
                 // Of the screening itself: its gains are those of single directions.
                 growth.p_value = round.screened.first().map_or(1.0, |s| by_chance(s.gain, round.independent));
@@ -134,34 +134,31 @@ impl<'a> Search<'a> {
             let next = match (single, pair) {
                 (Some(single), pair) => self.either(single, pair),
                 // Two together may do what neither does alone.
-                (None, Some(pair)) => (self.over_or_in_windows(pair), None),
+                (None, Some(pair)) => self.over_or_in_windows(pair),
                 (None, None) => {
                     growth.rounds.push(round);
                     break;
                 }
             };
-            growth.step("added", next.0);
-            ahead = next.1;
+            growth.step("added", next);
             growth.rounds.push(round);
             // What one effect stood in for may have its place once the next is in.
             while let Some(better) = self.exchange(&growth.last, &mut exchanges, watch) {
                 growth.step("exchanged", better);
-                ahead = None;
             }
         }
         Ok(growth)
     }
 
-    /// The best single effect with the round that follows it, where that was looked at; or a pair, where it beats that with
-    /// the best that can be added to it.
-    fn either(&self, single: &Trial<'a>, pair: Option<&Trial<'a>>) -> (Trial<'a>, Option<Round<'a>>) {
+    /// The best single effect; or a pair, where it beats that with the best that can be added to it.
+    fn either(&self, single: &Trial<'a>, pair: Option<&Trial<'a>>) -> Trial<'a> {
         let single = self.over_or_in_windows(single);
-        let Some(pair) = pair else { return (single, None) };
+        let Some(pair) = pair else { return single };
         let second = self.round(&single);
         let rival = second.as_ref().and_then(|second| second.trials.first());
         let of = Dispersion::of(pair);
         let alone = rival.map_or(f64::INFINITY, |rival| criterion(rival, &of)).min(criterion(&single, &of));
-        if criterion(pair, &of) < alone - 2.0 { (self.over_or_in_windows(pair), None) } else { (single, second) }
+        if criterion(pair, &of) < alone - 2.0 { self.over_or_in_windows(pair) } else { single }
     }
 
     /// The same over whole records, without what is superfluous, each effect held against its rivals.
@@ -194,7 +191,7 @@ impl<'a> Search<'a> {
 
     /// The model with one effect in place of two at the same port that it does the work of, as an asymmetric friction does that
     /// of a Coulomb friction and a constant force; and the round that it is from.
-    fn merged(&self, last: &Trial<'a>) -> Option<(Trial<'a>, Round<'a>)> {
+    fn merged(&self, last: &Trial<'a>) -> Option<(Trial<'a>, Arc<Round<'a>>)> {
         let of = Dispersion::of(last);
         let most = criterion(last, &of) + CLEARLY;
         for i in 0..last.added.len() {
@@ -226,8 +223,9 @@ impl<'a> Search<'a> {
 
     /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
     /// held against its rivals.
-    fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Round<'a>>) {
-        let rounds: Vec<Round<'a>> = (0..last.added.len()).filter_map(|index| self.rivals(last, index)).collect();
+    fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Arc<Round<'a>>>) {
+        let rounds: Vec<Arc<Round<'a>>> =
+            (0..last.added.len()).filter_map(|index| self.rivals(last, index).map(Arc::new)).collect();
         let of = Dispersion::of(last);
         let better = least(rounds.iter().filter_map(|round| round.trials.first()), &of);
         let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - margin(b, last)).cloned();
@@ -237,7 +235,7 @@ impl<'a> Search<'a> {
     /// The round for one of the effects with the others in.
     fn rivals(&self, last: &Trial<'a>, index: usize) -> Option<Round<'a>> {
         let without = self.over_or_in_windows(&self.without(last, index)?);
-        let mut round = self.round(&without)?;
+        let mut round = Round::clone(&*self.round(&without)?);
         let own = &last.added[index];
         let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a.clone());
         let others: Vec<Added> = others.collect();

@@ -139,7 +139,7 @@ fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
     let subject = plant(Hidden { force: Some(|_, x| bulge(x[0])), ..Hidden::default() }, "bulge");
     let simulations = AtomicUsize::new(0);
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &[], limits, simulations: &simulations };
+    let search = Search::new(&subject, &[], limits, &simulations);
     let trial = search.trial(&[], &subject.start(), vec![vec![0.0; 3]], 1, 60).expect("it simulates");
     let scene = Scene::new(&trial.fit, &trial.variant.model, &trial.fitted).expect("it simulates");
     let found = locate(&trial.fit, &trial.variant.model, &scene);

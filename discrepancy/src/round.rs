@@ -1,5 +1,7 @@
 //! A round of the search: the whole catalogue screened against what a model leaves, and the best of it fitted.
 
+use std::sync::Arc;
+
 use mops_core::{Trials, stream};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -14,6 +16,7 @@ use crate::variant::{Added, problem};
 use crate::weigh::{Dispersion, by_chance};
 
 /// Candidates of one round: as screened, and the best of them as fitted.
+#[derive(Clone)]
 pub struct Round<'a> {
     /// As screened, best first.
     pub screened: Vec<Screened>,
@@ -58,8 +61,19 @@ fn white(count: usize) -> Vec<Vec<f64>> {
 }
 
 impl<'a> Search<'a> {
+    /// The round that begins with a trial; none is done twice.
+    pub fn round(&self, from: &Trial<'a>) -> Option<Arc<Round<'a>>> {
+        let looked = || self.looked.lock().expect("no thread panics with it");
+        if let Some((_, round)) = looked().iter().find(|(other, _)| other.is_like(from)) {
+            return Some(Arc::clone(round));
+        }
+        let round = Arc::new(self.look(from)?);
+        looked().push((from.clone(), Arc::clone(&round)));
+        Some(round)
+    }
+
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
-    pub fn round(&self, from: &Trial<'a>) -> Option<Round<'a>> {
+    fn look(&self, from: &Trial<'a>) -> Option<Round<'a>> {
         let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
         // What chance does is asked of the declared model alone.
         let draws = if from.added.is_empty() { white(scene.residuals.len()) } else { Vec::new() };

@@ -1,7 +1,7 @@
 //! The search: which effects, one after the other, bring the residuals down to the noise.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex};
 
 use mops_core::{Effect, Role, stream};
 use rand_distr::{Distribution, StandardNormal};
@@ -9,6 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::base;
 use crate::candidate::{Candidate, candidates};
 use crate::fit::{Fit, Fitted, Piece, dot};
+use crate::round::Round;
 use crate::subject::{Local, Subject};
 use crate::variant::{Added, Variant, problem};
 use crate::weigh::{Dispersion, criterion};
@@ -66,9 +67,21 @@ pub struct Search<'a> {
     pub limits: Limits,
     /// Counts simulations.
     pub simulations: &'a AtomicUsize,
+    /// Rounds that were looked at, each with what it began with.
+    pub(crate) looked: Mutex<Vec<(Trial<'a>, Arc<Round<'a>>)>>,
 }
 
 impl<'a> Search<'a> {
+    /// A search that begins.
+    pub fn new(
+        subject: &'a Subject,
+        effects: &'a [Arc<dyn Effect>],
+        limits: Limits,
+        simulations: &'a AtomicUsize,
+    ) -> Self {
+        Self { subject, effects, limits, simulations, looked: Mutex::default() }
+    }
+
     /// Pieces that choose between models: calibration and selection data, each record in so many windows.
     pub(crate) fn pieces(&self, windows: usize) -> Vec<Piece> {
         let whole = base::pieces(self.subject, |role| role != Role::Validation);
@@ -327,6 +340,15 @@ impl<'a> Trial<'a> {
     pub(crate) fn continued(self, iterations: usize) -> Option<Self> {
         let fitted = self.fit.resume(&self.fitted, iterations)?;
         Some(Self { fitted, ..self }.read())
+    }
+
+    /// Whether it is the same model of the same pieces, and leaves as much but for a small share.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        const SHARE: f64 = 1e-3;
+        self.windows == other.windows
+            && self.added.len() == other.added.len()
+            && self.added.iter().zip(&other.added).all(|(a, b)| a.candidate.is(&b.candidate))
+            && (self.fitted.chi2 - other.fitted.chi2).abs() <= SHARE * self.fitted.chi2
     }
 
     /// The effect that was added last; `None` in the declared model.

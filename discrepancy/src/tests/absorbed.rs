@@ -47,7 +47,7 @@ fn a_fit_that_is_fine_as_gravity_absorbs_the_drag_forecasts_badly_and_the_drag_i
     assert!(alone.normalised() < 1.15 && alone.point.globals[0] < 8.5, "{} {:?}", alone.normalised(), alone.point);
 
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &effects, limits, simulations: &simulations };
+    let search = Search::new(&subject, &effects, limits, &simulations);
     let declared = search.declared(&alone).expect("it simulates");
     let forecast = search.calibrate(&declared, &[]).expect("it simulates").errors(&subject.measurements);
     assert!(forecast[1].normalised > 5.0 && forecast[2].normalised > 20.0, "{forecast:?}");

@@ -31,7 +31,7 @@ fn decay(r: f64, label: &str) -> Subject {
 fn with<T>(subject: &Subject, look: impl FnOnce(&Trial<'_>) -> T) -> T {
     let simulations = AtomicUsize::new(0);
     let limits = Limits::at(0.01);
-    let search = Search { subject, effects: &[], limits, simulations: &simulations };
+    let search = Search::new(subject, &[], limits, &simulations);
     look(&search.trial(&[], &subject.start(), vec![vec![50.0]], 1, 60).expect("it simulates"))
 }
 

@@ -77,7 +77,7 @@ fn by_outputs(record: Record) -> String {
         effects().into_iter().filter(|e| TERMS.iter().any(|(name, _)| *name == e.name())).collect();
     assert_eq!(named.len(), TERMS.len());
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
+    let search = Search::new(&subject, &named, limits, &simulations);
     let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
     screened[0].added.candidate.effect.name().to_owned()
 }

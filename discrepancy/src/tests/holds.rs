@@ -50,7 +50,7 @@ fn explained(hold: Hold) -> f64 {
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let named: Vec<Arc<dyn Effect>> = effects();
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &named, limits, simulations: &simulations };
+    let search = Search::new(&subject, &named, limits, &simulations);
     let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
     let left: f64 = scene.residuals.iter().map(|r| r * r).sum();
     let cubic = screened.iter().find(|s| s.added.candidate.effect.name() == "cubic-stiffness");

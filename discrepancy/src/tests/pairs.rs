@@ -71,7 +71,7 @@ fn dry_friction_alone_would_want_a_negative_viscous_coefficient() {
     let simulations = std::sync::atomic::AtomicUsize::new(0);
     let effects = named(&["coulomb-friction"]);
     let limits = crate::search::Limits::at(0.01);
-    let search = crate::search::Search { subject: &subject, effects: &effects, limits, simulations: &simulations };
+    let search = crate::search::Search::new(&subject, &effects, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![2.4, 0.0]], 1, 60).expect("it simulates");
     // Along the tangent it would have to drive the pendulum, which no friction does.
     let alone = search.round(&declared).expect("it simulates");

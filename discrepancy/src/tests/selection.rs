@@ -54,7 +54,7 @@ fn diagnosis(subject: &Subject) -> Diagnosis {
 fn weighed(subject: &Subject) -> (Vec<(String, f64)>, StrengthValue) {
     let simulations = AtomicUsize::new(0);
     let (named, limits) = (named(), Limits::at(0.01));
-    let search = Search { subject, effects: &named, limits, simulations: &simulations };
+    let search = Search::new(subject, &named, limits, &simulations);
     let calibrated = base::fit(subject, 1, &simulations).expect("it simulates");
     let declared = search.declared(&calibrated).expect("it simulates");
     let round = search.round(&search.over_or_in_windows(&declared)).expect("it simulates");

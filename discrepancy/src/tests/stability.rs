@@ -35,7 +35,7 @@ fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
     let simulations = AtomicUsize::new(0);
     let some: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| named.contains(&e.name())).collect();
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &some, limits, simulations: &simulations };
+    let search = Search::new(&subject, &some, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![1.0, 0.0]; count], 1, 60).expect("it simulates");
     let round = search.round(&declared).expect("it simulates");
     let best = round.trials[0].added[0].candidate.effect.name().to_owned();

@@ -32,7 +32,7 @@ fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise(
     let simulations = AtomicUsize::new(0);
     let lag: Vec<_> = effects().into_iter().filter(|e| e.name() == "actuator-lag").collect();
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &lag, limits, simulations: &simulations };
+    let search = Search::new(&subject, &lag, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![0.0; 2]], 1, 60).expect("it simulates");
     assert!(declared.fitted.normalised() > 5.0, "{}", declared.fitted.normalised());
 

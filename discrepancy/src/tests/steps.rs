@@ -42,7 +42,7 @@ fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let simulations = AtomicUsize::new(0);
     let all: Vec<Arc<dyn Effect>> = effects();
     let limits = Limits::at(0.01);
-    let search = Search { subject: &subject, effects: &all, limits, simulations: &simulations };
+    let search = Search::new(&subject, &all, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![0.5]], 1, 60).expect("it simulates");
     let round = search.round(&search.over_or_in_windows(&declared)).expect("it simulates");
     let best = &round.trials[0];
