@@ -499,6 +499,11 @@ fn experiments_that_do_not_fit_their_data() {
             calibration("every sample skipped", "free     =", "skip = 4\nfree     ="),
             calibration("an experiment that measures nothing", "channels = {", "channels = {}\n# {"),
             calibration("a noise of zero", "noise = 0.003", "noise = 0.0"),
+            calibration(
+                "an error in units of a noise that nobody gave",
+                "fit = { signal = \"theta\" }",
+                "normalised-error = { signal = \"phi\" }",
+            ),
             calibration("a noise in a unit that does not fit", "noise = 0.003", "noise = \"3 mm\""),
             calibration("a unit that does not fit the signal", "noise = 0.003", "unit = \"N m\""),
             calibration("a column of another kind than its signal", "phi = \"arm\"", "phi = \"torque\""),

@@ -64,6 +64,20 @@ impl Criterion for Bound {
         vec![self.signal.clone()]
     }
 
+    fn suits(&self, case: &Case) -> Result<(), Mistake> {
+        let channel = case.experiment.as_ref().and_then(|experiment| experiment.channel(&self.signal));
+        match channel {
+            Some(channel) if self.noise.or(channel.noise).is_none() => Err(Mistake::here(format!(
+                "the noise of `{}` in `{}` is not known",
+                self.signal, case.name
+            ))
+            .with_help(
+                "give `noise` here or with the channel of the experiment; `mops data` estimates it, `fit` needs none",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal)?;
         let scale = self.scale(comparison.channel)?;
@@ -81,12 +95,8 @@ impl Bound {
     /// `1/(noise sqrt(N))`.
     #[allow(clippy::cast_precision_loss)]
     fn scale(&self, channel: &Channel) -> Result<f64, String> {
-        let noise = self.noise.or(channel.noise).ok_or_else(|| {
-            format!(
-                "the noise of `{}` is not known: give `noise` here or with the channel of the experiment",
-                self.signal
-            )
-        })?;
+        let noise =
+            self.noise.or(channel.noise).ok_or_else(|| format!("the noise of `{}` is not known", self.signal))?;
         Ok(1.0 / (noise * (channel.times.len() as f64).sqrt()))
     }
 }
@@ -113,6 +123,6 @@ mod tests {
     #[test]
     fn without_a_noise_there_is_no_value() {
         let why = undefined_in(&measured(&[0.0, 1.0], &[0.0, 1.0], None), &error(None), &simulated(1.0, |t| t));
-        assert_eq!(why, "the noise of `y` is not known: give `noise` here or with the channel of the experiment");
+        assert_eq!(why, "the noise of `y` is not known");
     }
 }

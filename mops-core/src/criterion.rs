@@ -35,6 +35,14 @@ pub trait Criterion: Send + Sync {
     /// Names of the signals it reads.
     fn signals(&self) -> Vec<String>;
 
+    /// Whether the case has what the value needs, whatever the analysis.
+    ///
+    /// # Errors
+    /// What is lacking, and the way out.
+    fn suits(&self, _case: &Case) -> Result<(), Mistake> {
+        Ok(())
+    }
+
     /// The value for one case.
     ///
     /// # Errors

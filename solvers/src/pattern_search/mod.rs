@@ -163,6 +163,8 @@ impl Solver for PatternSearch {
         // An infeasible end: the penalty was too small, or nothing is feasible.
         if !state.best.merit.is_feasible() && state.penalty < 1e6 {
             state.penalty *= 100.0;
+            // Nothing is worth what it was.
+            state.followed_from = f64::INFINITY;
             state.radius = self.options.size;
             return Ok(Progress::Continue);
         }
@@ -204,11 +206,7 @@ impl State {
         let before = self.worth(shape, &self.best);
         let mut gained = 0.0;
         for answer in answers {
-            if let Some(scaled) = &answer.scaled
-                && !self.knows(&answer.point)
-            {
-                self.known.push((answer.point.clone(), scaled.clone()));
-            }
+            self.remember(&answer);
             let worth = self.worth(shape, &answer);
             if before - worth > gained {
                 gained = before - worth;
@@ -218,11 +216,20 @@ impl State {
         Ok(gained)
     }
 
+    fn remember(&mut self, answer: &Evaluation) {
+        if let Some(scaled) = &answer.scaled
+            && !self.knows(&answer.point)
+        {
+            self.known.push((answer.point.clone(), scaled.clone()));
+        }
+    }
+
     /// Forgets the oldest points where there are many: few of them are near.
     fn forget(&mut self) {
         let n = self.best.point.len();
         if self.known.len() > MEMORY + 2 * (n + 1) * (n + 2) {
             self.known.drain(..MEMORY);
+            self.remember(&self.best.clone());
         }
     }
 
@@ -375,6 +382,7 @@ impl State {
             && self.worth(shape, best) < self.worth(shape, &self.best)
         {
             self.best = best.clone();
+            self.remember(best);
         }
         Ok(())
     }

@@ -37,6 +37,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
             .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
     }
     for case in cases_of(study, &draft)? {
+        criterion.suits(&study.cases[case])?;
         let job = job(study, model, case, &criterion.signals(), &signals)?;
         study.rows.push(Row {
             name: name.to_owned(),

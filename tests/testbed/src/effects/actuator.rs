@@ -46,10 +46,9 @@ pub const ALL: &[Effect] = &[
         fits: real_actuator,
         build: |s| {
             let (peak, low, high) = (s.peak(), s.range.0, s.range.1);
-            // One-sided commands are cut at the top.
-            let floor = if low >= 0.0 { low } else { -high };
             Family::up_to(0.75, move |cut| {
-                let limit = if floor >= 0.0 { high - cut * (high - floor) } else { peak * (1.0 - cut) };
+                // Commands that are never negative are cut at the top.
+                let limit = if low >= 0.0 { high - cut * (high - low) } else { peak * (1.0 - cut) };
                 (curve(move |u| u.clamp(-limit, limit)), vec![("limit", limit)])
             })
         },
