@@ -31,7 +31,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
             // Nothing at all is a rival too, beforehand as likely as all candidates together.
             #[allow(clippy::cast_precision_loss)]
             let candidates = round.screened.len().max(1) as f64;
-            criteria.push(round.before / dispersion.weight() - 2.0 * candidates.ln());
+            criteria.push(criterion(&round.from, &dispersion) - 2.0 * candidates.ln());
         }
         let probabilities = probabilities(&criteria);
         for (trial, probability) in round.trials.iter().zip(probabilities) {
@@ -56,7 +56,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
                 place: key.1,
                 class: a.candidate.effect.class().name().to_owned(),
                 probability,
-                bic_gain: (round.before - criterion(trial, &Dispersion::WHITE)) / dispersion.weight(),
+                bic_gain: criterion(&round.from, &dispersion) - criterion(trial, &dispersion),
                 strengths: strengths.collect(),
                 absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
                 normalised: [Some(trial.fitted.normalised()), None],
@@ -139,7 +139,7 @@ fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], effect: &str, place: &str) -> 
     rounds.iter().find(best_is).map(Arc::as_ref)
 }
 
-/// The experiment that would best tell an effect found from its nearest rival.
+/// The experiment that would best tell an effect found from the first rival that the data cannot tell from it.
 pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<String> {
     found.iter().find_map(|found| {
         let rival = found.indistinguishable.first()?;

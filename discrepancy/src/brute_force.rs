@@ -41,6 +41,7 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
     let simulations = AtomicUsize::new(0);
     let failed = || Mistake::here("the model cannot be simulated near its start values");
     let declared = base::fit(&subject, study.seed, &simulations).ok_or_else(failed)?;
+    subject.take_pace(&declared.point.globals);
     let point = &declared.point;
     let of = |added: &[Added]| {
         let pieces = base::pieces(&subject, |role| role == Role::Calibration);

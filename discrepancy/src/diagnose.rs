@@ -68,10 +68,11 @@ pub fn diagnose(
     let (last, held) = search.without_declared(growth.last);
     watch.stage("the repaired model", 0.9);
     let after = search.calibrate(&last, &held).ok_or_else(lost)?;
-    let Judgement { verdict, last, after, unexplained, note } = judge(&search, &base, &located, last, after);
-
     let (rounds, steps) = (growth.rounds, growth.steps);
     let ranked = ranking(&rounds, &last);
+    let Judgement { verdict, last, held, after, unexplained, note } =
+        judge(&search, &base, &located, last, held, after);
+
     let dispersion = Dispersion::of(&last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
     let found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();

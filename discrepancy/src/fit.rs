@@ -140,7 +140,6 @@ impl Fitted {
 }
 
 /// What is known at the point of another fit, which has the first of the unknowns of this one.
-#[derive(Clone)]
 pub struct Known {
     /// The point.
     pub point: Point,

@@ -1,6 +1,7 @@
 //! Growth: effects are added one at a time, or two at once, as long as chance would not do as well; then what the others
 //! make superfluous goes, and each is held against its rivals.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use mops_core::{Mistake, Watch};
@@ -154,11 +155,16 @@ impl<'a> Search<'a> {
     fn either(&self, single: &Trial<'a>, pair: Option<&Trial<'a>>) -> Trial<'a> {
         let single = self.over_or_in_windows(single);
         let Some(pair) = pair else { return single };
+        let pair = self.over_or_in_windows(pair);
         let second = self.round(&single);
         let rival = second.as_ref().and_then(|second| second.trials.first());
-        let of = Dispersion::of(pair);
-        let alone = rival.map_or(f64::INFINITY, |rival| criterion(rival, &of)).min(criterion(&single, &of));
-        if criterion(pair, &of) < alone - 2.0 { self.over_or_in_windows(pair) } else { single }
+        let of = Dispersion::of(&pair);
+        // What cannot be followed over whole records has lost against what can.
+        let beats = |than: &Trial<'a>| match pair.windows.cmp(&than.windows) {
+            Ordering::Equal => criterion(&pair, &of) < criterion(than, &of) - 2.0,
+            other => other == Ordering::Less,
+        };
+        if beats(&single) && rival.is_none_or(beats) { pair } else { single }
     }
 
     /// The same over whole records, without what is superfluous, each effect held against its rivals.

@@ -8,7 +8,7 @@ use crate::locate::Located;
 use crate::screen::Scene;
 use crate::unknown::{Unknown, basis};
 
-/// Blocks per record; every fifth is left out at a time.
+/// Blocks per piece of a record; every fifth is left out at a time.
 const BLOCKS: f64 = 25.0;
 const FOLDS: usize = 5;
 

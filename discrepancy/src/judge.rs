@@ -30,6 +30,8 @@ pub struct Judgement<'a> {
     pub verdict: Verdict,
     /// The model, perhaps with a table in it.
     pub last: Trial<'a>,
+    /// Tuners of declared terms that it does not need.
+    pub held: Vec<usize>,
     /// The same fitted to calibration data alone.
     pub after: Calibrated,
     /// What no effect explains.
@@ -38,13 +40,15 @@ pub struct Judgement<'a> {
     pub note: Option<String>,
 }
 
-/// Judges the model that the search ended with; `base` is the declared one, and `located` where its residual comes from.
+/// Judges the model that the search ended with, without the declared terms `held`; `base` is the declared one, and `located`
+/// where its residual comes from.
 #[allow(clippy::cast_precision_loss)]
 pub fn judge<'a>(
     search: &Search<'a>,
     base: &Trial<'a>,
     located: &[Located],
     last: Trial<'a>,
+    held: Vec<usize>,
     after: Calibrated,
 ) -> Judgement<'a> {
     let (left, note) = if last.fitted.normalised() > UNEXPLAINED { left(&last) } else { (0.0, None) };
@@ -58,7 +62,7 @@ pub fn judge<'a>(
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,
     };
-    let mut judgement = Judgement { verdict, last, after, unexplained: None, note };
+    let mut judgement = Judgement { verdict, last, held, after, unexplained: None, note };
     if verdict == Verdict::Unexplained {
         judgement.unexplained = located.first().and_then(Located::unexplained);
         for place in located.iter().take(2) {
@@ -82,6 +86,8 @@ impl<'a> Judgement<'a> {
         };
         if better {
             (self.after, self.last, self.unexplained) = (calibrated, table, Some(found));
+            // Every declared term was fitted with it.
+            self.held.clear();
         }
         Some(())
     }

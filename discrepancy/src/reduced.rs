@@ -47,7 +47,8 @@ impl<'a> Search<'a> {
             let value = trial.fitted.point.globals[k];
             let error = covariance[(k, k)].max(0.0).sqrt();
             let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
-            let zero = global.bounds[0] <= 0.0 || (global.log && global.bounds[0] > 0.0);
+            let [low, high] = global.bounds;
+            let zero = (low <= 0.0 && high >= 0.0) || (global.log && low > 0.0);
             if !(zero && (at_least || value.abs() < 2.0 * error)) {
                 continue;
             }

@@ -19,17 +19,17 @@ use crate::weigh::{Dispersion, by_chance};
 #[derive(Clone)]
 pub struct Round<'a> {
     /// As screened, best first.
-    pub screened: Vec<Screened>,
+    pub screened: Arc<Vec<Screened>>,
     /// As fitted, best first.
     pub trials: Vec<Trial<'a>>,
     /// Directions that were looked in, as many as independent ones.
     pub directions: f64,
     /// The same as white noise in place of the residuals shows it, where that was tried.
     pub independent: f64,
-    /// The criterion of what the round began with.
-    pub before: f64,
-    /// Residuals and slopes of what the round began with.
-    known: Known,
+    /// What the round began with.
+    pub from: Trial<'a>,
+    /// Residuals and slopes of that.
+    known: Arc<Known>,
 }
 
 /// Draws of white noise in place of residuals.
@@ -61,14 +61,14 @@ fn white(count: usize) -> Vec<Vec<f64>> {
 }
 
 impl<'a> Search<'a> {
-    /// The round that begins with a trial; none is done twice.
+    /// The round that begins with a trial; what was found in it once is not looked for again.
     pub fn round(&self, from: &Trial<'a>) -> Option<Arc<Round<'a>>> {
         let looked = || self.looked.lock().expect("no thread panics with it");
-        if let Some((_, round)) = looked().iter().find(|(other, _)| other.is_like(from)) {
+        if let Some(round) = looked().iter().find(|round| round.from.is_like(from)) {
             return Some(Arc::clone(round));
         }
         let round = Arc::new(self.look(from)?);
-        looked().push((from.clone(), Arc::clone(&round)));
+        looked().push(Arc::clone(&round));
         Some(round)
     }
 
@@ -132,7 +132,8 @@ impl<'a> Search<'a> {
             }
         }
         let independent = independent.unwrap_or(directions);
-        Some(Round { screened, trials, directions, independent, before: from.score(), known })
+        let (screened, known) = (Arc::new(screened), Arc::new(known));
+        Some(Round { screened, trials, directions, independent, from: from.clone(), known })
     }
 
     /// The best candidates of a round, fitted from where the study begins: the fit of the model without them may have ended

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex};
 
-use mops_core::{Effect, Role, stream};
+use mops_core::{Effect, Role, Scope, Strength, stream};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::base;
@@ -67,8 +67,8 @@ pub struct Search<'a> {
     pub limits: Limits,
     /// Counts simulations.
     pub simulations: &'a AtomicUsize,
-    /// Rounds that were looked at, each with what it began with.
-    pub(crate) looked: Mutex<Vec<(Trial<'a>, Arc<Round<'a>>)>>,
+    /// Rounds that were looked at.
+    pub(crate) looked: Mutex<Vec<Arc<Round<'a>>>>,
 }
 
 impl<'a> Search<'a> {
@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
             let begins_with = |p: &Piece| {
                 p.measurement == piece.measurement && (p.case.begins - piece.case.begins).abs() < 1e-6 * p.horizon
             };
-            let first = trial.fit.pieces.iter().position(begins_with)?;
+            let Some(first) = trial.fit.pieces.iter().position(begins_with) else { continue };
             for (local, value) in piece.locals.iter().zip(locals) {
                 let window = &trial.fit.pieces[first];
                 if let Some(k) = window.locals.iter().position(|l| l.parameter == local.parameter) {
@@ -344,7 +344,7 @@ impl<'a> Trial<'a> {
 
     /// Whether it is the same model of the same pieces, and leaves as much but for a small share.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        const SHARE: f64 = 1e-3;
+        const SHARE: f64 = 1e-5;
         self.windows == other.windows
             && self.added.len() == other.added.len()
             && self.added.iter().zip(&other.added).all(|(a, b)| a.candidate.is(&b.candidate))
@@ -361,7 +361,14 @@ impl<'a> Trial<'a> {
         self.newest().zip(than.newest()).is_some_and(|(own, other)| own.is_simpler_than(other))
     }
 
-    /// Number of unknowns that its effects bring in.
+    /// Number of unknowns that its effects bring in for each experiment anew: phases, say, and where their states begin.
+    pub fn own_unknowns(&self) -> usize {
+        let free = |s: &&Strength| s.scope == Scope::Experiment && !s.fixed;
+        let of = |effect: &dyn Effect| effect.strengths().iter().filter(free).count() + effect.free_starts();
+        self.added.iter().map(|a| of(a.candidate.effect.as_ref())).sum()
+    }
+
+    /// Number of unknowns that its effects bring in for all experiments together.
     pub fn unknowns(&self) -> usize {
         self.fitted.point.globals.len() - self.fit.subject.globals.len()
     }

@@ -68,7 +68,7 @@ impl Variant {
         Self { model: Arc::new(model), first }
     }
 
-    /// Strengths as the experiment `measurement` has them at a point.
+    /// The `count` strengths of the effect `index` as a piece has them at a point.
     pub fn strengths(&self, fit: &Fit<'_>, point: &Point, index: usize, count: usize, piece: usize) -> Vec<f64> {
         let parameters = fit.parameters(piece, point);
         parameters[self.first[index]..self.first[index] + count].to_vec()

@@ -52,8 +52,10 @@ impl Dispersion {
 #[allow(clippy::cast_precision_loss)]
 pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
     let rarity: f64 = trial.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
-    let worth = (trial.fitted.count as f64 / dispersion.repeats).max(2.0);
-    trial.fitted.chi2 / dispersion.weight() + trial.unknowns() as f64 * worth.ln() + 2.0 * rarity
+    let worth = |samples: usize| (samples as f64 / dispersion.repeats).max(2.0).ln();
+    // What each experiment has of its own is told by its samples alone.
+    let own: f64 = trial.fitted.residuals.iter().map(|r| worth(r.len())).sum::<f64>() * trial.own_unknowns() as f64;
+    trial.fitted.chi2 / dispersion.weight() + trial.unknowns() as f64 * worth(trial.fitted.count) + own + 2.0 * rarity
 }
 
 /// Probabilities of models from their criteria, lower being better.

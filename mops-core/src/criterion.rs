@@ -35,10 +35,10 @@ pub trait Criterion: Send + Sync {
     /// Names of the signals it reads.
     fn signals(&self) -> Vec<String>;
 
-    /// Whether the case has what the value needs, whatever the analysis.
+    /// Whether the case has what the value needs, whatever the analysis; every case has where a criterion says nothing.
     ///
     /// # Errors
-    /// What is lacking, and the way out.
+    /// The case lacks something: what, and the way out.
     fn suits(&self, _case: &Case) -> Result<(), Mistake> {
         Ok(())
     }

@@ -4,8 +4,9 @@ use std::sync::atomic::AtomicUsize;
 
 use mops_models::effects::effects;
 
-use crate::candidate::candidates;
+use crate::candidate::{Candidate, candidates};
 use crate::screen::{Screening, screen};
+use crate::subject::Subject;
 use crate::testing::{Record, fitted, subject, white};
 use crate::weigh::by_chance;
 
@@ -30,24 +31,39 @@ fn records() -> Vec<Record> {
     vec![record(1.0), record(0.6)]
 }
 
-#[test]
-fn noise_gains_as_much_as_what_a_fit_leaves_of_it_and_its_probability_is_uniform() {
-    const KNOWN: usize = 40;
-    const OTHERS: u32 = 160;
-    let (subject, simulations) = (subject(OSCILLATOR, &[0.1, 16.0, 1.0, 0.0], 2, records()), AtomicUsize::new(0));
-    let (fit, variant, _, mut scene) = fitted(&subject, &simulations);
-    let interface = subject.model.interface();
-    let all = candidates(&effects(), interface, &["x".to_owned()], &[0, 1]);
-    let draws: Vec<Vec<f64>> =
-        (0..KNOWN + OTHERS as usize).map(|k| white(&format!("draw {k}"), 1.0, scene.residuals.len())).collect();
+fn draws(count: usize, length: usize) -> Vec<Vec<f64>> {
+    (0..count).map(|k| white(&format!("draw {k}"), 1.0, length)).collect()
+}
 
-    let screening = screen(&all, &fit, &variant.model, &scene, &draws);
-    for (draw, by_noise) in draws.iter().zip(&screening.by_chance).take(20) {
+fn oscillator() -> Subject {
+    subject(OSCILLATOR, &[0.1, 16.0, 1.0, 0.0], 2, records())
+}
+
+fn all(subject: &Subject) -> Vec<Candidate> {
+    candidates(&effects(), subject.model.interface(), &["x".to_owned()], &[0, 1])
+}
+
+#[test]
+fn noise_gains_as_much_as_what_a_fit_leaves_of_it() {
+    let (subject, simulations) = (oscillator(), AtomicUsize::new(0));
+    let (fit, variant, _, mut scene) = fitted(&subject, &simulations);
+    let draws = draws(20, scene.residuals.len());
+    let screening = screen(&all(&subject), &fit, &variant.model, &scene, &draws);
+    for (draw, by_noise) in draws.iter().zip(&screening.by_chance) {
         scene.residuals = scene.project(draw);
-        let gain = screen(&all, &fit, &variant.model, &scene, &[]).screened[0].gain;
+        let gain = screen(&all(&subject), &fit, &variant.model, &scene, &[]).screened[0].gain;
         assert!((gain - by_noise).abs() < 1e-9 * gain, "{gain} {by_noise}");
     }
+}
 
+#[test]
+fn the_probability_of_what_noise_gains_is_uniform() {
+    const KNOWN: usize = 40;
+    const OTHERS: u32 = 160;
+    let (subject, simulations) = (oscillator(), AtomicUsize::new(0));
+    let (fit, variant, _, scene) = fitted(&subject, &simulations);
+    let draws = draws(KNOWN + OTHERS as usize, scene.residuals.len());
+    let screening = screen(&all(&subject), &fit, &variant.model, &scene, &draws);
     let (known, others) = screening.by_chance.split_at(KNOWN);
     let known = Screening { screened: Vec::new(), by_chance: known.to_vec() };
     let directions = known.independent().expect("there are draws");

@@ -252,7 +252,7 @@ impl State {
         if promised <= floor || point == self.best.point {
             return self.mend(oracle, &near, &models);
         }
-        let points = self.with_pattern(shape, &models, point);
+        let points = self.filled(shape, Some(&models), vec![point]);
         let gained = self.visit(oracle, &points)?;
         let ratio = gained / promised;
         if gained > 0.0 {
@@ -282,7 +282,7 @@ impl State {
             return Ok(false);
         }
         let count = self.known.len();
-        let points = self.with_pattern(oracle.shape(), models, point);
+        let points = self.filled(oracle.shape(), Some(models), vec![point]);
         self.visit(oracle, &points)?;
         Ok(self.known.len() > count)
     }
@@ -305,10 +305,13 @@ impl State {
         Ok(false)
     }
 
-    /// A point, and what looks best of the pattern: a batch.
-    fn with_pattern(&self, shape: &Shape, models: &Models, point: Vec<f64>) -> Vec<Vec<f64>> {
-        let beside = self.pattern(shape, Some(models)).into_iter().take(self.batch.saturating_sub(1));
-        std::iter::once(point).chain(beside).collect()
+    /// Points, and as much of the pattern as fills a batch, what looks best first.
+    fn filled(&self, shape: &Shape, models: Option<&Models>, mut points: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if points.len() < self.batch {
+            let room = self.batch - points.len();
+            points.extend(self.pattern(shape, models).into_iter().take(room));
+        }
+        points
     }
 
     /// Unknown points of the pattern around the best one, what looks best to the models first.
@@ -342,7 +345,13 @@ impl State {
             }
             points.retain(|point| *point != here);
             points.dedup();
-            if points.is_empty() || self.visit(oracle, &points)? == 0.0 {
+            if points.is_empty() {
+                return Ok(());
+            }
+            // At the edge of the box few are left.
+            let models = if points.len() < self.batch { self.models(&self.near()) } else { None };
+            let points = self.filled(oracle.shape(), models.as_ref(), points);
+            if self.visit(oracle, &points)? == 0.0 {
                 return Ok(());
             }
             before = here;
