@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::candidate::Candidate;
 use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue};
 use crate::fit::dot;
 use crate::plan::separating;
@@ -84,7 +85,7 @@ pub fn found(
     let a = &last.added[index];
     let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
     let own = ranking.iter().find(|r| r.effect == effect.name() && r.place == place);
-    let round = round_of(rounds, effect.name(), &place);
+    let round = round_of(rounds, |newest| newest.is(&a.candidate));
     let mut rivals = Vec::new();
     if let Some(round) = round {
         let best = &round.trials[0];
@@ -112,9 +113,17 @@ pub fn found(
         }
     }
     let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
+    // A gust in another experiment, say.
+    let namesakes = last.added[..index]
+        .iter()
+        .filter(|b| b.candidate.effect.name() == effect.name() && b.candidate.place() == place);
+    let number = match namesakes.count() {
+        0 => String::new(),
+        before => format!("-{}", before + 1),
+    };
     Found {
         effect: effect.name().to_owned(),
-        name: format!("{tail}-{}", effect.name()),
+        name: format!("{tail}-{}{number}", effect.name()),
         companion: a.candidate.companion.as_ref().map(ToString::to_string),
         only: a.candidate.only.map(|only| last.fit.subject.measurements[only].name.clone()),
         class: effect.class().name().to_owned(),
@@ -133,9 +142,9 @@ fn is_newest(trial: &Trial<'_>, effect: &str, place: &str) -> bool {
     trial.newest().is_some_and(|c| c.effect.name() == effect && c.place() == place)
 }
 
-/// The round in which an effect did best.
-fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], effect: &str, place: &str) -> Option<&'r Round<'a>> {
-    let best_is = |round: &&Arc<Round<'a>>| round.trials.first().is_some_and(|best| is_newest(best, effect, place));
+/// The round in which such an effect did best.
+fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], is: impl Fn(&Candidate) -> bool) -> Option<&'r Round<'a>> {
+    let best_is = |round: &&Arc<Round<'a>>| round.trials.first().and_then(Trial::newest).is_some_and(&is);
     rounds.iter().find(best_is).map(Arc::as_ref)
 }
 
@@ -143,7 +152,7 @@ fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], effect: &str, place: &str) -> 
 pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<String> {
     found.iter().find_map(|found| {
         let rival = found.indistinguishable.first()?;
-        let round = round_of(rounds, &found.effect, &found.place)?;
+        let round = round_of(rounds, |c| c.effect.name() == found.effect && c.place() == found.place)?;
         let trial = |t: &&Trial<'_>| is_newest(t, &rival.effect, &rival.place);
         let names =
             [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];

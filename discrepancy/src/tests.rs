@@ -5,6 +5,7 @@ mod chance;
 mod correlated;
 mod derivatives;
 mod holds;
+mod namesakes;
 mod pairs;
 mod selection;
 mod sessions;
