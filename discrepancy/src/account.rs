@@ -65,8 +65,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
             });
         }
     }
-    let is_found =
-        |r: &Ranked| last.added.iter().any(|a| a.candidate.effect.name() == r.effect && a.candidate.place() == r.place);
+    let is_found = |r: &Ranked| last.added.iter().any(|a| a.candidate.is_named(&r.effect, &r.place));
     let (mut found, mut others): (Vec<Ranked>, Vec<Ranked>) = ranked.into_iter().partition(is_found);
     others.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     found.append(&mut others);
@@ -114,9 +113,7 @@ pub fn found(
     }
     let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
     // A gust in another experiment, say.
-    let namesakes = last.added[..index]
-        .iter()
-        .filter(|b| b.candidate.effect.name() == effect.name() && b.candidate.place() == place);
+    let namesakes = last.added[..index].iter().filter(|b| b.candidate.is_named(effect.name(), &place));
     let number = match namesakes.count() {
         0 => String::new(),
         before => format!("-{}", before + 1),
@@ -137,11 +134,6 @@ pub fn found(
     }
 }
 
-/// Whether the effect that was added last is this.
-fn is_newest(trial: &Trial<'_>, effect: &str, place: &str) -> bool {
-    trial.newest().is_some_and(|c| c.effect.name() == effect && c.place() == place)
-}
-
 /// The round in which such an effect did best.
 fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], is: impl Fn(&Candidate) -> bool) -> Option<&'r Round<'a>> {
     let best_is = |round: &&Arc<Round<'a>>| round.trials.first().and_then(Trial::newest).is_some_and(&is);
@@ -152,8 +144,8 @@ fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], is: impl Fn(&Candidate) -> boo
 pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<String> {
     found.iter().find_map(|found| {
         let rival = found.indistinguishable.first()?;
-        let round = round_of(rounds, |c| c.effect.name() == found.effect && c.place() == found.place)?;
-        let trial = |t: &&Trial<'_>| is_newest(t, &rival.effect, &rival.place);
+        let round = round_of(rounds, |newest| newest.is_named(&found.effect, &found.place))?;
+        let trial = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.is_named(&rival.effect, &rival.place));
         let names =
             [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
         separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])

@@ -34,6 +34,11 @@ impl Candidate {
             && self.only == other.only
     }
 
+    /// Whether it is such an effect at such a place, whatever its companion and its experiment.
+    pub fn is_named(&self, effect: &str, place: &str) -> bool {
+        self.effect.name() == effect && self.place() == place
+    }
+
     /// Whether it is of the same class at the same place, and has fewer strengths.
     pub fn is_simpler_than(&self, other: &Self) -> bool {
         self.port == other.port

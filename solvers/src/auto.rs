@@ -19,10 +19,11 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 /// numbers or lists, else `sqp`. One criterion without constraints is looked at along two lines near the start: where it is
 /// noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`. Each begins at
 /// several starts: the study's own, and the best points of a sample of the box. Where the objective is no sum of squares a
-/// pattern search goes on from the end of the first run and, after all starts, from the best point found, because an optimum may lie on a jump (of a settling time, say), where
-/// slopes lead no further; a sum of squares is started again around the best point until nothing changes. Where every
-/// criterion counts for itself (`objective = "each"`) it is `weighted-chebyshev` for up to three criteria and 50 tuners
-/// without whole numbers or lists, else `nsga2` for two criteria and `nsga3` for more.
+/// pattern search goes on from the end of the first run and, after all starts, from the best point found, because an optimum
+/// may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
+/// best point until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is
+/// `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria
+/// and `nsga3` for more.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {

@@ -6,9 +6,10 @@ use mops_models::effects::effects;
 
 use crate::candidate::{Candidate, candidates};
 use crate::screen::{Screening, screen};
+use crate::search::{Limits, Search};
 use crate::subject::Subject;
 use crate::testing::{Record, fitted, subject, white};
-use crate::weigh::by_chance;
+use crate::weigh::{Dispersion, by_chance, criterion};
 
 /// An oscillator whose stiffness, damping and start absorb most of what moves it near its frequency.
 const OSCILLATOR: &str = r#"
@@ -18,15 +19,14 @@ der        = { x = "v", v = "v' = -d*v - k*x" }
 "#;
 const NOISE: f64 = 0.01;
 const SAMPLES: u32 = 80;
+const STEP: f64 = 0.04;
 
 /// Two records of `x'' + d x' + k x = 0`.
 fn records() -> Vec<Record> {
     let record = |amplitude: f64| {
-        let times: Vec<f64> = (0..SAMPLES).map(|i| 0.04 * f64::from(i)).collect();
-        let swing = |t: &f64| amplitude * (-0.05 * t).exp() * (4.0 * t).cos();
-        let noise = white(&amplitude.to_string(), NOISE, times.len());
-        let values = times.iter().zip(noise).map(|(t, e)| swing(t) + e).collect();
-        Record { inputs: Vec::new(), times, signals: vec![("x", values, NOISE)] }
+        let swing = |t: f64| [amplitude * (-0.05 * t).exp() * (4.0 * t).cos(), 0.0];
+        let states: Vec<[f64; 2]> = (0..SAMPLES).map(|i| swing(STEP * f64::from(i))).collect();
+        Record::of_first("x", &states, STEP, NOISE, &amplitude.to_string())
     };
     vec![record(1.0), record(0.6)]
 }
@@ -54,6 +54,22 @@ fn noise_gains_as_much_as_what_a_fit_leaves_of_it() {
         let gain = screen(&all(&subject), &fit, &variant.model, &scene, &[]).screened[0].gain;
         assert!((gain - by_noise).abs() < 1e-9 * gain, "{gain} {by_noise}");
     }
+}
+
+#[test]
+fn a_phase_of_every_experiment_is_paid_for_with_its_samples() {
+    let (subject, simulations, effects) = (oscillator(), AtomicUsize::new(0), effects());
+    let (fit, variant, _, scene) = fitted(&subject, &simulations);
+    let screened = screen(&all(&subject), &fit, &variant.model, &scene, &[]).screened;
+    let periodic = screened.iter().find(|s| s.added.candidate.effect.name() == "periodic-disturbance");
+    let added = periodic.expect("it can act there").added.clone();
+    let search = Search::new(&subject, &effects, Limits::at(0.01), &simulations);
+    let trial = search.trial(&[added], &subject.start(), vec![vec![1.0, 0.0]; 2], 1, 1).expect("it simulates");
+    let rarity = f64::from(trial.added[0].candidate.effect.rarity());
+    // Amplitude and frequency in two records of 80 samples together, a phase in each.
+    let paid = 2.0 * 160.0_f64.ln() + 2.0 * 80.0_f64.ln() + 2.0 * rarity;
+    let told = criterion(&trial, &Dispersion::WHITE) - trial.fitted.chi2;
+    assert!((told - paid).abs() < 1e-6 * trial.fitted.chi2, "{told} {paid}");
 }
 
 #[test]
