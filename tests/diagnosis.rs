@@ -66,6 +66,16 @@ fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
 }
 
 #[test]
+fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
+    // The pendulum stops: the fit of the Coulomb friction alone stays where the sum of squares is 25 times as large.
+    let missing = Missing::Effects(&["coulomb-friction"]);
+    let case = generate("pendulum", missing, 20.0, 403_726_925_825).expect("it can be made");
+    let diagnosis = diagnosis(&case, false);
+    assert_eq!(found(&diagnosis), [("coulomb-friction", "joint:th")]);
+    assert!(diagnosis.after.iter().all(|error| error.normalised < 1.1), "{:?}", diagnosis.after);
+}
+
+#[test]
 fn where_nothing_is_missing_nothing_is_found() {
     for plant in ["pendulum", "servo"] {
         let case = case(plant, Missing::Nothing, 0.0);

@@ -12,7 +12,7 @@ use crate::screen::Screened;
 use crate::search::Trial;
 use crate::stability::stability;
 use crate::subject::Subject;
-use crate::weigh::{Dispersion, criterion, probabilities};
+use crate::weigh::{Dispersion, criterion, informed, probabilities};
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
 pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
@@ -27,7 +27,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
             continue;
         }
         let dispersion = Dispersion::of(best);
-        let mut criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+        let mut criteria: Vec<f64> = round.trials.iter().map(|t| informed(t, &dispersion)).collect();
         if !accepted {
             // Nothing at all is a rival too, beforehand as likely as all candidates together.
             #[allow(clippy::cast_precision_loss)]
@@ -89,12 +89,12 @@ pub fn found(
     if let Some(round) = round {
         let best = &round.trials[0];
         let of = Dispersion::of(best);
-        let least = criterion(best, &of);
+        let least = informed(best, &of);
         let screened = |t: &Trial<'_>| -> Option<&Screened> {
             let newest = t.newest()?;
             round.screened.iter().find(|s| s.added.candidate.is(newest))
         };
-        let criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &of)).collect();
+        let criteria: Vec<f64> = round.trials.iter().map(|t| informed(t, &of)).collect();
         let shares = probabilities(&criteria);
         for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
             let Some(newest) = trial.newest().filter(|_| value - least < 6.0) else { continue };
@@ -106,10 +106,11 @@ pub fn found(
                 effect: newest.effect.name().to_owned(),
                 place: newest.place(),
                 probability,
-                bic_behind: value - least,
+                bic_behind: (value - least).max(0.0),
                 likeness,
             });
         }
+        rivals.sort_by(|a, b| a.bic_behind.total_cmp(&b.bic_behind));
     }
     let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
     // A gust in another experiment, say.
@@ -131,6 +132,19 @@ pub fn found(
         indistinguishable: rivals,
         stability: round.and_then(stability),
         place,
+    }
+}
+
+/// Widens the intervals of strengths to those of another model with the same effects that the data allow as well.
+pub fn widen(found: &mut [Found], other: &Calibrated, last: &Trial<'_>, repeats: f64) {
+    for (index, found) in found.iter_mut().enumerate() {
+        for (own, theirs) in found.strengths.iter_mut().zip(other.strengths(index, &last.variant, repeats)) {
+            let [low, high] = theirs.interval95.unwrap_or([theirs.value; 2]);
+            let [from, to] = own.interval95.unwrap_or([own.value; 2]);
+            if low < high || low != own.value {
+                own.interval95 = Some([from.min(low), to.max(high)]);
+            }
+        }
     }
 }
 

@@ -4,10 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{Effect, Mistake, Study, Watch};
+use rayon::prelude::*;
 
-use crate::account::{found, moves, next_experiment, noticeable, predictions, ranking, starts};
+use crate::account::{found, moves, next_experiment, noticeable, predictions, ranking, starts, widen};
 use crate::base;
 use crate::diagnosis::{Diagnosis, Found, Verdict};
+use crate::drawn::draw;
 use crate::judge::{Judgement, judge};
 use crate::locate::locate;
 use crate::screen::Scene;
@@ -61,21 +63,30 @@ pub fn diagnose(
     let base = search.over_or_in_windows(&declared);
     watch.stage("where the residual comes from", 0.08);
     let scene = Scene::new(&base.fit, &base.variant.model, &base.fitted);
-    let located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
+    let mut located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
 
     let growth = search.grow(&base, options, watch)?;
     let growth = search.settle(growth, watch);
     let (last, held) = search.without_declared(growth.last);
     watch.stage("the repaired model", 0.9);
-    let after = search.calibrate(&last, &held).ok_or_else(lost)?;
-    let (rounds, steps) = (growth.rounds, growth.steps);
+    let (last, held, after) = match search.calibrate(&last, &held) {
+        Some(after) => (last, held, after),
+        // What calibration data alone make of it cannot be simulated: it explains nothing.
+        None => (base.clone(), Vec::new(), search.calibrate(&declared, &[]).ok_or_else(lost)?),
+    };
+    let (rounds, steps, allowed) = (growth.rounds, growth.steps, growth.allowed);
     let ranked = ranking(&rounds, &last);
     let Judgement { verdict, last, held, after, unexplained, note } =
         judge(&search, &base, &located, last, held, after);
 
+    draw(&mut located, &last);
     let dispersion = Dispersion::of(&last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
-    let found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
+    let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
+    if verdict == Verdict::Effect {
+        let allowed = allowed.par_iter().filter_map(|trial| search.calibrate(trial, &[]));
+        allowed.collect::<Vec<_>>().iter().for_each(|other| widen(&mut found, other, &last, dispersion.repeats));
+    }
     let probability = match verdict {
         // Nothing at all was weighed among the others.
         Verdict::None => 1.0 - ranked.iter().map(|r| r.probability).sum::<f64>(),

@@ -28,7 +28,8 @@ pub struct StrengthValue {
     pub unit: String,
     /// Standard error of the value, selection of the effect not included; `None` where it cannot be told.
     pub std_error: Option<f64>,
-    /// An interval that holds the value with probability 0.95, the selection of the effect included.
+    /// An interval that holds the value with probability 0.95, other values of shapes that no fit moves included where the data
+    /// allow them; of such a shape the range of these values, if there are several.
     pub interval95: Option<[f64; 2]>,
 }
 
@@ -41,7 +42,8 @@ pub struct Rival {
     pub place: String,
     /// Its probability.
     pub probability: f64,
-    /// How far its BIC lies above that of the effect found; under 2 the data cannot tell them apart.
+    /// How far its BIC, without the price of strengths that the data tell nothing of, lies above that of the effect found;
+    /// under 2 the data cannot tell them apart.
     pub bic_behind: f64,
     /// Cosine between the traces of the two in the outputs, what the parameters absorb taken out; 1: the same.
     pub likeness: f64,
@@ -199,13 +201,15 @@ pub struct Prediction {
     pub after: Vec<f64>,
 }
 
-/// A curve or a cloud of points.
+/// A signal over something, as points.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Curve {
     /// Abscissae.
     pub x: Vec<f64>,
-    /// Ordinates.
-    pub y: Vec<f64>,
+    /// The signal as it is estimated, without any formula.
+    pub estimated: Vec<f64>,
+    /// What the effects found there make of it by their formulas; empty where none was found.
+    pub found: Vec<f64>,
 }
 
 /// The unknown signal at a place that would explain the residual.
@@ -225,14 +229,12 @@ pub struct Evidence {
     pub over_time: Vec<(String, Curve)>,
     /// The signal over what it may depend on (`position`, `speed`, `input`), with the unit of that.
     pub over: Vec<(String, String, Curve)>,
-    /// The curve of the effect found, over the same.
-    pub found: Vec<(String, Curve)>,
 }
 
 /// A model that the search passed through.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
-    /// What made it of the one before: `added`, `exchanged`, `begun otherwise`, `left out`, `one for two`.
+    /// What made it of the one before: `added`, `exchanged`, `begun otherwise`, `left out`, `one for two`, `reshaped`.
     pub did: &'static str,
     /// Its effects, each as `effect at kind:name`.
     pub effects: Vec<String>,

@@ -32,13 +32,15 @@ pub struct Growth<'a> {
     pub rounds: Vec<Arc<Round<'a>>>,
     /// The models on the way.
     pub steps: Vec<Step>,
+    /// Models with other shapes of the same effects that the data allow as well.
+    pub allowed: Vec<Trial<'a>>,
     /// Probability of a residual as structured as the declared model's if nothing were missing.
     pub p_value: f64,
 }
 
 impl<'a> Growth<'a> {
     fn begun(last: Trial<'a>) -> Self {
-        Self { last, rounds: Vec::new(), steps: Vec::new(), p_value: 1.0 }
+        Self { last, rounds: Vec::new(), steps: Vec::new(), allowed: Vec::new(), p_value: 1.0 }
     }
 
     /// Goes on to another model.
@@ -192,6 +194,12 @@ impl<'a> Search<'a> {
             // Beside another effect, what was needed may be superfluous.
             growth.step("exchanged", better);
         }
+        watch.stage("other shapes of what was found", 0.88);
+        let reshaped;
+        (reshaped, growth.allowed) = self.shapes(growth.last.clone());
+        if reshaped.fitted.chi2 < growth.last.fitted.chi2 {
+            growth.step("reshaped", reshaped);
+        }
         growth
     }
 
@@ -250,11 +258,8 @@ impl<'a> Search<'a> {
         // the others in, another shape of it may do better.
         let mut trials: Vec<Trial<'a>> = self.from(last, &with(own), 10).into_iter().collect();
         // What is simpler begins there too, whatever a linear view from afar says of it.
-        for s in round.screened.iter().filter(|s| s.added.candidate.is_simpler_than(&own.candidate)) {
-            let fitted =
-                round.trials.iter().filter_map(|t| t.added.last()).find(|a| a.candidate.is(&s.added.candidate));
-            trials.extend(self.from(last, &with(fitted.unwrap_or(&s.added)), 40));
-        }
+        let simpler = round.screened.iter().filter(|s| s.added.candidate.is_simpler_than(&own.candidate));
+        trials.extend(simpler.filter_map(|s| self.from(last, &with(&s.added.begun_like(own)), 40)));
         for (rank, trial) in std::mem::take(&mut round.trials).into_iter().enumerate() {
             // As does what was looked at in windows alone.
             if trial.windows == last.windows {

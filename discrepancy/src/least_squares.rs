@@ -229,6 +229,34 @@ impl Fit<'_> {
         Fitted { normal: Some(normal), ..fitted }
     }
 
+    /// How many of the globals from `first` on the data tell nothing of: of each the share of its variance beforehand that they
+    /// leave, where `weight` units of the sum of squares count as one. Beforehand it lies anywhere between its bounds; a shape
+    /// without an upper one within a decade either way; of what has no bounds at all the data tell everything.
+    ///
+    /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 4.4.
+    pub fn untold(&self, fitted: &Fitted, first: usize, weight: f64) -> f64 {
+        let Some(normal) = self.normal_at(fitted) else { return 0.0 };
+        let held = self.held(&fitted.point, &normal.gradient);
+        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
+        let before = |k: usize| {
+            let [low, high] = self.globals[k].bounds;
+            if (high - low).is_finite() {
+                12.0 * (self.stretch(k, fitted.point.globals[k]) / (high - low)).powi(2)
+            } else if self.globals[k].log {
+                12.0 / (2.0 * 10.0_f64.ln()).powi(2)
+            } else {
+                0.0
+            }
+        };
+        let own: Vec<f64> =
+            free.iter().map(|&k| if (first..self.globals.len()).contains(&k) { before(k) } else { 0.0 }).collect();
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+            normal.matrix[(free[i], free[j])] / weight + if i == j { own[i] } else { 0.0 }
+        });
+        let inverse = pseudo_inverse(&matrix);
+        own.iter().enumerate().map(|(i, before)| (before * inverse[(i, i)]).clamp(0.0, 1.0)).sum()
+    }
+
     /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1; 0
     /// for what stands at a bound, and where the slopes cannot be had.
     pub fn covariance(&self, fitted: &Fitted) -> DMatrix<f64> {

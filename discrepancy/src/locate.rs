@@ -105,7 +105,8 @@ fn better(a: Choice, b: Choice) -> Choice {
     if b.evidence > a.evidence { b } else { a }
 }
 
-fn located(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Option<Located> {
+/// A place with the signal that is likeliest there; `None` where none reaches the data.
+pub fn located(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Option<Located> {
     let unknown = Unknown::new(port, fit, model, scene)?;
     // Step 1: every family alone.
     let alone = |family: usize| {
@@ -171,8 +172,11 @@ fn share(unknown: &Unknown, coefficients: &[f64], freedom: f64) -> f64 {
     ((before - after.max(0.0)) / before.max((2.0 * n.freedom).sqrt())).clamp(0.0, 1.0)
 }
 
-/// The longest curve that is kept.
-const POINTS: usize = 800;
+/// Of so many points, one in this many is kept in a curve.
+pub fn thinning(points: usize) -> usize {
+    const POINTS: usize = 800;
+    points.div_ceil(POINTS).max(1)
+}
 
 fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, model: &WithEffects) -> Option<Evidence> {
     let estimate = unknown.normals.estimate(&unknown.prior(&choice.terms)?, choice.variance)?;
@@ -183,11 +187,10 @@ fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, mode
     let mut over: Vec<(Over, String, Curve)> = arguments.map(|(over, unit)| (over, unit, Curve::default())).into();
     for (piece, looks) in unknown.looks.iter().enumerate().filter(|(_, looks)| !looks.is_empty()) {
         let signal = unknown.signal(&choice.terms, coefficients, piece);
-        let step = looks.len().div_ceil(POINTS);
-        let kept = || looks.iter().zip(&signal).step_by(step);
+        let kept = || looks.iter().zip(&signal).step_by(thinning(looks.len()));
         for (over, _, curve) in &mut over {
             curve.x.extend(kept().map(|(look, _)| look.of(*over)));
-            curve.y.extend(kept().map(|(_, s)| *s));
+            curve.estimated.extend(kept().map(|(_, s)| *s));
         }
         // The windows of an experiment follow each other.
         let name = &fit.subject.measurements[fit.pieces[piece].measurement].name;
@@ -196,7 +199,7 @@ fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, mode
         }
         if let Some((_, curve)) = over_time.last_mut() {
             curve.x.extend(kept().map(|(look, _)| look.t));
-            curve.y.extend(kept().map(|(_, s)| *s));
+            curve.estimated.extend(kept().map(|(_, s)| *s));
         }
     }
     let varies = |curve: &Curve| curve.x.iter().any(|x| x != &curve.x[0]);
@@ -209,7 +212,6 @@ fn evidence(port: &Port, unknown: &Unknown, choice: &Choice, fit: &Fit<'_>, mode
         freedom: estimate.freedom,
         over_time,
         over: over.into_iter().map(|(over, unit, curve)| (over.name().to_owned(), unit, curve)).collect(),
-        found: Vec::new(),
     })
 }
 

@@ -88,7 +88,8 @@ fn a_force_pulse_is_found_at_its_joint_with_its_shape() {
     assert_eq!(best.place, "joint:x", "{:?}", shown(&found));
     assert!(best.share > 0.99 && best.evidence > found[1].evidence.evidence + 20.0, "{:?}", shown(&found));
     let curve = &best.over_time[0].1;
-    let error = curve.x.iter().zip(&curve.y).map(|(&t, f)| (f - bump(t)).powi(2)).sum::<f64>() / curve.x.len() as f64;
+    let error =
+        curve.x.iter().zip(&curve.estimated).map(|(&t, f)| (f - bump(t)).powi(2)).sum::<f64>() / curve.x.len() as f64;
     // What is left is of second order: the fit without the force has other parameters.
     assert!(error.sqrt() < 0.08 * 3.0, "{}", error.sqrt());
     assert!(gain > 0.1, "{gain}");

@@ -153,7 +153,8 @@ impl Calibrated {
                 value,
                 unit: a.candidate.unit(strength, &parameters[variant.first[index] + k].variable.unit),
                 std_error: error,
-                interval95: error.map(|e| [value - 1.96 * e, value + 1.96 * e]),
+                interval95: error
+                    .map(|e| [-1.96, 1.96].map(|z| (value + z * e).clamp(strength.bounds[0], strength.bounds[1]))),
             }
         };
         a.candidate.effect.strengths().iter().enumerate().map(one).collect()

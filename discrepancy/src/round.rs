@@ -131,9 +131,29 @@ impl<'a> Search<'a> {
                 best_first(&mut trials);
             }
         }
+        self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
         Some(Round { screened, trials, directions, independent, from: from.clone(), known })
+    }
+
+    /// Fits what is simpler than the best once more, from where that ended: records with stops have minima at which the simpler
+    /// one of two effects may have stayed.
+    fn simplify(&self, trials: &mut Vec<Trial<'a>>, screened: &[Screened]) {
+        let Some(best) = trials.first() else { return };
+        let Some((own, others)) = best.added.split_last() else { return };
+        let is_simpler = |s: &&Screened| s.added.candidate.is_simpler_than(&own.candidate);
+        let simpler: Vec<&Screened> = screened.iter().filter(is_simpler).collect();
+        let fit = |s: &&Screened| self.from(best, &[others, &[s.added.begun_like(own)]].concat(), 40);
+        for one in simpler.par_iter().filter_map(fit).collect::<Vec<_>>() {
+            let same = |t: &Trial<'a>| t.newest().zip(one.newest()).is_some_and(|(a, b)| a.is(b));
+            match trials.iter_mut().find(|t| same(t)) {
+                Some(before) if one.windows == before.windows && one.fitted.chi2 < before.fitted.chi2 => *before = one,
+                Some(_) => {}
+                None => trials.push(one),
+            }
+        }
+        best_first(trials);
     }
 
     /// The best candidates of a round, fitted from where the study begins: the fit of the model without them may have ended

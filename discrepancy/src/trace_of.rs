@@ -267,6 +267,23 @@ impl<'a> View<'a> {
         Some(self.along.response(column, &signal))
     }
 
+    /// What the candidate at these strengths adds at its place, at the nodes of the motion or at the samples of a sensor, in the
+    /// unit of the place, forces forward; `None` where that is not finite.
+    pub fn added(&self, strengths: &[f64]) -> Option<Vec<f64>> {
+        let acting = self.candidate.effect.act(strengths);
+        let sign = match self.here {
+            _ if self.seen.is_empty() => return Some(Vec::new()),
+            Spot::Sensor(index) => {
+                let (change, noise) = (self.measured(acting.as_ref(), index), self.piece.series[index].noise);
+                return change.iter().all(|c| c.is_finite()).then(|| change.iter().map(|c| c * noise).collect());
+            }
+            Spot::Joint(w, ..) | Spot::Process(w, _) => self.along.forward[w],
+            Spot::Actuator(_) => 1.0,
+        };
+        let signal = self.signal(acting.as_ref())?.1;
+        Some(signal.into_iter().map(|s| s * sign).collect())
+    }
+
     /// The signal that an effect adds at the nodes of a motion, and its column.
     fn signal(&self, acting: &dyn Acting<f64>) -> Option<(usize, Vec<f64>)> {
         let (effect, along) = (self.candidate.effect.as_ref(), self.along);

@@ -140,7 +140,7 @@ fn looks(here: Option<Spot>, piece: usize, fit: &Fit<'_>, scene: &Scene) -> Vec<
 }
 
 /// What a signal adds to the residuals of a piece.
-fn respond(here: Spot, piece: usize, signal: &[f64], fit: &Fit<'_>, scene: &Scene) -> Vec<f64> {
+pub fn respond(here: Spot, piece: usize, signal: &[f64], fit: &Fit<'_>, scene: &Scene) -> Vec<f64> {
     let along = &scene.trajectories[piece];
     match here {
         Spot::Joint(w, ..) | Spot::Process(w, _) => {

@@ -29,6 +29,25 @@ pub struct Added {
     pub expected: Option<Arc<DMatrix<f64>>>,
 }
 
+impl Added {
+    /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the
+    /// simpler part of one that was fitted.
+    pub fn begun_like(&self, other: &Self) -> Self {
+        let mut begun = self.clone();
+        let theirs = other.candidate.effect.strengths();
+        for (strength, value) in self.candidate.effect.strengths().iter().zip(&mut begun.strengths) {
+            let [low, high] = strength.bounds;
+            let known = theirs.iter().position(|s| s.name == strength.name && s.dimension == strength.dimension);
+            if let Some(known) =
+                known.map(|k| other.strengths[k]).filter(|k| !strength.fixed && (low..=high).contains(k))
+            {
+                *value = known;
+            }
+        }
+        begun
+    }
+}
+
 /// Where the strengths of an added effect stand among the parameters of the model.
 #[derive(Clone)]
 pub struct Variant {
@@ -52,11 +71,15 @@ impl Variant {
     pub fn new(subject: &Subject, added: &[Added], pieces: &[Piece]) -> Self {
         let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
         let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
-        let longest = pieces.iter().flat_map(|piece| &piece.series).map(|s| s.times.len()).max().unwrap_or(0);
-        let horizon = pieces.iter().map(|piece| piece.horizon).fold(0.0, f64::max);
+        // By the longest record whichever are looked at: what could be simulated among all can be alone.
+        let all = || subject.measurements.iter();
+        let longest = all().flat_map(|m| &m.series).map(|s| s.times.len()).max().unwrap_or(0);
+        let horizon = all().map(|m| m.horizon).fold(0.0, f64::max);
+        let share = pieces.iter().map(|piece| piece.horizon / subject.measurements[piece.measurement].horizon);
+        let share = share.fold(0.0, f64::max);
         let declared = subject.pace.get().map_or(0.0, |pace| pace * horizon);
         #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let limit = (FEW_STEPS + STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared) as usize;
+        let limit = (FEW_STEPS + share * (STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared)) as usize;
         let model = model.with_step_limit(limit);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();

@@ -1,6 +1,7 @@
 //! Weighing fitted models against each other: what correlated residuals are worth, and how likely chance is.
 
 use crate::search::Trial;
+use crate::variant::Added;
 
 /// What the residuals of the best model tell of the data: the error model that all candidates share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +57,31 @@ pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
     // What each experiment has of its own is told by its samples alone.
     let own: f64 = trial.fitted.residuals.iter().map(|r| worth(r.len())).sum::<f64>() * trial.own_unknowns() as f64;
     trial.fitted.chi2 / dispersion.weight() + trial.unknowns() as f64 * worth(trial.fitted.count) + own + 2.0 * rarity
+}
+
+/// The same without the price of strengths of the newest effect that the data tell nothing of: a break-away force is as likely
+/// as before where nothing breaks away.
+#[allow(clippy::cast_precision_loss)]
+pub fn informed(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
+    let told = criterion(trial, dispersion);
+    if !trial.added.last().is_some_and(is_plausible) {
+        return told;
+    }
+    let worth = (trial.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
+    let first = trial.fit.globals.len() - trial.newest_unknowns();
+    told - worth * trial.fit.untold(&trial.fitted, first, dispersion.weight())
+}
+
+/// Whether shapes of an effect are within a decade of those that are tried first. What is far off tells nothing because the
+/// effect has vanished there, and such shapes are few among all that are likely.
+fn is_plausible(added: &Added) -> bool {
+    let strengths = added.candidate.effect.strengths().iter().zip(&added.strengths).skip(1);
+    strengths.filter(|(strength, _)| strength.bounds[0] >= 0.0).all(|(strength, &value)| {
+        let tried = added.sizes.values(strength.dimension, strength.trials, strength.bounds);
+        let low = tried.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = tried.iter().copied().fold(0.0, f64::max);
+        (0.1 * low..=10.0 * high).contains(&value)
+    })
 }
 
 /// Probabilities of models from their criteria, lower being better.

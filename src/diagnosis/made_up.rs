@@ -59,19 +59,18 @@ fn evidence(place: &str, evidence: f64, share: f64, true_place: bool) -> Evidenc
         .enumerate()
         .map(|(i, v)| if true_place { -0.0124 * (4.0 * v).tanh() } else { 0.004 * chance(i) } + 0.0012 * chance(i + 7))
         .collect();
-    let found = Curve { x: vec![-7.0, -1e-9, 1e-9, 7.0], y: vec![0.0124, 0.0124, -0.0124, -0.0124] };
+    let formula = speed.iter().map(|v| -0.0124 * v.signum()).collect();
+    let position = times.iter().map(|t| (7.0 * t).cos()).collect();
+    let found: Vec<f64> = if true_place { formula } else { Vec::new() };
+    let curve = |x: Vec<f64>| Curve { x, estimated: force.clone(), found: found.clone() };
     Evidence {
         place: place.into(),
         unit: "N m".into(),
         evidence,
         share,
         freedom: 41.0,
-        over_time: vec![("swing".into(), Curve { x: times.clone(), y: force.clone() })],
-        over: vec![
-            ("speed".into(), "rad/s".into(), Curve { x: speed, y: force.clone() }),
-            ("position".into(), "rad".into(), Curve { x: times.iter().map(|t| (7.0 * t).cos()).collect(), y: force }),
-        ],
-        found: if true_place { vec![("speed".into(), found)] } else { Vec::new() },
+        over_time: vec![("swing".into(), curve(times))],
+        over: vec![("speed".into(), "rad/s".into(), curve(speed)), ("position".into(), "rad".into(), curve(position))],
     }
 }
 

@@ -30,11 +30,17 @@ fn gusts_in_two_experiments_are_two_findings() {
     let subject = subject(BLOCK, &[8.0, 0.5, 1.0, 0.0], 2, records);
     let gust: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| e.name() == "wind-gust").collect();
     let options = Options { max_effects: 3, level: 0.01, seed: 1 };
-    let found = diagnose(&study(&subject), &gust, &options, &()).expect("it simulates").found;
+    let diagnosis = diagnose(&study(&subject), &gust, &options, &()).expect("it simulates");
+    let found = diagnosis.found;
     let mut told: Vec<(Option<&str>, f64)> = found.iter().map(|f| (f.only.as_deref(), f.strengths[0].value)).collect();
     told.sort_by(|a, b| a.0.cmp(&b.0));
     assert_eq!(told.len(), 2, "{told:?}");
     assert_eq!([told[0].0, told[1].0], [Some("record 0"), Some("record 1")]);
     assert!((told[0].1 - 2.0).abs() < 0.1 && (told[1].1 + 3.0).abs() < 0.1, "{told:?}");
     assert_ne!(found[0].name, found[1].name);
+    // Each is drawn in its own experiment.
+    let drawn = diagnosis.evidence.iter().find(|e| e.place == found[0].place).expect("every place has evidence");
+    let peaks: Vec<f64> = drawn.over_time.iter().map(|(_, c)| c.found.iter().copied().fold(0.0, f64::max)).collect();
+    let least: Vec<f64> = drawn.over_time.iter().map(|(_, c)| c.found.iter().copied().fold(0.0, f64::min)).collect();
+    assert!(peaks[0] > 1.8 && least[0] == 0.0 && peaks[1] == 0.0 && least[1] < -2.8, "{peaks:?}, {least:?}");
 }

@@ -19,7 +19,7 @@ pub(crate) use judge::Row;
 pub(crate) use page::page;
 pub(crate) use plan::{Kind, Plan, Wish};
 pub(crate) use statistics::{Bin, Rate, brier, deciles, reliability, uniformity};
-pub(crate) use table::csv;
+pub(crate) use table::{csv, strengths};
 pub(crate) use tool::{Answer, Tools, spelt};
 
 /// What a benchmark over simulated experiments gives.

@@ -1,4 +1,4 @@
-//! Every case with its answer as one line of a table.
+//! Every case with its answer, and every strength beside its truth, as one line of a table.
 
 use super::judge::Row;
 use super::tool::spelt;
@@ -27,10 +27,27 @@ const HEADER: [&str; 19] = [
 
 /// The cases as CSV.
 pub(crate) fn csv(rows: &[Row]) -> String {
+    written(&HEADER, rows.iter().map(cells))
+}
+
+/// The strengths of true effects that were found as CSV: the case, its size, the strength, its truth, its value and the
+/// interval stated.
+pub(crate) fn strengths(rows: &[Row]) -> String {
+    let lines = rows.iter().flat_map(|row| {
+        row.judgement.covered.iter().map(|c| {
+            let numbers = [c.truth, c.value, c.interval[0], c.interval[1]].map(|number| number.to_string());
+            let named = [row.name.clone(), row.size.to_string(), c.name.clone()];
+            named.into_iter().chain(numbers).chain([c.holds().to_string()]).collect()
+        })
+    });
+    written(&["case", "size", "strength", "truth", "value", "from", "to", "truth inside"], lines)
+}
+
+fn written(header: &[&str], lines: impl Iterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(HEADER).expect("memory can be written to");
-    for row in rows {
-        writer.write_record(cells(row)).expect("memory can be written to");
+    writer.write_record(header).expect("memory can be written to");
+    for line in lines {
+        writer.write_record(line).expect("memory can be written to");
     }
     String::from_utf8(writer.into_inner().expect("memory can be written to")).expect("it was made of texts")
 }

@@ -62,7 +62,7 @@ struct Diagnosis {
     /// Number of cases that run at once, each on one thread; all cores where absent.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Folder for a table of all cases and a page.
+    /// Folder for a page and tables of all cases and of the strengths found.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Put another tool beside the diagnosis.
@@ -111,6 +111,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     print(&text);
     if let Some(folder) = &arguments.out {
         write(folder, "cases.csv", &diagnosis::csv(&results.rows))?;
+        write(folder, "strengths.csv", &diagnosis::strengths(&results.rows))?;
         if against {
             write(folder, "brute-force.csv", &diagnosis::csv(&results.brute))?;
         }

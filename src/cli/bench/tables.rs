@@ -203,9 +203,18 @@ fn coverage(rows: &[Row]) -> String {
         let median = format!("{:.1} %", 100.0 * off[off.len() / 2]);
         vec![(*name).to_owned(), rate_of(&own.iter().map(|c| c.holds()).collect::<Vec<_>>()), median]
     });
+    let mut sizes: Vec<f64> = rows.iter().map(|row| row.size).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    sizes.dedup();
+    let by_size = sizes.iter().filter_map(|&size| {
+        let held = rows.iter().filter(|row| row.size == size).flat_map(|row| &row.judgement.covered);
+        let rate = Rate::of(held.map(|c| c.holds()));
+        (rate.of > 0).then(|| format!(" size {size}: {}\n", percent(rate)))
+    });
+    let by_size: String = by_size.collect();
     let header = ["strength", "truth inside", "median error"];
     format!(
-        "95 % intervals of found strengths hold the truth: {}\n{}",
+        "95 % intervals of found strengths hold the truth: {}\n{by_size}{}",
         percent(rate),
         table(&header, &[1, 2], lines.collect())
     )

@@ -73,57 +73,56 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
 
 fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     let sketched = diagnosis.unexplained.as_ref().filter(|u| u.place == evidence.place);
-    let found = |over: &str| {
-        let effect = diagnosis.found.iter().find(|f| f.place == evidence.place).map_or("effect", |f| &f.effect);
-        let curves = evidence.found.iter().filter(|(name, _)| name == over);
-        let mut lines: Vec<Curve> = curves.map(|(_, points)| line(effect, pairs(points), Ink::Result)).collect();
-        if let Some(unexplained) = sketched.filter(|u| u.over == over) {
-            let points = unexplained.table.iter().map(|&[x, y]| (x, y)).collect();
-            lines.push(line("table, linear between its points", points, Ink::Demand));
-        }
-        lines
-    };
+    let effects: Vec<&str> =
+        diagnosis.found.iter().filter(|f| f.place == evidence.place).map(|f| f.effect.as_str()).collect();
+    let effects = effects.join(" and ");
     let y_label = labelled("missing signal", &evidence.unit);
+    // The estimate, and what the effects make of it.
+    let both = |points: &Points, drawn: fn(&str, &[f64], &[f64], Ink) -> Curve| {
+        let mut curves = vec![drawn("estimated, without any formula", &points.x, &points.estimated, Ink::Measured)];
+        if !points.found.is_empty() {
+            curves.push(drawn(&effects, &points.x, &points.found, Ink::Result));
+        }
+        curves
+    };
+    let figure = |key: &str, title: String, x_label: String, curves| {
+        let plot = Plot { title, x_label, y_label: y_label.clone(), curves, ..Plot::default() };
+        Figure { plots: vec![(format!("missing-{}-{key}", evidence.place), plot)], caption: Vec::new() }
+    };
     let mut figures = Vec::new();
     for (over, unit, points) in &evidence.over {
-        let mut curves = vec![cloud(points)];
-        curves.extend(found(over));
-        let plot = Plot {
-            title: format!("missing signal at {} over {over}", evidence.place),
-            x_label: labelled(over, unit),
-            y_label: y_label.clone(),
-            curves,
-            ..Plot::default()
-        };
-        figures.push(Figure { plots: vec![(format!("missing-{}-{over}", evidence.place), plot)], caption: Vec::new() });
+        let mut curves = both(points, dots);
+        if let Some(unexplained) = sketched.filter(|u| u.over == *over) {
+            let [x, y] = [0, 1].map(|k| unexplained.table.iter().map(|point| point[k]).collect::<Vec<f64>>());
+            curves.push(line("table, linear between its points", &x, &y, Ink::Demand));
+        }
+        let title = format!("missing signal at {} over {over}", evidence.place);
+        figures.push(figure(over, title, labelled(over, unit), curves));
     }
     for (experiment, points) in evidence.over_time.iter().take(MOST_EXPERIMENTS) {
-        let mut curves = vec![line("estimated", thinned(pairs(points)), Ink::Measured)];
-        curves.extend(found("time"));
-        let plot = Plot {
-            title: format!("missing signal at {} in {experiment}", evidence.place),
-            x_label: "time (s)".into(),
-            y_label: y_label.clone(),
-            curves,
-            ..Plot::default()
-        };
-        let name = format!("missing-{}-time-{experiment}", evidence.place);
-        figures.push(Figure { plots: vec![(name, plot)], caption: Vec::new() });
+        let title = format!("missing signal at {} in {experiment}", evidence.place);
+        figures.push(figure(&format!("time-{experiment}"), title, "time (s)".into(), both(points, line)));
     }
     let title = format!("The missing signal {}", words::at(&evidence.place));
-    Group { title, about: Vec::new(), figures }
+    let about = if effects.is_empty() {
+        Vec::new()
+    } else {
+        vec![format!(
+            "Estimated about the repaired model with {effects} taken away and everything else held; where the formula is the \
+             right one, the estimate follows it."
+        )]
+    };
+    Group { title, about, figures }
 }
 
-fn pairs(points: &Points) -> Vec<(f64, f64)> {
-    points.x.iter().copied().zip(points.y.iter().copied()).collect()
+fn dots(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
+    let points = x.iter().copied().zip(y.iter().copied()).collect();
+    Curve { name: name.into(), points, ink, style: CurveStyle::Dots, ..Curve::default() }
 }
 
-fn line(name: &str, points: Vec<(f64, f64)>, ink: Ink) -> Curve {
-    Curve { name: name.into(), points, ink, ..Curve::default() }
-}
-
-fn cloud(points: &Points) -> Curve {
-    Curve { style: CurveStyle::Dots, ..line("estimated, without any formula", pairs(points), Ink::Measured) }
+fn line(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
+    let dots = dots(name, x, y, ink);
+    Curve { points: thinned(dots.points), style: CurveStyle::Line, ..dots }
 }
 
 /// A place as it stands in tables.

@@ -1,0 +1,50 @@
+//! Shapes that no fit moves: the value that the screening likes best need not be the right one, and the data may allow
+//! several.
+
+use std::sync::Arc;
+
+use mops_core::Effect;
+use mops_models::effects::effects;
+
+use crate::diagnosis::StrengthValue;
+use crate::testing::{Record, integrated, study, subject};
+use crate::{Options, diagnose};
+
+/// A body that cools: `T' = -h (T - 20)`.
+const BODY: &str = r#"
+states     = { T = "degC" }
+parameters = { h = "1/s" }
+der        = { T = "-h*(T - 20)" }
+"#;
+const RADIATED: f64 = 6e-11;
+
+/// The strengths of the radiation found in a body that cools from these temperatures.
+fn radiation(noise: f64, from: &[f64]) -> Vec<StrengthValue> {
+    let cooled = |&start: &f64| {
+        let fourth = |t: f64| (t + 273.15).powi(4);
+        let rates = |_: f64, x: &[f64; 2]| [-0.01 * (x[0] - 20.0) - RADIATED * (fourth(x[0]) - fourth(20.0)), 0.0];
+        Record::of_first("T", &integrated(rates, [start, 0.0], 1.0, 200), 1.0, noise, &format!("{start}"))
+    };
+    let subject = subject(BODY, &[0.02, 100.0], 1, from.iter().map(cooled).collect());
+    let own: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| e.name() == "radiation-loss").collect();
+    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let diagnosis = diagnose(&study(&subject), &own, &options, &()).expect("it simulates");
+    diagnosis.found.into_iter().next().expect("it is found").strengths
+}
+
+#[test]
+fn of_shapes_that_no_fit_moves_the_one_that_fits_best_stays() {
+    let found = radiation(0.001, &[98.0, 60.0]);
+    let zero = &found[2];
+    assert_eq!((zero.name.as_str(), zero.value, zero.interval95), ("zero", 273.15, None), "{found:?}");
+    let [low, high] = found[0].interval95.expect("it is told");
+    assert!(low < RADIATED && RADIATED < high && high - low < 0.1 * RADIATED, "{found:?}");
+}
+
+#[test]
+fn where_the_data_allow_several_the_intervals_span_them() {
+    let found = radiation(0.1, &[98.0]);
+    assert_eq!(found[2].interval95.map(|[low, _]| low < 293.15), Some(true), "{found:?}");
+    let [low, high] = found[0].interval95.expect("it is told");
+    assert!(low < RADIATED && RADIATED < high, "{found:?}");
+}
