@@ -301,10 +301,10 @@ fn is_clearly_better(trial: &Trial<'_>, than: Option<&Trial<'_>>) -> bool {
 }
 
 /// Probability that effects do as well by chance, chosen among so many directions.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
+#[allow(clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
 fn chance(from: &Trial<'_>, with: &Trial<'_>, directions: f64) -> f64 {
     let dispersion = Dispersion::of(with);
-    let worth = (with.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
+    let worth = dispersion.worth(with.fitted.count);
     let added = (with.added.len() - from.added.len()) as i32;
     let gain = criterion(from, &dispersion) - criterion(with, &dispersion) + f64::from(added) * worth;
     by_chance(gain, directions.powi(added))

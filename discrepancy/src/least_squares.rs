@@ -5,12 +5,16 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::fit::{Fit, Fitted, Known, Point, Residuals, Slopes, dot};
+use crate::fit::{Fit, Fitted, Global, Known, Point, Residuals, Sets, Slopes, dot};
 use crate::subject::Local;
+use crate::weigh::Dispersion;
 
 /// How far, in units of its scale, a start value may be expected from where it begins: what the data say nothing of, such as a
 /// speed while the sensor is saturated, stays there.
 const WIDE: f64 = 30.0;
+
+/// How far beyond a bound, in standard errors, the data must want an unknown for the bound to hold it.
+const BEYOND: f64 = 2.0;
 
 /// Normal equations at a point.
 #[derive(Debug)]
@@ -229,52 +233,73 @@ impl Fit<'_> {
         Fitted { normal: Some(normal), ..fitted }
     }
 
-    /// How many of the globals from `first` on the data tell nothing of: of each the share of its variance beforehand that they
-    /// leave, where `weight` units of the sum of squares count as one. Beforehand it lies anywhere between its bounds; a shape
-    /// without an upper one within a decade either way; of what has no bounds at all the data tell everything.
+    /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly
+    /// narrow them: the logarithm of how many times smaller they make the variance. Beforehand a global lies anywhere between
+    /// its bounds, a shape without an upper one within a decade either way; a start value within ten of its scales. What has no
+    /// bounds at all costs the whole.
     ///
-    /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 4.4.
-    pub fn untold(&self, fitted: &Fitted, first: usize, weight: f64) -> f64 {
+    /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 2.3: the Occam factor.
+    pub fn spared(&self, fitted: &Fitted, first: usize, dispersion: &Dispersion) -> f64 {
+        const START: f64 = 10.0;
         let Some(normal) = self.normal_at(fitted) else { return 0.0 };
+        let uniform = |width: f64| if width.is_finite() { 12.0 / (width * width) } else { 0.0 };
+        let global = |(k, global): (usize, &Global)| match global.sets {
+            Sets::Parameter(parameter) if parameter >= first => {
+                let width = (global.bounds[1] - global.bounds[0]) / self.stretch(k, fitted.point.globals[k]);
+                uniform(if global.log && !width.is_finite() { 2.0 * 10.0_f64.ln() } else { width })
+            }
+            _ => 0.0,
+        };
+        // Of each unknown the precision beforehand, and what it costs where the data tell it.
+        let all = dispersion.worth(fitted.count);
+        let mut unknowns: Vec<(f64, f64)> = self.globals.iter().enumerate().map(|g| (global(g), all)).collect();
+        for (piece, r) in self.pieces.iter().zip(&fitted.residuals) {
+            let local = |local: &Local| if local.parameter >= first { START.powi(-2) } else { 0.0 };
+            unknowns.extend(piece.locals.iter().map(|l| (local(l), dispersion.worth(r.len()))));
+        }
         let held = self.held(&fitted.point, &normal.gradient);
         let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let before = |k: usize| {
-            let [low, high] = self.globals[k].bounds;
-            if (high - low).is_finite() {
-                12.0 * (self.stretch(k, fitted.point.globals[k]) / (high - low)).powi(2)
-            } else if self.globals[k].log {
-                12.0 / (2.0 * 10.0_f64.ln()).powi(2)
-            } else {
-                0.0
-            }
-        };
-        let own: Vec<f64> =
-            free.iter().map(|&k| if (first..self.globals.len()).contains(&k) { before(k) } else { 0.0 }).collect();
         let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-            normal.matrix[(free[i], free[j])] / weight + if i == j { own[i] } else { 0.0 }
+            normal.matrix[(free[i], free[j])] / dispersion.weight() + if i == j { unknowns[free[i]].0 } else { 0.0 }
         });
-        let inverse = pseudo_inverse(&matrix);
-        own.iter().enumerate().map(|(i, before)| (before * inverse[(i, i)]).clamp(0.0, 1.0)).sum()
+        let after = pseudo_inverse(&matrix);
+        let spared = |(i, &k): (usize, &usize)| {
+            let (before, whole) = unknowns[k];
+            let narrowed = -(before * after[(i, i)]).ln();
+            if before > 0.0 { whole - narrowed.clamp(0.0, whole) } else { 0.0 }
+        };
+        free.iter().enumerate().map(spared).sum()
     }
 
     /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1; 0
-    /// for what stands at a bound, and where the slopes cannot be had.
+    /// for what stands at a bound against which the data press it, and where the slopes cannot be had.
     pub fn covariance(&self, fitted: &Fitted) -> DMatrix<f64> {
         let g = self.globals.len();
         let mut covariance = DMatrix::zeros(g, g);
         let Some(normal) = self.normal_at(fitted) else { return covariance };
-        let held = self.held(&fitted.point, &normal.gradient);
-        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let mut matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
         let stretch = |k: usize| self.stretch(k, fitted.point.globals[k]);
-        // What the data do not tell is still known to lie between the bounds: uniform there.
-        for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
-            let [low, high] = self.globals[k].bounds;
-            if (high - low).is_finite() {
-                matrix[(i, i)] += 12.0 * (stretch(k) / (high - low)).powi(2);
+        let inverse = |free: &[usize]| {
+            let mut matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
+            // What the data do not tell is still known to lie between the bounds: uniform there.
+            for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
+                let [low, high] = self.globals[k].bounds;
+                if (high - low).is_finite() {
+                    matrix[(i, i)] += 12.0 * (stretch(k) / (high - low)).powi(2);
+                }
             }
+            wide_inverse(&matrix)
+        };
+        let mut held = self.held(&fitted.point, &normal.gradient);
+        let pinned = |k: usize| k < g && self.globals[k].is_pinned();
+        let all: Vec<usize> = (0..held.len()).filter(|&k| !pinned(k)).collect();
+        let whole = inverse(&all);
+        let wanted = -(&whole * DVector::from_fn(all.len(), |i, _| normal.gradient[all[i]]));
+        // What would move beyond its bound by less than the data tell is not held by it, nor is what goes with it.
+        for (i, &k) in all.iter().enumerate() {
+            held[k] &= wanted[i].abs() > BEYOND * whole[(i, i)].sqrt();
         }
-        let inverse = pseudo_inverse(&matrix);
+        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
+        let inverse = inverse(&free);
         for (i, &a) in free.iter().enumerate().filter(|(_, a)| **a < g) {
             for (j, &b) in free.iter().enumerate().filter(|(_, b)| **b < g) {
                 covariance[(a, b)] = inverse[(i, j)] * stretch(a) * stretch(b);
@@ -309,8 +334,20 @@ pub(crate) fn damped_step(normal: &Normal, held: &[bool], damping: f64) -> Optio
     Some(step)
 }
 
-/// Inverse of a symmetric matrix without the directions whose eigenvalue, scaled to a unit diagonal, is below 1e-12.
+/// Inverse of a symmetric matrix without the directions whose eigenvalue, scaled to a unit diagonal, is below [`NONE`].
 pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    inverted(matrix, |value, least| if value > least { 1.0 / value } else { 0.0 })
+}
+
+/// The same with these directions as wide as numbers tell: what nothing tells is uncertain, not certain.
+fn wide_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    inverted(matrix, |value, least| 1.0 / value.max(least))
+}
+
+/// Share of the largest eigenvalue that counts as none.
+const NONE: f64 = 1e-12;
+
+fn inverted(matrix: &DMatrix<f64>, invert: impl Fn(f64, f64) -> f64) -> DMatrix<f64> {
     let n = matrix.nrows();
     if n == 0 {
         return DMatrix::zeros(0, 0);
@@ -318,14 +355,11 @@ pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let scale: Vec<f64> = (0..n).map(|k| matrix[(k, k)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
     let eigen = scaled.symmetric_eigen();
-    let largest = eigen.eigenvalues.amax();
+    let least = NONE * eigen.eigenvalues.amax();
     let mut inverse = DMatrix::zeros(n, n);
-    for k in 0..n {
-        let value = eigen.eigenvalues[k];
-        if value > 1e-12 * largest {
-            let v = eigen.eigenvectors.column(k);
-            inverse += (v * v.transpose()) / value;
-        }
+    for (k, &value) in eigen.eigenvalues.iter().enumerate() {
+        let v = eigen.eigenvectors.column(k);
+        inverse += (v * v.transpose()) * invert(value, least);
     }
     DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]))
 }

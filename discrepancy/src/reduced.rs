@@ -53,7 +53,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let mut tuners = trial.fitted.point.globals[..self.subject.globals.len()].to_vec();
-            tuners[k] = global.bounds[0].max(0.0);
+            tuners[k] = 0.0;
             let (own, locals) = (self.pieces(trial.windows), self.own_locals(&trial));
             let all: Vec<usize> = held.iter().copied().chain([k]).collect();
             let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
-use crate::fit::{Fit, Fitted, Piece, Sets, dot};
+use crate::fit::{Fit, Fitted, Piece, dot};
 use crate::round::Round;
 use crate::subject::{Local, Subject};
 use crate::variant::{Added, Variant, problem};
@@ -366,12 +366,6 @@ impl<'a> Trial<'a> {
         let free = |s: &&Strength| s.scope == Scope::Experiment && !s.fixed;
         let of = |effect: &dyn Effect| effect.strengths().iter().filter(free).count() + effect.free_starts();
         self.added.iter().map(|a| of(a.candidate.effect.as_ref())).sum()
-    }
-
-    /// Number of unknowns that the effect added last brings in for all experiments together.
-    pub fn newest_unknowns(&self) -> usize {
-        let from = self.variant.first.last().copied().unwrap_or(usize::MAX);
-        self.fit.globals.iter().filter(|global| matches!(global.sets, Sets::Parameter(k) if k >= from)).count()
     }
 
     /// Number of unknowns that its effects bring in for all experiments together.

@@ -40,6 +40,12 @@ impl Dispersion {
         Self { square, repeats: (1.0 + r) / (1.0 - r) }
     }
 
+    /// What an unknown costs that so many samples tell: the logarithm of as many as are independent.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn worth(&self, samples: usize) -> f64 {
+        (samples as f64 / self.repeats).max(2.0).ln()
+    }
+
     /// How many units of the sum of squares count as one.
     pub fn weight(&self) -> f64 {
         self.square * self.repeats
@@ -53,23 +59,22 @@ impl Dispersion {
 #[allow(clippy::cast_precision_loss)]
 pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
     let rarity: f64 = trial.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
-    let worth = |samples: usize| (samples as f64 / dispersion.repeats).max(2.0).ln();
     // What each experiment has of its own is told by its samples alone.
-    let own: f64 = trial.fitted.residuals.iter().map(|r| worth(r.len())).sum::<f64>() * trial.own_unknowns() as f64;
-    trial.fitted.chi2 / dispersion.weight() + trial.unknowns() as f64 * worth(trial.fitted.count) + own + 2.0 * rarity
+    let own: f64 = trial.fitted.residuals.iter().map(|r| dispersion.worth(r.len())).sum();
+    let unknowns = trial.unknowns() as f64 * dispersion.worth(trial.fitted.count) + trial.own_unknowns() as f64 * own;
+    trial.fitted.chi2 / dispersion.weight() + unknowns + 2.0 * rarity
 }
 
-/// The same without the price of strengths of the newest effect that the data tell nothing of: a break-away force is as likely
-/// as before where nothing breaks away.
-#[allow(clippy::cast_precision_loss)]
+/// The same where what the newest effect brings in and the data hardly tell costs accordingly less: a break-away force is as
+/// likely as before where nothing breaks away.
 pub fn informed(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
-    let told = criterion(trial, dispersion);
-    if !trial.added.last().is_some_and(is_plausible) {
-        return told;
+    let whole = criterion(trial, dispersion);
+    match (trial.added.last(), trial.variant.first.last()) {
+        (Some(newest), Some(&first)) if is_plausible(newest) => {
+            whole - trial.fit.spared(&trial.fitted, first, dispersion)
+        }
+        _ => whole,
     }
-    let worth = (trial.fitted.count as f64 / dispersion.repeats).max(2.0).ln();
-    let first = trial.fit.globals.len() - trial.newest_unknowns();
-    told - worth * trial.fit.untold(&trial.fitted, first, dispersion.weight())
 }
 
 /// Whether shapes of an effect are within a decade of those that are tried first. What is far off tells nothing because the

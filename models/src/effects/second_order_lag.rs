@@ -3,6 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
+use super::terms::damped;
 
 /// `second-order-lag`.
 pub struct SecondOrderLag;
@@ -36,6 +37,10 @@ impl Definition for SecondOrderLag {
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn start(&self, at: &At<'_, S>, z: &mut [S]) {
         z.copy_from_slice(&[at.value, S::from(0.0)]);
+    }
+
+    fn longest_step(&self) -> f64 {
+        damped(self.tau) / (self.d.value() * 2.0).max(1.0)
     }
 
     fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {

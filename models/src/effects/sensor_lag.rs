@@ -3,6 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
+use super::terms::damped;
 
 /// `sensor-lag`.
 pub struct SensorLag;
@@ -33,6 +34,10 @@ impl Definition for SensorLag {
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn start(&self, at: &At<'_, S>, z: &mut [S]) {
         z[0] = at.value;
+    }
+
+    fn longest_step(&self) -> f64 {
+        damped(self.tau)
     }
 
     fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {

@@ -17,6 +17,13 @@ pub(super) const fn phase() -> Strength {
     Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
 }
 
+/// The longest step within which the explicit method damps what decays in a time: at rest no error would tell it to keep to
+/// that, and tangents would grow. Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
+/// section IV.2: to 3.3 of these times along the real axis, to 1 along the imaginary one.
+pub(super) fn damped<S: Scalar>(time: S) -> f64 {
+    if time.value() > 0.0 { time.value() } else { f64::INFINITY }
+}
+
 /// `x` in steps; a neutral 0 leaves it as it is. Its slope by `x` is that of the stairs seen from afar, 1: on each stair it would
 /// be 0, and tell nothing.
 pub(super) fn quantised<S: Scalar>(x: S, step: S) -> S {
