@@ -12,7 +12,7 @@ use crate::screen::Screened;
 use crate::search::Trial;
 use crate::stability::stability;
 use crate::subject::Subject;
-use crate::weigh::{Dispersion, criterion, informed, probabilities};
+use crate::weigh::{Dispersion, criterion, probabilities, weighed};
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
 pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
@@ -27,7 +27,12 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
             continue;
         }
         let dispersion = Dispersion::of(best);
-        let mut criteria: Vec<f64> = round.trials.iter().map(|t| informed(t, &dispersion)).collect();
+        let mut criteria = if accepted {
+            weighed(&round.trials, &dispersion)
+        } else {
+            // What the data tell of effects that were not added was not the question.
+            round.trials.iter().map(|t| criterion(t, &dispersion)).collect()
+        };
         if !accepted {
             // Nothing at all is a rival too, beforehand as likely as all candidates together.
             #[allow(clippy::cast_precision_loss)]
@@ -60,8 +65,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
                 bic_gain: criterion(&round.from, &dispersion) - criterion(trial, &dispersion),
                 strengths: strengths.collect(),
                 absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
-                normalised: [Some(trial.fitted.normalised()), None],
-                fitted: true,
+                normalised: trial.fitted.normalised(),
             });
         }
     }
@@ -89,12 +93,12 @@ pub fn found(
     if let Some(round) = round {
         let best = &round.trials[0];
         let of = Dispersion::of(best);
-        let least = informed(best, &of);
         let screened = |t: &Trial<'_>| -> Option<&Screened> {
             let newest = t.newest()?;
             round.screened.iter().find(|s| s.added.candidate.is(newest))
         };
-        let criteria: Vec<f64> = round.trials.iter().map(|t| informed(t, &of)).collect();
+        let criteria = weighed(&round.trials, &of);
+        let least = criteria[0];
         let shares = probabilities(&criteria);
         for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
             let Some(newest) = trial.newest().filter(|_| value - least < 6.0) else { continue };
@@ -106,7 +110,7 @@ pub fn found(
                 effect: newest.effect.name().to_owned(),
                 place: newest.place(),
                 probability,
-                bic_behind: (value - least).max(0.0),
+                bic_behind: value - least,
                 likeness,
             });
         }

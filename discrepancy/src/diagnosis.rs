@@ -87,7 +87,7 @@ pub struct Removed {
     pub place: String,
 }
 
-/// An effect that was tried as the only one.
+/// An effect that was tried, beside those that were in by then.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ranked {
     /// The effect.
@@ -104,10 +104,8 @@ pub struct Ranked {
     pub strengths: Vec<StrengthValue>,
     /// Share of its trace in the outputs that the parameters and start values absorb.
     pub absorbed: f64,
-    /// Normalised error with it, on calibration and selection data.
-    pub normalised: [Option<f64>; 2],
-    /// Whether it was fitted, rather than only screened.
-    pub fitted: bool,
+    /// Normalised error with it, on calibration and selection data together.
+    pub normalised: f64,
 }
 
 /// What no effect explains.

@@ -137,14 +137,18 @@ impl<'a> Search<'a> {
         Some(Round { screened, trials, directions, independent, from: from.clone(), known })
     }
 
-    /// Fits what is simpler than the best once more, from where that ended: records with stops have minima at which the simpler
-    /// one of two effects may have stayed.
+    /// Where the best explains the data, fits what is simpler once more, from where that ended: records with stops have minima
+    /// at which the simpler one of two effects may have stayed.
     fn simplify(&self, trials: &mut Vec<Trial<'a>>, screened: &[Screened]) {
-        let Some(best) = trials.first() else { return };
+        let Some(best) = trials.first().filter(|best| best.fitted.normalised() <= UNEXPLAINED) else { return };
         let Some((own, others)) = best.added.split_last() else { return };
+        let near = nearness(Some(best));
         let is_simpler = |s: &&Screened| s.added.candidate.is_simpler_than(&own.candidate);
         let simpler: Vec<&Screened> = screened.iter().filter(is_simpler).collect();
-        let fit = |s: &&Screened| self.from(best, &[others, &[s.added.begun_like(own)]].concat(), 40);
+        let fit = |s: &&Screened| {
+            let begun = self.from(best, &[others, &[s.added.begun_like(own)]].concat(), LOOK)?;
+            if near(&begun) { begun.continued(40) } else { None }
+        };
         for one in simpler.par_iter().filter_map(fit).collect::<Vec<_>>() {
             let same = |t: &Trial<'a>| t.newest().zip(one.newest()).is_some_and(|(a, b)| a.is(b));
             match trials.iter_mut().find(|t| same(t)) {

@@ -16,4 +16,5 @@ mod stability;
 mod starts;
 mod steps;
 mod tangents;
+mod unidentified;
 mod untold;

@@ -1,5 +1,7 @@
 //! Weighing fitted models against each other: what correlated residuals are worth, and how likely chance is.
 
+use rayon::prelude::*;
+
 use crate::search::Trial;
 use crate::variant::Added;
 
@@ -65,16 +67,23 @@ pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
     trial.fitted.chi2 / dispersion.weight() + unknowns + 2.0 * rarity
 }
 
-/// The same where what the newest effect brings in and the data hardly tell costs accordingly less: a break-away force is as
-/// likely as before where nothing breaks away.
-pub fn informed(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
-    let whole = criterion(trial, dispersion);
-    match (trial.added.last(), trial.variant.first.last()) {
-        (Some(newest), Some(&first)) if is_plausible(newest) => {
-            whole - trial.fit.spared(&trial.fitted, first, dispersion)
+/// The criteria of models of which the first was chosen. What the newest effect of a rival brings in and the data hardly tell
+/// costs accordingly less, down to where the rival is as good as the first: a break-away force is as likely as before where
+/// nothing breaks away.
+pub fn weighed(trials: &[Trial<'_>], dispersion: &Dispersion) -> Vec<f64> {
+    /// Behind by more than this, no rival gets near by it.
+    const FAR: f64 = 40.0;
+    let Some(first) = trials.first().map(|first| criterion(first, dispersion)) else { return Vec::new() };
+    let one = |trial: &Trial<'_>| {
+        let whole = criterion(trial, dispersion);
+        match (trial.added.last(), trial.variant.first.last()) {
+            (Some(newest), Some(&own)) if whole > first && whole < first + FAR && is_plausible(newest) => {
+                (whole - trial.fit.spared(&trial.fitted, own, dispersion)).max(first)
+            }
+            _ => whole,
         }
-        _ => whole,
-    }
+    };
+    trials.par_iter().map(one).collect()
 }
 
 /// Whether shapes of an effect are within a decade of those that are tried first. What is far off tells nothing because the

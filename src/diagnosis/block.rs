@@ -72,8 +72,7 @@ fn ranked(ranked: &Ranked) -> Value {
         "bic_gain": ranked.bic_gain,
         "strengths": strengths(&ranked.strengths),
         "absorbed": ranked.absorbed,
-        "normalised": { "calibration": ranked.normalised[0], "selection": ranked.normalised[1] },
-        "fitted": ranked.fitted,
+        "normalised": ranked.normalised,
     })
 }
 

@@ -83,8 +83,7 @@ fn ranked(effect: &str, place: &str, probability: f64, bic_gain: f64) -> Ranked 
         bic_gain,
         strengths: vec![strength("c", 0.0124, "N m")],
         absorbed: 0.87,
-        normalised: [Some(1.01), Some(f64::NAN)],
-        fitted: bic_gain > 1000.0,
+        normalised: 1.01,
     }
 }
 

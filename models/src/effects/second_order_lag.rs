@@ -40,7 +40,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
     }
 
     fn longest_step(&self) -> f64 {
-        damped(self.tau) / (self.d.value() * 2.0).max(1.0)
+        0.5 * damped(self.tau) / (self.d.value() * 2.0).max(1.0)
     }
 
     fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {

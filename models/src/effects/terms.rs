@@ -21,7 +21,7 @@ pub(super) const fn phase() -> Strength {
 /// that, and tangents would grow. Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
 /// section IV.2: to 3.3 of these times along the real axis, to 1 along the imaginary one.
 pub(super) fn damped<S: Scalar>(time: S) -> f64 {
-    if time.value() > 0.0 { time.value() } else { f64::INFINITY }
+    if time.value() > 0.0 { 2.0 * time.value() } else { f64::INFINITY }
 }
 
 /// `x` in steps; a neutral 0 leaves it as it is. Its slope by `x` is that of the stairs seen from afar, 1: on each stair it would

@@ -109,6 +109,22 @@ fn tangents_along_strengths_are_those_of_differences() {
     }
 }
 
+#[test]
+fn a_lag_at_rest_has_tangents_that_decay() {
+    let model = with(&equations(BLOCK), &[("actuator-lag", "actuator:u")]);
+    // The command is 1 all along, and the lag begins at 1: nothing but its time limits the step.
+    let (tau, mass) = (1.5e-3, 2.0);
+    let u = Input::Constant(1.0);
+    let case = Case { inputs: vec![("u".into(), u)], ..Case::default() };
+    let parameters = [mass, 0.0, 0.0, tau, 0.0];
+    let job = Job { case: &case, parameters: &parameters, signals: &[0, 1], horizon: 10.0 };
+    let mut of_start = vec![0.0; parameters.len()];
+    of_start[4] = 1.0;
+    let (_, tangents) = model.tangents(&job, &[of_start]).expect("it has them").expect("it simulates");
+    // What begins 1 too high leaves an impulse of tau.
+    assert!((tangents[0].trace("v").last() * mass / tau - 1.0).abs() < 1e-3, "{}", tangents[0].trace("v").last());
+}
+
 fn built_in(kind: &str) -> Arc<dyn Model> {
     let kinds = crate::kinds();
     let kind = kinds.iter().find(|known| known.name == kind).expect("it is there");

@@ -16,8 +16,8 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     let (first, others) = diagnosis.ranked.split_at(SHOWN.min(diagnosis.ranked.len()));
     html! {
         p {
-            "Each effect of the catalogue at each place it fits, as the only one that is added. Absorbed is the share of its trace in "
-            "the outputs that parameters and start values can take over; what was only screened was not worth a fit."
+            "The effects that were fitted at places of the model, each beside those that were in by then. Absorbed is the share of "
+            "its trace in the outputs that parameters and start values can take over."
         }
         (scrolling("Ranking", rows(diagnosis, first)))
         @if !others.is_empty() {
@@ -49,27 +49,17 @@ fn rows(diagnosis: &Diagnosis, ranked: &[Ranked]) -> Markup {
                     tr class=[mark(diagnosis, effect).map(|_| "marked")] {
                         th scope="row" { (effect.effect) small { (effect.class) } }
                         td { (effect.place) }
-                        @if effect.probability.is_finite() {
-                            td { span class="scaled" { span class="number" { (words::probability(effect.probability)) } (bar(effect.probability)) } }
-                        } @else {
-                            td class="quiet" { "screened only" }
-                        }
+                        td { span class="scaled" { span class="number" { (words::probability(effect.probability)) } (bar(effect.probability)) } }
                         td { @if let Some(mark) = mark(diagnosis, effect) { (mark) } }
                         td class="number" { @if effect.bic_gain.is_finite() { (significant(effect.bic_gain, 4)) } }
                         td { @for (i, strength) in effect.strengths.iter().enumerate() { @if i > 0 { br; } (words::strength(strength)) } }
-                        td class="number" { (normalised(effect)) }
+                        td class="number" { @if effect.normalised.is_finite() { (words::times(effect.normalised)) } }
                         td class="number" { (words::share(effect.absorbed)) }
                     }
                 }
             }
         }
     }
-}
-
-/// Error with the effect on calibration data, and on selection data where there are some.
-fn normalised(effect: &Ranked) -> String {
-    let known = effect.normalised.iter().flatten().filter(|error| error.is_finite());
-    known.map(|error| words::times(*error)).collect::<Vec<_>>().join(", ")
 }
 
 /// How an effect stands to those found.

@@ -67,7 +67,6 @@ fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
         "c = 0.0124 (0.0118 to 0.013) N m",
         "cannot be told apart",
         "not excluded",
-        "screened only",
         "15.40",
     ] {
         assert!(page.contains(text), "{text}");
