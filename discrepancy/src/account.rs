@@ -12,7 +12,7 @@ use crate::screen::Screened;
 use crate::search::Trial;
 use crate::stability::stability;
 use crate::subject::Subject;
-use crate::weigh::{Dispersion, criterion, probabilities, weighed};
+use crate::weigh::{CLEARLY, Dispersion, criterion, probabilities, weighed};
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
 pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
@@ -101,7 +101,7 @@ pub fn found(
         let least = criteria[0];
         let shares = probabilities(&criteria);
         for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
-            let Some(newest) = trial.newest().filter(|_| value - least < 6.0) else { continue };
+            let Some(newest) = trial.newest().filter(|_| value - least < CLEARLY) else { continue };
             let likeness = match (screened(best), screened(trial)) {
                 (Some(x), Some(y)) => dot(&x.direction, &y.direction).abs(),
                 _ => f64::NAN,
@@ -142,12 +142,14 @@ pub fn found(
 /// Widens the intervals of strengths to those of another model with the same effects that the data allow as well.
 pub fn widen(found: &mut [Found], other: &Calibrated, last: &Trial<'_>, repeats: f64) {
     for (index, found) in found.iter_mut().enumerate() {
-        for (own, theirs) in found.strengths.iter_mut().zip(other.strengths(index, &last.variant, repeats)) {
-            let [low, high] = theirs.interval95.unwrap_or([theirs.value; 2]);
-            let [from, to] = own.interval95.unwrap_or([own.value; 2]);
-            if low < high || low != own.value {
-                own.interval95 = Some([from.min(low), to.max(high)]);
-            }
+        let theirs = other.strengths(index, &last.variant, repeats);
+        let strengths = last.added[index].candidate.effect.strengths();
+        for ((own, theirs), strength) in found.strengths.iter_mut().zip(theirs).zip(strengths) {
+            // What no fit moves has no interval of its own.
+            let told = |value: &StrengthValue| value.interval95.or(strength.fixed.then_some([value.value; 2]));
+            let (Some([from, to]), Some([low, high])) = (told(own), told(&theirs)) else { continue };
+            let span = [from.min(low), to.max(high)];
+            own.interval95 = (span[0] < span[1]).then_some(span);
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::drawn::draw;
 use crate::judge::{Judgement, judge};
 use crate::locate::locate;
 use crate::screen::Scene;
-use crate::search::{Limits, Search};
+use crate::search::{Limits, Search, Trial};
 use crate::stopgap::is_table;
 use crate::subject::Subject;
 use crate::weigh::Dispersion;
@@ -69,12 +69,12 @@ pub fn diagnose(
     let growth = search.settle(growth, watch);
     let (last, held) = search.without_declared(growth.last);
     watch.stage("the repaired model", 0.9);
-    let (last, held, after) = match search.calibrate(&last, &held) {
-        Some(after) => (last, held, after),
-        // What calibration data alone make of it cannot be simulated: it explains nothing.
-        None => (base.clone(), Vec::new(), search.calibrate(&declared, &[]).ok_or_else(lost)?),
-    };
     let (rounds, steps, allowed) = (growth.rounds, growth.steps, growth.allowed);
+    let (last, held, after, rounds) = match search.calibrate(&last, &held) {
+        Some(after) => (last, held, after, rounds),
+        // What calibration data alone make of it cannot be simulated: it explains nothing.
+        None => (declared.clone(), Vec::new(), search.calibrate(&declared, &[]).ok_or_else(lost)?, Vec::new()),
+    };
     let ranked = ranking(&rounds, &last);
     let Judgement { verdict, last, held, after, unexplained, note } =
         judge(&search, &base, &located, last, held, after);
@@ -84,7 +84,13 @@ pub fn diagnose(
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
     let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
     if verdict == Verdict::Effect {
-        let allowed = allowed.par_iter().filter_map(|trial| search.calibrate(trial, &[]));
+        // Without the declared terms that went.
+        let calibrated = |trial: &Trial<'_>| {
+            let mut trial = trial.clone();
+            held.iter().for_each(|&k| trial.fitted.point.globals[k] = last.fitted.point.globals[k]);
+            search.calibrate(&trial, &held)
+        };
+        let allowed = allowed.par_iter().filter_map(calibrated);
         allowed.collect::<Vec<_>>().iter().for_each(|other| widen(&mut found, other, &last, dispersion.repeats));
     }
     let probability = match verdict {

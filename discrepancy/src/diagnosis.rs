@@ -210,7 +210,8 @@ pub struct Curve {
     pub found: Vec<f64>,
 }
 
-/// The unknown signal at a place that would explain the residual.
+/// The unknown signal at a place that would explain the residual: how likely of the declared model; over what it is drawn, where
+/// effects were found there whose formula can be drawn, of the repaired one without them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// The place, as `kind:name`.

@@ -7,6 +7,7 @@
 
 use mops_core::Port;
 
+use crate::candidate::Candidate;
 use crate::diagnosis::Evidence;
 use crate::locate::{Located, located, thinning};
 use crate::screen::Scene;
@@ -19,13 +20,22 @@ use crate::unknown::respond;
 pub fn draw(places: &mut [Located], last: &Trial<'_>) {
     for place in places {
         let here: Vec<usize> = (0..last.added.len()).filter(|&k| last.added[k].candidate.port == place.port).collect();
-        if here.iter().all(|&k| is_table(&last.added[k])) {
+        let can = |&k: &usize| can_be_drawn(&last.added[k].candidate);
+        if here.iter().all(|&k| is_table(&last.added[k])) || !here.iter().all(can) {
             continue;
         }
         if let Some(Evidence { over, over_time, .. }) = drawn(&place.port, &here, last) {
             (place.evidence.over, place.evidence.over_time) = (over, over_time);
         }
     }
+}
+
+/// Whether an effect's formula can be drawn along the motion that has it already. What passes an actuator tells nothing where
+/// it is held, inertia adds to the acceleration that it changes, and states begin where a fit put them: for these the signal
+/// stays as the declared model wants it.
+fn can_be_drawn(candidate: &Candidate) -> bool {
+    let effect = candidate.effect.as_ref();
+    !matches!(candidate.port, Port::Actuator { .. }) && !effect.is_inertial() && effect.states() == 0
 }
 
 /// The signal at a port, with what the effects of these indices make of it; `None` where it cannot be had.

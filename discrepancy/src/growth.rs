@@ -12,11 +12,7 @@ use crate::diagnosis::Step;
 use crate::round::{Round, best_first};
 use crate::search::{Search, Trial};
 use crate::variant::Added;
-use crate::weigh::{Dispersion, by_chance, criterion};
-
-/// How much better a criterion must be for a rival to take the place of an effect. Source: R. E. Kass, A. E. Raftery, Bayes
-/// Factors, JASA 90 (1995), section 3.2: strong evidence.
-const CLEARLY: f64 = 6.0;
+use crate::weigh::{CLEARLY, Dispersion, by_chance, criterion};
 
 /// How often effects are held against their rivals at most while a model grows.
 const EXCHANGES: usize = 4;

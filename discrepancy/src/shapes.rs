@@ -1,14 +1,11 @@
 //! Other values of shapes that no fit moves, such as the number of waves in a turn, of the effects that were found.
 
+use mops_core::Trials;
 use rayon::prelude::*;
 
 use crate::search::{Search, Trial};
 use crate::variant::Added;
-use crate::weigh::{Dispersion, criterion};
-
-/// How much worse the criterion may be of what the data still allow. Source: R. E. Kass, A. E. Raftery, Bayes Factors, JASA 90
-/// (1995), section 3.2.
-const ALLOWED: f64 = 6.0;
+use crate::weigh::{CLEARLY, Dispersion, criterion};
 
 /// Iterations with which every beginning begins.
 const LOOK: usize = 4;
@@ -31,7 +28,7 @@ impl<'a> Search<'a> {
         rivals.insert(0, last);
         let of = rivals.iter().map(Dispersion::of).min_by(|a, b| a.square.total_cmp(&b.square)).expect("one is there");
         rivals.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
-        let most = criterion(&rivals[0], &of) + ALLOWED;
+        let most = criterion(&rivals[0], &of) + CLEARLY;
         let mut allowed = rivals.into_iter().take_while(|trial| criterion(trial, &of) <= most);
         (allowed.next().expect("the best is allowed"), allowed.collect())
     }
@@ -50,7 +47,9 @@ fn others(own: &Added) -> Vec<Vec<Vec<f64>>> {
         if values(&strengths) == values(&own.strengths) {
             continue;
         }
-        strengths[0] = own.strengths[0];
+        if effect.strengths()[0].trials == Trials::Linear {
+            strengths[0] = own.strengths[0];
+        }
         match others.iter_mut().find(|begins| values(&begins[0]) == values(&strengths)) {
             Some(begins) => begins.push(strengths),
             None => others.push(vec![strengths]),

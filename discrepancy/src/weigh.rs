@@ -5,6 +5,10 @@ use rayon::prelude::*;
 use crate::search::Trial;
 use crate::variant::Added;
 
+/// How far apart criteria are where the data clearly prefer one model. Source: R. E. Kass, A. E. Raftery, Bayes Factors, JASA
+/// 90 (1995), section 3.2: strong evidence.
+pub const CLEARLY: f64 = 6.0;
+
 /// What the residuals of the best model tell of the data: the error model that all candidates share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dispersion {
@@ -71,7 +75,7 @@ pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
 /// costs accordingly less, down to where the rival is as good as the first: a break-away force is as likely as before where
 /// nothing breaks away.
 pub fn weighed(trials: &[Trial<'_>], dispersion: &Dispersion) -> Vec<f64> {
-    /// Behind by more than this, no rival gets near by it.
+    /// Rivals behind by more than this are not looked at so closely.
     const FAR: f64 = 40.0;
     let Some(first) = trials.first().map(|first| criterion(first, dispersion)) else { return Vec::new() };
     let one = |trial: &Trial<'_>| {

@@ -341,6 +341,11 @@ pub trait Acting<S: Scalar> {
         f64::INFINITY
     }
 
+    /// Longest step in which an explicit method damps what decays in it by itself, s.
+    fn damped_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Moves what is remembered from one moment to the next ([`Effect::memory`]), NaN before the first: at an actuator
     /// whenever the command jumps or changes its slope, before and after it, at a sensor along the simulation.
     fn remember(&self, _at: &At<'_, S>, _memory: &mut [S]) {}

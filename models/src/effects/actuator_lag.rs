@@ -36,7 +36,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         z[0] = at.value;
     }
 
-    fn longest_step(&self) -> f64 {
+    fn damped_step(&self) -> f64 {
         damped(self.tau)
     }
 

@@ -39,7 +39,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         z.copy_from_slice(&[at.value, S::from(0.0)]);
     }
 
-    fn longest_step(&self) -> f64 {
+    fn damped_step(&self) -> f64 {
         0.5 * damped(self.tau) / (self.d.value() * 2.0).max(1.0)
     }
 

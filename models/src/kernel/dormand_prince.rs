@@ -16,6 +16,7 @@ pub(super) struct DormandPrince<X> {
 
 impl<S: Scalar, D: Dynamics<S>> Method<S, D> for DormandPrince<D::State> {
     const ERROR_ORDER: f64 = 5.0;
+    const IS_EXPLICIT: bool = true;
 
     fn new(_: &D, x: &D::State) -> Self {
         Self { k: std::array::from_fn(|_| x.clone()), stage: x.clone() }

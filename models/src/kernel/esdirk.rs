@@ -76,6 +76,7 @@ pub(super) struct Esdirk<X> {
 
 impl<S: Scalar, D: Dynamics<S>> Method<S, D> for Esdirk<D::State> {
     const ERROR_ORDER: f64 = 4.0;
+    const IS_EXPLICIT: bool = false;
 
     fn new(f: &D, x: &D::State) -> Self {
         let n = x.as_ref().len();

@@ -72,6 +72,8 @@ pub(super) struct Attempt<'a, X> {
 pub(super) trait Method<S: Scalar, D: Dynamics<S>> {
     /// The error of a step of length `h` is of this order in `h`.
     const ERROR_ORDER: f64;
+    /// Whether it damps what decays in short steps alone.
+    const IS_EXPLICIT: bool;
 
     fn new(f: &D, x: &D::State) -> Self;
 
@@ -130,7 +132,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
     let mut last_log_error = LOG_SMALL_ERROR;
     let mut rejected = false;
     let mut events_here = 0;
-    let longest = dynamics.longest_step();
+    let longest = dynamics.longest_step().min(if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY });
 
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {

@@ -67,6 +67,11 @@ pub trait Dynamics<S: Scalar> {
         f64::INFINITY
     }
 
+    /// Longest step in which an explicit method damps what decays fast, s: at rest no error tells it, and tangents grow.
+    fn damped_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// The places of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
     /// method solves with the band that they span.
     fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {

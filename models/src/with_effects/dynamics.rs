@@ -105,6 +105,7 @@ pub(super) struct Driven<'a, S> {
     forces: usize,
     breaks: Vec<f64>,
     longest_step: f64,
+    damped_step: f64,
     /// For each signal the state that it shows as it is.
     shows: Vec<Option<usize>>,
     /// Whether no effect sits at a sensor.
@@ -157,6 +158,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
         breaks.sort_by(f64::total_cmp);
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
+        let damped = actors.iter().map(|a| a.acting.damped_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
         Self {
             plant,
@@ -167,6 +169,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             forces,
             breaks,
             longest_step: longest,
+            damped_step: damped,
             shows,
             smooth,
             untouched,
@@ -504,6 +507,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn longest_step(&self) -> f64 {
         self.longest_step
+    }
+
+    fn damped_step(&self) -> f64 {
+        self.damped_step
     }
 
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {

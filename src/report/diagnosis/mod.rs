@@ -107,7 +107,7 @@ fn effect(found: &Found) -> Markup {
             p class="formula" { code { (found.formula) } }
             ul class="findings" {
                 @for strength in &found.strengths {
-                    li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval, selection included" } } }
+                    li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval" } } }
                 }
                 li { "Probability " strong { (words::probability(found.probability)) } ", " (found.class) ", BIC lower by " (significant(found.bic_gain, 3)) "." }
                 @for text in words::remarks(found) { li { (rich(&text)) } }

@@ -104,7 +104,8 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
         figures.push(figure(&format!("time-{experiment}"), title, "time (s)".into(), both(points, line)));
     }
     let title = format!("The missing signal {}", words::at(&evidence.place));
-    let about = if effects.is_empty() {
+    let drawn = evidence.over.iter().any(|(_, _, points)| !points.found.is_empty());
+    let about = if !drawn {
         Vec::new()
     } else {
         vec![format!(
