@@ -1,8 +1,8 @@
 //! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start values of
 //! each piece.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use mops_core::{Case, Job, Model};
 use nalgebra::{DMatrix, DVector};
@@ -127,8 +127,8 @@ pub struct Fitted {
     pub count: usize,
     /// The residuals of each piece.
     pub residuals: Vec<Vec<f64>>,
-    /// The normal equations there, where the last iteration needed them.
-    pub normal: Option<Arc<Normal>>,
+    /// The normal equations there, once somebody needed them.
+    pub normal: OnceLock<Arc<Normal>>,
 }
 
 impl Fitted {

@@ -1,6 +1,6 @@
 //! Levenberg and Marquardt's method for a fit: normal equations with exact slopes, steps within bounds, the covariance.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -179,7 +179,11 @@ impl Fit<'_> {
     }
 
     pub(crate) fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
-        fitted.normal.clone().or_else(|| self.normal(&fitted.point).map(Arc::new))
+        if fitted.normal.get().is_none() {
+            let normal = Arc::new(self.normal(&fitted.point)?);
+            return Some(Arc::clone(fitted.normal.get_or_init(|| normal)));
+        }
+        fitted.normal.get().cloned()
     }
 
     /// Where the fit is a short one, sizes of steps before the global `first` stay as they are.
@@ -192,7 +196,7 @@ impl Fit<'_> {
     pub(crate) fn levenberg_marquardt(&self, start: Point, normal: Arc<Normal>, iterations: usize) -> Fitted {
         let count = self.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
         let residuals = normal.residuals.clone();
-        let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: None };
+        let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: OnceLock::new() };
         let mut normal = normal;
         let mut damping = 1e-3;
         let mut total = fitted.chi2 + self.unexpected(&fitted.point);
@@ -230,7 +234,7 @@ impl Fit<'_> {
             fitted.residuals.clone_from(&next.residuals);
             normal = Arc::new(next);
         }
-        Fitted { normal: Some(normal), ..fitted }
+        Fitted { normal: OnceLock::from(normal), ..fitted }
     }
 
     /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly

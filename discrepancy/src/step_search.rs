@@ -1,5 +1,7 @@
 //! Search over the size of steps, which no slope tells: a value that crosses to the next step jumps.
 
+use std::sync::OnceLock;
+
 use crate::fit::{Fit, Fitted, Residuals, Slopes};
 use crate::least_squares::{damped_step, sum_of_squares};
 
@@ -67,7 +69,13 @@ impl Fit<'_> {
                 let step = damped_step(&normal, &self.held_by_slopes(&point, &normal.gradient), 1e-3)?;
                 let point = self.moved(&point, &step);
                 let residuals = self.all(&point)?;
-                Some(Fitted { point, chi2: sum_of_squares(&residuals), residuals, normal: None, count: best.count })
+                Some(Fitted {
+                    point,
+                    chi2: sum_of_squares(&residuals),
+                    residuals,
+                    normal: OnceLock::new(),
+                    count: best.count,
+                })
             };
             let better = |fitted: &Fitted| fitted.chi2 < best.chi2;
             match [stride, -stride].into_iter().find_map(|by| beside(by).filter(better)) {

@@ -4,9 +4,10 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{
-    Case, Channel, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role, Scale,
-    Study, Task, Tasks, Tuner, Unit, stream,
+    Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role,
+    Scale, Study, Task, Tasks, Tuner, Unit, stream,
 };
+use mops_models::effects::effects;
 use mops_models::equations::EquationsOptions;
 use rand_distr::{Distribution, Normal};
 
@@ -150,6 +151,11 @@ pub fn fitted<'a>(subject: &'a Subject, simulations: &'a AtomicUsize) -> (Fit<'a
     let fitted = fit.solve(point, 60).expect("it simulates");
     let scene = Scene::new(&fit, &variant.model, &fitted).expect("it simulates");
     (fit, variant, fitted, scene)
+}
+
+/// The effects of these names.
+pub fn catalogue(names: &[&str]) -> Vec<Arc<dyn Effect>> {
+    effects().into_iter().filter(|e| names.contains(&e.name())).collect()
 }
 
 /// White noise.

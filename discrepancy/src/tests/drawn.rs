@@ -1,12 +1,7 @@
 //! What was found is drawn through the signal that the data show at its place without any formula.
 
-use std::sync::Arc;
-
-use mops_core::Effect;
-use mops_models::effects::effects;
-
 use crate::diagnosis::{Curve, Evidence};
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
 
 /// A block on a spring: `v' = -k x - d v`.
@@ -20,9 +15,8 @@ const NOISE: f64 = 0.002;
 /// The evidence at the place of one effect of the catalogue that is looked for in the records.
 fn at_the_effect(name: &str, records: Vec<Record>) -> Evidence {
     let subject = subject(BLOCK, &[8.0, 0.5, 1.0, 0.0], 2, records);
-    let own: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| e.name() == name).collect();
     let options = Options { max_effects: 1, level: 0.01, seed: 1 };
-    let diagnosis = diagnose(&study(&subject), &own, &options, &()).expect("it simulates");
+    let diagnosis = diagnose(&study(&subject), &catalogue(&[name]), &options, &()).expect("it simulates");
     let place = diagnosis.found.first().expect("it is found").place.clone();
     diagnosis.evidence.into_iter().find(|e| e.place == place).expect("every place has one")
 }

@@ -1,12 +1,8 @@
 //! One and the same effect twice at one place: each is a finding of its own, by a name of its own.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
-use mops_core::Effect;
-use mops_models::effects::effects;
-
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
 
 /// A block on a spring, of which the data have gusts: `v' = -k x - d v + g(t)`.
@@ -28,9 +24,8 @@ fn blown(label: &str, at: f64, force: f64) -> Record {
 fn gusts_in_two_experiments_are_two_findings() {
     let records = vec![blown("one", 1.0, 2.0), blown("other", 2.5, -3.0)];
     let subject = subject(BLOCK, &[8.0, 0.5, 1.0, 0.0], 2, records);
-    let gust: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| e.name() == "wind-gust").collect();
     let options = Options { max_effects: 3, level: 0.01, seed: 1 };
-    let diagnosis = diagnose(&study(&subject), &gust, &options, &()).expect("it simulates");
+    let diagnosis = diagnose(&study(&subject), &catalogue(&["wind-gust"]), &options, &()).expect("it simulates");
     let found = diagnosis.found;
     let mut told: Vec<(Option<&str>, f64)> = found.iter().map(|f| (f.only.as_deref(), f.strengths[0].value)).collect();
     told.sort_by(|a, b| a.0.cmp(&b.0));

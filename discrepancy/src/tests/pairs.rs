@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use mops_core::{Effect, Role};
-use mops_models::effects::effects;
 
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Diagnosis, Options, diagnose};
 
 /// A pendulum that is declared with viscous friction, and has dry friction and the air instead.
@@ -28,10 +27,6 @@ fn swing(label: &str, start: f64) -> Record {
     Record::of_first("q", &states, STEP, NOISE, label)
 }
 
-fn named(names: &[&str]) -> Vec<Arc<dyn Effect>> {
-    effects().into_iter().filter(|e| names.contains(&e.name())).collect()
-}
-
 fn diagnosis(effects: &[Arc<dyn Effect>], max_effects: usize) -> Diagnosis {
     let records = vec![swing("wide", 2.4), swing("middle", 1.6), swing("other", 2.0)];
     let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.0, 0.0], 2, records);
@@ -47,7 +42,7 @@ fn diagnosis(effects: &[Arc<dyn Effect>], max_effects: usize) -> Diagnosis {
 
 #[test]
 fn dry_friction_and_quadratic_drag_are_found_together_and_no_coefficient_is_negative() {
-    let all = named(&["coulomb-friction", "quadratic-drag", "viscous-friction", "sensor-bias", "sensor-gain"]);
+    let all = catalogue(&["coulomb-friction", "quadratic-drag", "viscous-friction", "sensor-bias", "sensor-gain"]);
     let found = diagnosis(&all, 3);
     let mut names: Vec<&str> = found.found.iter().map(|f| f.effect.as_str()).collect();
     names.sort_unstable();
@@ -69,7 +64,7 @@ fn dry_friction_alone_would_want_a_negative_viscous_coefficient() {
     let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.4, 0.0], 2, records);
     subject.measurements[0].locals[0].start = 2.4;
     let simulations = std::sync::atomic::AtomicUsize::new(0);
-    let effects = named(&["coulomb-friction"]);
+    let effects = catalogue(&["coulomb-friction"]);
     let limits = crate::search::Limits::at(0.01);
     let search = crate::search::Search::new(&subject, &effects, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![2.4, 0.0]], 1, 60).expect("it simulates");

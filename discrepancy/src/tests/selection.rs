@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Effect, Role};
-use mops_models::effects::effects;
 
 use crate::base;
 use crate::diagnosis::StrengthValue;
 use crate::search::{Limits, Search};
 use crate::subject::Subject;
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::weigh::{Dispersion, criterion, probabilities};
 use crate::{Diagnosis, Options, diagnose};
 
@@ -43,7 +42,7 @@ fn block(fast: Role, shift: f64) -> Subject {
 
 fn named() -> Vec<Arc<dyn Effect>> {
     let few = ["viscous-friction", "quadratic-drag", "cubic-drag"];
-    effects().into_iter().filter(|e| few.contains(&e.name())).collect()
+    catalogue(&few)
 }
 
 fn diagnosis(subject: &Subject) -> Diagnosis {

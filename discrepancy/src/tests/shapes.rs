@@ -1,13 +1,8 @@
 //! Shapes that no fit moves: the value that the screening likes best need not be the right one, and the data may allow
 //! several.
 
-use std::sync::Arc;
-
-use mops_core::Effect;
-use mops_models::effects::effects;
-
 use crate::diagnosis::StrengthValue;
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
 
 /// A body that cools: `T' = -h (T - 20)`.
@@ -26,9 +21,8 @@ fn radiation(noise: f64, from: &[f64]) -> Vec<StrengthValue> {
         Record::of_first("T", &integrated(rates, [start, 0.0], 1.0, 200), 1.0, noise, &format!("{start}"))
     };
     let subject = subject(BODY, &[0.02, 100.0], 1, from.iter().map(cooled).collect());
-    let own: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| e.name() == "radiation-loss").collect();
     let options = Options { max_effects: 1, level: 0.01, seed: 1 };
-    let diagnosis = diagnose(&study(&subject), &own, &options, &()).expect("it simulates");
+    let diagnosis = diagnose(&study(&subject), &catalogue(&["radiation-loss"]), &options, &()).expect("it simulates");
     diagnosis.found.into_iter().next().expect("it is found").strengths
 }
 

@@ -1,14 +1,10 @@
 //! A choice that rests on noise, or on one experiment alone, is told from one that rests on all data.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
-
-use mops_core::Effect;
-use mops_models::effects::effects;
 
 use crate::search::{Limits, Search};
 use crate::stability::{Stability, stability};
-use crate::testing::{Record, integrated, subject};
+use crate::testing::{Record, catalogue, integrated, subject};
 
 const OSCILLATOR: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -33,7 +29,7 @@ fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
     let count = records.len();
     let subject = subject(OSCILLATOR, &[20.0, 0.2, 1.0, 0.0], 2, records);
     let simulations = AtomicUsize::new(0);
-    let some: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| named.contains(&e.name())).collect();
+    let some = catalogue(named);
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &some, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![1.0, 0.0]; count], 1, 60).expect("it simulates");

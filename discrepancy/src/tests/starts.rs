@@ -3,10 +3,9 @@
 use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Hold, Input};
-use mops_models::effects::effects;
 
 use crate::search::{Limits, Search};
-use crate::testing::{Record, integrated, subject, white};
+use crate::testing::{Record, catalogue, integrated, subject, white};
 
 const CART: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -30,7 +29,7 @@ fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise(
     let record = Record { inputs, times, signals: vec![("x", values, 2e-3)] };
     let subject = subject(CART, &[m, d, 0.0, 0.0], 2, vec![record]);
     let simulations = AtomicUsize::new(0);
-    let lag: Vec<_> = effects().into_iter().filter(|e| e.name() == "actuator-lag").collect();
+    let lag = catalogue(&["actuator-lag"]);
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &lag, limits, &simulations);
     let declared = search.trial(&[], &subject.start(), vec![vec![0.0; 2]], 1, 60).expect("it simulates");

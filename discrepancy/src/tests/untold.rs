@@ -1,11 +1,6 @@
 //! Strengths that the data tell nothing of.
 
-use std::sync::Arc;
-
-use mops_core::Effect;
-use mops_models::effects::effects;
-
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
 
 /// A pendulum: `w' = -g sin(th) - b w`.
@@ -23,8 +18,7 @@ fn a_break_away_that_the_data_tell_nothing_of_is_as_likely_as_before_and_a_fall_
     let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - FRICTION * (x[1] / 1e-3).tanh()];
     let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, 742), 0.01, NOISE, "let go");
     let subject = subject(PENDULUM, &[23.3, 0.24, -1.0, 0.0], 2, vec![record]);
-    let names = ["coulomb-friction", "stiction", "stribeck-friction"];
-    let some: Vec<Arc<dyn Effect>> = effects().into_iter().filter(|e| names.contains(&e.name())).collect();
+    let some = catalogue(&["coulomb-friction", "stiction", "stribeck-friction"]);
     let options = Options { max_effects: 2, level: 0.01, seed: 1 };
     let told = diagnose(&study(&subject), &some, &options, &()).expect("it simulates");
     let found = &told.found[0];

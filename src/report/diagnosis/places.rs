@@ -105,13 +105,13 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     }
     let title = format!("The missing signal {}", words::at(&evidence.place));
     let drawn = evidence.over.iter().any(|(_, _, points)| !points.found.is_empty());
-    let about = if !drawn {
-        Vec::new()
-    } else {
+    let about = if drawn {
         vec![format!(
             "Estimated about the repaired model with {effects} taken away and everything else held; where the formula is the \
              right one, the estimate follows it."
         )]
+    } else {
+        Vec::new()
     };
     Group { title, about, figures }
 }
