@@ -153,9 +153,11 @@ impl Sizes {
     /// The values of a strength that are tried.
     #[allow(clippy::cast_precision_loss)]
     pub fn values(&self, dimension: Dimension, trials: Trials, bounds: [f64; 2]) -> Vec<f64> {
+        let scaled = |multiples: &'static [f64]| multiples.iter().map(|m| m * self.of(dimension));
         let values: Vec<f64> = match trials {
             Trials::Linear => vec![self.of(dimension)],
-            Trials::Scaled(multiples) => multiples.iter().map(|m| m * self.of(dimension)).collect(),
+            Trials::Scaled(multiples) => scaled(multiples).collect(),
+            Trials::PlainAndScaled(values, multiples) => values.iter().copied().chain(scaled(multiples)).collect(),
             Trials::Within(shares) => {
                 shares.iter().map(|s| self.range[0] + s * (self.range[1] - self.range[0])).collect()
             }

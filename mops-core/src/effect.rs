@@ -166,6 +166,8 @@ pub enum Trials {
     Within(&'static [f64]),
     /// These values.
     Plain(&'static [f64]),
+    /// These values, then these multiples of its typical size: periods in a turn, and along a rail.
+    PlainAndScaled(&'static [f64], &'static [f64]),
     /// Frequencies in rad/s that the record can resolve, from one period in the record on.
     Frequencies,
     /// Sizes of steps: the largest value over numbers of steps from one on, so close together that about every eighth sample of a

@@ -1,5 +1,5 @@
-//! Shapes that no fit moves: the value that the screening likes best need not be the right one, and the data may allow
-//! several.
+//! Shapes: of those that no fit moves the value that the screening likes best need not be the right one, and the data may
+//! allow several; a wave along a rail need not be a whole number.
 
 use crate::diagnosis::StrengthValue;
 use crate::testing::{Record, catalogue, integrated, study, subject};
@@ -41,4 +41,30 @@ fn where_the_data_allow_several_the_intervals_span_them() {
     assert_eq!(found[2].interval95.map(|[low, _]| low < 293.15), Some(true), "{found:?}");
     let [low, high] = found[0].interval95.expect("it is told");
     assert!(low < RADIATED && RADIATED < high, "{found:?}");
+}
+
+#[test]
+fn a_rail_is_worn_at_distances_of_its_own() {
+    const SLEDGE: &str = r#"
+        states     = { x = "m", v = "m/s" }
+        parameters = { k = "1/s^2", d = "1/s" }
+        der        = { x = "v", v = "v' = -k*x - d*v" }
+    "#;
+    const WAVES: f64 = 11.5;
+    let slid = |start: f64| {
+        let friction = |x: &[f64; 2]| 0.5 * (1.0 + 0.7 * (WAVES * x[0] + 0.4).cos()) * (x[1] / 1e-3).tanh();
+        let rates = |_: f64, x: &[f64; 2]| [x[1], -30.0 * x[0] - 0.2 * x[1] - friction(x)];
+        Record::of_first("x", &integrated(rates, [start, 0.0], 0.01, 300), 0.01, 1e-3, &format!("{start}"))
+    };
+    let mut subject = subject(SLEDGE, &[40.0, 0.4, 0.5, 0.0], 2, vec![slid(0.5), slid(0.4)]);
+    for (measurement, start) in subject.measurements.iter_mut().zip([0.5, 0.4]) {
+        measurement.locals[0].start = start;
+    }
+    let some = catalogue(&["coulomb-friction", "position-dependent-friction"]);
+    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let found = diagnose(&study(&subject), &some, &options, &()).expect("it simulates").found;
+    assert_eq!(found[0].effect, "position-dependent-friction");
+    let waves = &found[0].strengths[2];
+    let [low, high] = waves.interval95.expect("it is told");
+    assert!(waves.name == "n" && low < WAVES && WAVES < high && high - low < 1.0, "{waves:?}");
 }

@@ -16,7 +16,8 @@ struct AtStrengths<S> {
 
 impl Definition for Imbalance {
     const NAME: &'static str = "imbalance";
-    const ABOUT: &'static str = "The weight of a mass off the axis of a turning joint.";
+    const ABOUT: &'static str =
+        "The weight of a mass off the axis of a turning joint, a base that tilts it, or buoyancy.";
     const FORMULA: &'static str = "-a sin(q - phase)";
     const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), chapter 6";
     const CLASS: EffectClass = EffectClass::Gravity;

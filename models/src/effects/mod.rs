@@ -16,6 +16,8 @@ mod cross_talk;
 mod cubic_drag;
 mod cubic_stiffness;
 mod dahl_friction;
+mod damping_drift;
+mod damping_step;
 mod eccentricity;
 mod end_stop;
 mod flexible_mode;
@@ -26,6 +28,8 @@ mod input_bias;
 mod input_dead_zone;
 mod input_delay;
 mod input_gain;
+mod input_gain_drift;
+mod input_gain_step;
 mod input_quantisation;
 mod input_rate_limit;
 mod input_saturation;
@@ -229,6 +233,10 @@ pub fn effects() -> Vec<Arc<dyn Effect>> {
         effect::<lugre_friction::LugreFriction>(),
         effect::<tabulated_friction::TabulatedFriction>(),
         effect::<torsional_hysteresis::TorsionalHysteresis>(),
+        effect::<damping_drift::DampingDrift>(),
+        effect::<damping_step::DampingStep>(),
+        effect::<input_gain_drift::InputGainDrift>(),
+        effect::<input_gain_step::InputGainStep>(),
         effect::<input_quantisation::InputQuantisation>(),
         effect::<sensor_quantisation::SensorQuantisation>(),
     ]

@@ -18,7 +18,8 @@ struct AtStrengths<S> {
 
 impl Definition for PositionDependentFriction {
     const NAME: &'static str = "position-dependent-friction";
-    const ABOUT: &'static str = "Dry friction that grows and falls over a turn, as with a bent shaft.";
+    const ABOUT: &'static str =
+        "Dry friction that grows and falls along the position, as with a bent shaft or a rail worn in places.";
     const FORMULA: &'static str = "-c (1 + a cos(n q + phase)) sgn(v); at rest whatever holds it, up to that";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
@@ -30,12 +31,11 @@ impl Definition for PositionDependentFriction {
         Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
         Strength::shape(
             "n",
-            "periods in a turn",
+            "wave number: rad over the period, periods in a turn",
             Dimension::ONE.over(Dimension::POSITION),
             NOT_NEGATIVE,
-            Trials::Plain(&[1.0, 2.0, 3.0, 4.0, 6.0]),
-        )
-        .kept(),
+            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.0, 3.5, 5.0, 7.0, 9.5, 13.0]),
+        ),
         phase(),
     ];
 

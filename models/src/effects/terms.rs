@@ -57,3 +57,15 @@ pub(super) fn above<S: Scalar>(x: S) -> S {
 pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
 }
+
+/// From 0 at `from` to 1 a `length` later, along half a period of a cosine.
+pub(super) fn risen<S: Scalar>(t: f64, from: S, length: S) -> S {
+    let since = -from + t;
+    if since.value() <= 0.0 {
+        S::from(0.0)
+    } else if since.value() >= length.value() {
+        S::from(1.0)
+    } else {
+        (-(since / length * PI).cos() + 1.0) * 0.5
+    }
+}

@@ -112,13 +112,18 @@ fn first_trials_are_few_and_allowed() {
     for effect in effects() {
         let mut count = 1;
         for of in effect.strengths() {
+            let allowed = |values: &[f64]| values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]);
             match of.trials {
                 Trials::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
                 Trials::Plain(values) => {
-                    assert!(values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]), "{}", effect.name());
+                    assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
                 }
                 Trials::Scaled(values) | Trials::Within(values) => count *= values.len(),
+                Trials::PlainAndScaled(values, multiples) => {
+                    assert!(allowed(values), "{}", effect.name());
+                    count *= values.len() + multiples.len();
+                }
                 Trials::Frequencies | Trials::Steps | Trials::Moments(_) => {}
             }
         }

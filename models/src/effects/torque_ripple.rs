@@ -17,7 +17,8 @@ struct AtStrengths<S> {
 
 impl Definition for TorqueRipple {
     const NAME: &'static str = "torque-ripple";
-    const ABOUT: &'static str = "The command acts stronger and weaker over a turn of a joint.";
+    const ABOUT: &'static str =
+        "The command acts stronger and weaker along the position of a joint, as over a turn of a motor.";
     const FORMULA: &'static str = "u (1 + a sin(n q + phase)), q the position of the companion joint";
     const SOURCE: &'static str =
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
@@ -28,12 +29,11 @@ impl Definition for TorqueRipple {
         Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
         Strength::shape(
             "n",
-            "periods in a turn",
+            "wave number: rad over the period, periods in a turn",
             Dimension::ONE.over(Dimension::POSITION),
             NOT_NEGATIVE,
-            Trials::Plain(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]),
-        )
-        .kept(),
+            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0], &[3.5, 6.0, 9.0, 13.0, 18.0]),
+        ),
         phase(),
     ];
 

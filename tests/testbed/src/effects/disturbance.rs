@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effect, Family, any_place};
+use super::{Effect, Family, Scene, any_joint, any_place, real_actuator};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
 
@@ -12,6 +12,17 @@ fn masses(plant: &Plant) -> Vec<Spot> {
 
 fn athermal(plant: &Plant) -> Vec<Spot> {
     if plant.traits.thermal { Vec::new() } else { any_place(plant) }
+}
+
+/// Where the step of a parameter is drawn, in the calibration experiment only: a share of it that is 0 before, 1 after.
+fn step(s: &Scene<'_>) -> (f64, f64, impl Fn(&At<'_>) -> f64 + Send + Sync + Copy + 'static) {
+    let end = s.setup.duration();
+    let (from, long) = (end * s.between(0.2, 0.7), end * s.between(0.01, 0.1));
+    let share = move |at: &At<'_>| {
+        let c = ((at.t - from) / long).clamp(0.0, 1.0);
+        if at.experiment == 0 { c * c * (3.0 - 2.0 * c) } else { 0.0 }
+    };
+    (from, long, share)
 }
 
 pub const ALL: &[Effect] = &[
@@ -78,6 +89,50 @@ pub const ALL: &[Effect] = &[
                     ..Law::default()
                 };
                 (law, vec![("rate", rate)])
+            })
+        },
+    },
+    Effect {
+        name: "damping-drift",
+        fits: any_joint,
+        build: |s| {
+            // Where it falls, the base model has damping to lose: it grows here.
+            Family::up_to(2.0 * s.force / s.speed / s.setup.duration(), |r| {
+                (Law { force: Some(Box::new(move |at| -r * at.t * at.v)), ..Law::default() }, vec![("rate", r)])
+            })
+        },
+    },
+    Effect {
+        name: "input-gain-drift",
+        fits: real_actuator,
+        build: |s| {
+            let sign = s.sign();
+            Family::up_to(0.8 / s.setup.duration(), move |r| {
+                let law = Law { actuate: Some(Box::new(move |at, u| u * (1.0 + sign * r * at.t))), ..Law::default() };
+                (law, vec![("rate", sign * r)])
+            })
+        },
+    },
+    Effect {
+        name: "damping-step",
+        fits: any_joint,
+        build: |s| {
+            let (from, length, share) = step(s);
+            Family::up_to(2.0 * s.force / s.speed, move |d| {
+                let law = Law { force: Some(Box::new(move |at| -d * share(at) * at.v)), ..Law::default() };
+                (law, vec![("damping", d), ("from", from), ("length", length)])
+            })
+        },
+    },
+    Effect {
+        name: "input-gain-step",
+        fits: real_actuator,
+        build: |s| {
+            let (sign, (from, length, share)) = (s.sign(), step(s));
+            Family::up_to(0.9, move |g| {
+                let law =
+                    Law { actuate: Some(Box::new(move |at, u| u * (1.0 + sign * g * share(at)))), ..Law::default() };
+                (law, vec![("gain", sign * g), ("from", from), ("length", length)])
             })
         },
     },

@@ -1,0 +1,38 @@
+//! Friction in proportion to the speed that changes with time.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `damping-drift`.
+pub struct DampingDrift;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    r: S,
+}
+
+impl Definition for DampingDrift {
+    const NAME: &'static str = "damping-drift";
+    const ABOUT: &'static str = "Viscous friction that grows or falls steadily, as in a bearing that warms up.";
+    const FORMULA: &'static str = "-r t v";
+    const SOURCE: &'static str =
+        "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
+    const CLASS: EffectClass = EffectClass::TimeVarying;
+    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+        "r",
+        "force per speed, gained per time",
+        Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::TIME),
+    )];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { r: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        -self.r * at.v * at.t
+    }
+}

@@ -1,0 +1,35 @@
+//! A factor on an input that changes with time.
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+
+use super::Definition;
+
+/// `input-gain-drift`.
+pub struct InputGainDrift;
+
+/// At given strengths.
+struct AtStrengths<S> {
+    r: S,
+}
+
+impl Definition for InputGainDrift {
+    const NAME: &'static str = "input-gain-drift";
+    const ABOUT: &'static str = "The command acts steadily stronger or weaker, as with a battery that runs down.";
+    const FORMULA: &'static str = "u (1 + r t)";
+    const SOURCE: &'static str =
+        "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
+    const CLASS: EffectClass = EffectClass::TimeVarying;
+    const PORTS: &'static [PortKind] = &[PortKind::Actuator];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::signed("r", "share gained per time", Dimension::ONE.over(Dimension::TIME))];
+
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+        Box::new(AtStrengths { r: s[0] })
+    }
+}
+
+impl<S: Scalar> Acting<S> for AtStrengths<S> {
+    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+        at.value * (self.r * at.t + 1.0)
+    }
+}
