@@ -1,6 +1,7 @@
 //! The judgement: whether what was found explains the data, and a table where nothing does.
 
 use mops_core::Role;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::diagnose::UNEXPLAINED;
 use crate::diagnosis::{Unexplained, Verdict};
@@ -13,9 +14,8 @@ use crate::search::{Search, Trial};
 use crate::stopgap::stopgap;
 use crate::subject::Subject;
 
-/// How many times the number of unknowns the sum of squares over calibration data may rise where all data are fitted: were
-/// the model right, it would rise by about that number.
-const CONTRADICTED: f64 = 4.0;
+/// Probability, were the model right, of what counts as calibration data that contradict all data together.
+const CONTRADICTED: f64 = 1e-4;
 
 /// Share by which a free signal must lower the error on samples left out to count as something that is missing.
 const FORETOLD: f64 = 0.1;
@@ -56,7 +56,7 @@ pub fn judge<'a>(
     // little they determine.
     let mistaken = !last.added.is_empty()
         && forecast(&after, search.subject) > MISTAKEN
-        && contradiction(&last, &after) > CONTRADICTED * after.covariance.nrows() as f64;
+        && contradicts(contradiction(&last, &after), after.covariance.nrows());
     let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
@@ -101,6 +101,16 @@ fn contradiction(last: &Trial<'_>, after: &Calibrated) -> f64 {
     (together - after.chi2) / after.square
 }
 
+/// Whether a rise of the sum of squares over calibration data is more than the unknowns of a right model make it: at most a
+/// chi-squared variable, of as many degrees of freedom as there are unknowns.
+///
+/// Source: S. S. Wilks, The large-sample distribution of the likelihood ratio for testing composite hypotheses, Annals of
+/// Mathematical Statistics 9 (1938) 60.
+#[allow(clippy::cast_precision_loss)]
+fn contradicts(rise: f64, unknowns: usize) -> bool {
+    ChiSquared::new(unknowns as f64).is_ok_and(|chance| chance.sf(rise) < CONTRADICTED)
+}
+
 /// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out; and
 /// that in words.
 fn left(last: &Trial<'_>) -> (f64, Option<String>) {
@@ -121,4 +131,17 @@ fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
     let errors = after.errors(&subject.measurements);
     let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contradicts;
+
+    #[test]
+    fn calibration_data_contradict_where_one_right_model_in_ten_thousand_would_do_as_badly() {
+        // Quantiles at 0.9999 of tables of the chi-squared distribution.
+        for (unknowns, quantile) in [(1, 15.137), (2, 18.421), (10, 35.564)] {
+            assert!(contradicts(quantile + 0.01, unknowns) && !contradicts(quantile - 0.01, unknowns), "{unknowns}");
+        }
+    }
 }

@@ -63,6 +63,8 @@ pub(crate) struct Row {
     pub answer: Result<Answer, String>,
     /// How that stands beside the truth.
     pub judgement: Judgement,
+    /// Whether each further diagnosis, with another order of the catalogue and another seed, says the same.
+    pub agreeing: Vec<bool>,
 }
 
 /// Judges an answer.
@@ -136,6 +138,7 @@ impl Row {
             truth: truth.collect(),
             judgement: answer.as_ref().map_or(nothing, |answer| judge(&trial.truth, answer)),
             answer,
+            agreeing: Vec::new(),
         }
     }
 }

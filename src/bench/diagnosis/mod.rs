@@ -9,7 +9,9 @@ mod statistics;
 mod table;
 mod tool;
 
+use mops_core::{Catalogue, stream};
 use mops_testbed::Trial;
+use rand::seq::SliceRandom;
 
 use super::each;
 pub(crate) use folder::{Cases, Reply};
@@ -32,26 +34,50 @@ pub(crate) struct Results {
     pub unmade: usize,
 }
 
+/// What is asked beside the diagnosis of every case.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Beside {
+    /// What brute force says.
+    pub brute_force: bool,
+    /// Further diagnoses, each with another order of the catalogue and another seed.
+    pub orders: u64,
+}
+
 /// Runs a plan on so many threads.
-pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, against: bool) -> Results {
+pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, beside: Beside) -> Results {
     let done = each(&plan.wishes(), jobs, tools.watch, |wish| {
         let trial = plan.make(wish);
-        Some(trial.map(|trial| answered(plan, wish, &trial, tools, against)))
+        Some(trial.map(|trial| answered(plan, wish, &trial, tools, beside)))
     });
     let unmade = done.iter().filter(|case| case.is_none()).count();
     let (rows, brute): (Vec<Row>, Vec<Option<Row>>) = done.into_iter().flatten().unzip();
     Results { rows, brute: brute.into_iter().flatten().collect(), unmade }
 }
 
-fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, against: bool) -> (Row, Option<Row>) {
+fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: Beside) -> (Row, Option<Row>) {
     let size = if wish.kind == Kind::Nothing { 0.0 } else { plan.nearest(trial.truth.size) };
     let row = |answer| Row::new(trial, wish.kind, size, answer);
-    let study = match tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files)) {
-        Ok(study) => study,
-        Err(why) => return (row(Err(why)), None),
+    let read = |tools: Tools<'_>| tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files));
+    let answer = |tools: Tools<'_>| {
+        let guarded = std::panic::AssertUnwindSafe(|| tools.diagnose(read(tools)?));
+        let diagnosed = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
+        diagnosed.map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
     };
-    let brute = against.then(|| row(tools.brute_force(&study)));
-    let guarded = std::panic::AssertUnwindSafe(|| tools.diagnose(study));
-    let answer = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
-    (row(answer.map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))), brute)
+    let brute = beside.brute_force.then(|| row(read(tools).and_then(|study| tools.brute_force(&study))));
+    let mut row = row(answer(tools));
+    row.agreeing = (1..=beside.orders)
+        .map(|order| {
+            let catalogue = shuffled(tools.catalogue, order);
+            let again = answer(Tools { catalogue: &catalogue, seed: tools.seed + order, ..tools });
+            matches!((&row.answer, &again), (Ok(first), Ok(again)) if first.agrees(again))
+        })
+        .collect();
+    (row, brute)
+}
+
+/// The catalogue with its effects in another order.
+fn shuffled(catalogue: &Catalogue, order: u64) -> Catalogue {
+    let mut catalogue = catalogue.clone();
+    catalogue.effects.shuffle(&mut stream(order, "order of the catalogue"));
+    catalogue
 }

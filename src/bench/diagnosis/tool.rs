@@ -134,6 +134,16 @@ impl Answer {
         }
     }
 
+    /// Whether another answer has the same verdict and the same effects at the same places, in any order.
+    pub fn agrees(&self, other: &Self) -> bool {
+        let named = |answer: &Self| {
+            let mut all: Vec<Named> = answer.found.iter().map(|(named, _)| named.clone()).collect();
+            all.sort();
+            all
+        };
+        self.verdict == other.verdict && named(self) == named(other)
+    }
+
     /// The effect named first; none where the verdict is another.
     pub fn first(&self) -> Option<&Named> {
         self.found.first().map(|(named, _)| named).filter(|_| self.verdict == Verdict::Effect)
@@ -146,5 +156,21 @@ pub(crate) fn spelt(verdict: Verdict) -> &'static str {
         Verdict::Effect => "effect",
         Verdict::None => "none",
         Verdict::Unexplained => "unexplained",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Answer;
+    use crate::diagnosis::made_up;
+
+    #[test]
+    fn answers_agree_on_verdict_and_effects_whatever_their_order() {
+        let mut both = Answer::of(&made_up::coulomb(), 2.0);
+        both.found.push((("sensor-bias".to_owned(), "sensor:y".to_owned()), 1.0));
+        let mut other = both.clone();
+        other.found.reverse();
+        assert!(both.agrees(&other) && !both.agrees(&Answer::of(&made_up::coulomb(), 2.0)));
+        assert!(!Answer::of(&made_up::nothing(), 1.0).agrees(&both));
     }
 }

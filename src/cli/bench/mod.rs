@@ -12,7 +12,7 @@ use mops_core::{Catalogue, Diagnostic, suggestion};
 
 use super::progress::Progress;
 use super::{Trouble, cannot_write, print};
-use crate::bench::diagnosis::{self, Kind, Plan, Tools};
+use crate::bench::diagnosis::{self, Beside, Kind, Plan, Tools};
 
 /// What can be said to a benchmark.
 #[derive(Args)]
@@ -68,6 +68,9 @@ struct Diagnosis {
     /// Put another tool beside the diagnosis.
     #[arg(long, value_name = "TOOL")]
     against: Option<Rival>,
+    /// Diagnose every case so many times more, with other orders of the catalogue and other seeds, and count what agrees.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "folder")]
+    orders: u64,
     /// Diagnose the cases of a folder instead: a folder each, with case.json and data.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
@@ -105,7 +108,8 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let plan = plan(arguments)?;
     let progress = Progress::of_cases(!arguments.quiet);
     let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
-    let results = diagnosis::run(&plan, tools, jobs, against);
+    let beside = Beside { brute_force: against, orders: arguments.orders };
+    let results = diagnosis::run(&plan, tools, jobs, beside);
     progress.finish();
     let text = tables::all(&results);
     print(&text);

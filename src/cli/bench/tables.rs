@@ -133,6 +133,12 @@ fn summary(results: &Results) -> String {
         if rate.of == 0 { String::new() } else { percent(rate) }
     };
     lines.push(line("all: decisions right", &decided));
+    let again = Rate::of(results.rows.iter().flat_map(|row| row.agreeing.iter().copied()));
+    if again.of > 0 {
+        let mut cells = vec!["other orders of the catalogue and seeds: the same findings".to_owned(), percent(again)];
+        cells.extend(against.then(String::new));
+        lines.push(cells);
+    }
     lines.push(line("seconds per case on one thread", &|rows| spread(rows, |answer| answer.0, 2)));
     lines.push(line("simulations per case", &|rows| spread(rows, |answer| answer.1, 0)));
     let mut header = vec!["", "diagnosis"];
@@ -248,15 +254,17 @@ mod tests {
         };
         let truth = vec![("coulomb-friction".to_owned(), "joint:phi".to_owned())];
         let (size, truth) = if kind == Kind::One { (5.0, truth) } else { (0.0, Vec::new()) };
-        Row { name: "case".into(), plant: "servo".into(), kind, size, truth, answer, judgement }
+        Row { name: "case".into(), plant: "servo".into(), kind, size, truth, answer, judgement, agreeing: Vec::new() }
     }
 
     #[test]
     fn the_tables_give_rates_per_effect_false_alarms_and_what_failed() {
         let coulomb = || Ok(Answer::of(&made_up::coulomb(), 2.0));
         let nothing = || Ok(Answer::of(&made_up::nothing(), 1.0));
+        let mut steady = row(Kind::One, true, coulomb());
+        steady.agreeing = vec![true, true, true, false];
         let rows = vec![
-            row(Kind::One, true, coulomb()),
+            steady,
             row(Kind::One, false, coulomb()),
             row(Kind::Nothing, true, nothing()),
             row(Kind::Nothing, false, coulomb()),
@@ -268,6 +276,7 @@ mod tests {
         let cells: Vec<&str> = line("coulomb-friction").split_whitespace().collect();
         assert_eq!(cells[1..], ["1/3", "1/3", "3/3", "3.0", "1/3", "1/3"]);
         assert!(line("nothing missing").contains("50 % (1 to 99) of 2"), "{}", line("nothing missing"));
+        assert!(line("other orders").contains("75 %") && line("other orders").ends_with("of 4"));
         assert!(text.contains("1 cases asked for cannot be made") && text.contains("case failed: it diverges"));
         assert!(text.contains("probabilities of verdicts: Brier score") && text.contains("distance from uniform"));
     }
