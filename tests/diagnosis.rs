@@ -2,7 +2,7 @@
 
 use mops::discrepancy::{Diagnosis, Verdict};
 use mops::file::Files;
-use mops::{Options, catalogue};
+use mops::{Catalogue, Options, catalogue};
 use mops_testbed::{Missing, Trial, generate};
 
 /// The data files of a case.
@@ -31,9 +31,14 @@ fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
         catalogue.effects.reverse();
         catalogue.effects.rotate_left(17);
     }
+    diagnosis_among(case, catalogue, if shuffled { 4711 } else { 1 })
+}
+
+/// What mops says of a case with a catalogue and a seed.
+fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
     let file = mops::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
     let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
-    study.seed = if shuffled { 4711 } else { 1 };
+    study.seed = seed;
     let options = Options { effects: catalogue.effects, ..Options::default() };
     let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
     solved.diagnosis.expect("that was the task")
@@ -71,6 +76,19 @@ fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
     let missing = Missing::Effects(&["coulomb-friction"]);
     let case = generate("pendulum", missing, 20.0, 403_726_925_825).expect("it can be made");
     let diagnosis = diagnosis(&case, false);
+    assert_eq!(found(&diagnosis), [("coulomb-friction", "joint:th")]);
+    assert!(diagnosis.after.iter().all(|error| error.normalised < 1.1), "{:?}", diagnosis.after);
+}
+
+#[test]
+fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
+    // In windows the base leaves 10 times the noise; from nothing the fit ended at a quarter of the friction, with 9 left.
+    let missing = Missing::Effects(&["coulomb-friction"]);
+    let case = generate("furuta-free", missing, 20.0, 519_691_042_816).expect("it can be made");
+    let mut few = catalogue();
+    few.effects.retain(|effect| effect.name() == "coulomb-friction");
+    let diagnosis = diagnosis_among(&case, few, 1);
+    assert_eq!(diagnosis.steps.len(), 1, "{:?}", diagnosis.steps);
     assert_eq!(found(&diagnosis), [("coulomb-friction", "joint:th")]);
     assert!(diagnosis.after.iter().all(|error| error.normalised < 1.1), "{:?}", diagnosis.after);
 }

@@ -125,7 +125,8 @@ impl<'a> Search<'a> {
             let simpler = trials[finalists.len()..].iter().filter(is_simpler);
             let near = nearness(trials.first());
             let worth: Vec<&Trial<'a>> = finalists.iter().filter(|t| near(t)).chain(simpler).collect();
-            let wholes: Vec<Trial<'a>> = worth.par_iter().filter_map(|t| self.over_whole(t)).collect();
+            let wholes = worth.par_iter().filter_map(|t| self.over_whole(&self.begun_again(from, t)));
+            let wholes: Vec<Trial<'a>> = wholes.collect();
             if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
                 trials = wholes;
                 best_first(&mut trials);
@@ -135,6 +136,22 @@ impl<'a> Search<'a> {
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
         Some(Round { screened, trials, directions, independent, from: from.clone(), known })
+    }
+
+    /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began
+    /// with, as strong as it was found and twice as strong: where a step changes much, a fit from nothing may have stuck.
+    fn begun_again(&self, from: &Trial<'a>, trial: &Trial<'a>) -> Trial<'a> {
+        let enough = |trial: &Trial<'a>| trial.fitted.normalised() <= UNEXPLAINED;
+        let mut best = trial.clone();
+        for multiple in [1.0, 2.0] {
+            let mut added = trial.added.clone();
+            let Some(newest) = added.last_mut().filter(|_| !enough(&best)) else { break };
+            let [low, high] = newest.candidate.effect.strengths()[0].bounds;
+            newest.strengths[0] = (multiple * newest.strengths[0]).clamp(low, high);
+            let again = self.from(from, &added, 40);
+            best = again.filter(|again| again.fitted.chi2 < best.fitted.chi2).unwrap_or(best);
+        }
+        best
     }
 
     /// Where the best explains the data, fits what is simpler once more, from where that ended: records with stops have minima
