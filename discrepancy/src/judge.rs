@@ -22,7 +22,7 @@ const FORETOLD: f64 = 0.1;
 
 /// Error of forecasts of selection data, in units of the noise, above which a model is mistaken; its parameters come from
 /// calibration data, and are uncertain.
-const MISTAKEN: f64 = 1.5;
+const MISTAKEN: f64 = 1.2;
 
 /// What is concluded of a model that grew.
 pub struct Judgement<'a> {
