@@ -334,6 +334,37 @@ fn friction_of_a_loaded_gear_grows_with_the_input() {
     close(&found, &[3.0], 1e-9);
 }
 
+/// Time integral of half a period of a cosine that takes `length` to rise from 0 at `from` to 1.
+fn risen_so_far(t: f64, from: f64, length: f64) -> f64 {
+    let since = (t - from).max(0.0);
+    let rising = since.min(length);
+    0.5 * (rising - length / PI * (PI * rising / length).sin()) + (since - rising)
+}
+
+#[test]
+fn a_block_whose_friction_changes_with_time_slows_down_by_its_integral() {
+    let (times, from, length) = ([0.5, 1.4, 2.2, 4.0], 1.0, 0.8);
+    // m = 2, v0 = 3: v = v0 exp(-(integral of the factor)/m).
+    let drift = with(BLOCK, "damping-drift", "joint:x", None);
+    let found = values(&drift, &[2.0, 0.0, 3.0, 0.4], NOTHING, "v", &times);
+    close(&found, &times.map(|t| 3.0 * (-0.4 * t * t / 4.0).exp()), 1e-6);
+    let step = with(BLOCK, "damping-step", "joint:x", None);
+    let found = values(&step, &[2.0, 0.0, 3.0, 0.9, from, length], NOTHING, "v", &times);
+    close(&found, &times.map(|t| 3.0 * (-0.45 * risen_so_far(t, from, length)).exp()), 1e-6);
+}
+
+#[test]
+fn a_command_whose_gain_changes_with_time_pushes_by_its_integral() {
+    let (times, from, length) = ([0.5, 1.4, 2.2, 4.0], 1.0, 0.8);
+    // m = 2, u = 3: v = u/m (t + integral of the share gained).
+    let drift = with(BLOCK, "input-gain-drift", "actuator:u", None);
+    let found = values(&drift, &[2.0, 0.0, 0.0, -0.1], Input::Constant(3.0), "v", &times);
+    close(&found, &times.map(|t| 1.5 * (t - 0.05 * t * t)), 1e-6);
+    let step = with(BLOCK, "input-gain-step", "actuator:u", None);
+    let found = values(&step, &[2.0, 0.0, 0.0, -0.6, from, length], Input::Constant(3.0), "v", &times);
+    close(&found, &times.map(|t| 1.5 * (t - 0.6 * risen_so_far(t, from, length))), 1e-6);
+}
+
 #[test]
 fn a_vibration_shakes_a_block_by_its_integrals() {
     let model = with(BLOCK, "periodic-disturbance", "joint:x", None);
