@@ -178,12 +178,13 @@ impl Fit<'_> {
         Some(self.descend(from.point.clone(), normal, iterations, self.globals.len()))
     }
 
+    /// The normal equations at a solution, computed once.
     pub(crate) fn normal_at(&self, fitted: &Fitted) -> Option<Arc<Normal>> {
-        if fitted.normal.get().is_none() {
-            let normal = Arc::new(self.normal(&fitted.point)?);
-            return Some(Arc::clone(fitted.normal.get_or_init(|| normal)));
+        if let Some(known) = fitted.normal.get() {
+            return Some(Arc::clone(known));
         }
-        fitted.normal.get().cloned()
+        let normal = Arc::new(self.normal(&fitted.point)?);
+        Some(Arc::clone(fitted.normal.get_or_init(|| normal)))
     }
 
     /// Where the fit is a short one, sizes of steps before the global `first` stay as they are.

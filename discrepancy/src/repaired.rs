@@ -116,6 +116,11 @@ fn prognosis(fit: &Fit<'_>, point: &Point, piece: usize, measurement: &Measureme
 }
 
 impl Calibrated {
+    /// Number of unknowns that were fitted; tuners that were held have no variance.
+    pub fn unknowns(&self) -> usize {
+        self.covariance.diagonal().iter().filter(|&&variance| variance > 0.0).count()
+    }
+
     /// Its errors on every experiment.
     #[allow(clippy::cast_precision_loss)]
     pub fn errors(&self, measurements: &[Measurement]) -> Vec<ExperimentError> {

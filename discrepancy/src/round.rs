@@ -121,16 +121,20 @@ impl<'a> Search<'a> {
         if from.windows > 1 {
             // Windows forgive what whole records do not: these decide, where they can be fitted.
             let finalists = &trials[..trials.len().min(self.limits.finalists)];
-            let is_simpler = |t: &&Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
-            let simpler = trials[finalists.len()..].iter().filter(is_simpler);
+            let is_simpler = |t: &Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
             let near = nearness(trials.first());
-            let worth: Vec<&Trial<'a>> = finalists.iter().filter(|t| near(t)).chain(simpler).collect();
-            let wholes = worth.par_iter().filter_map(|t| self.over_whole(&self.begun_again(from, t)));
-            let wholes: Vec<Trial<'a>> = wholes.collect();
-            if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
-                trials = wholes;
-                best_first(&mut trials);
-            }
+            let is_worth = |(rank, t)| if rank < finalists.len() { near(t) } else { is_simpler(t) };
+            let worth: Vec<bool> = trials.iter().enumerate().map(is_worth).collect();
+            let (chosen, rest): (Vec<_>, Vec<_>) = trials.into_iter().zip(worth).partition(|(_, worth)| *worth);
+            let again = chosen.into_par_iter().map(|(trial, _)| self.begun_again(from, trial));
+            let chosen: Vec<Trial<'a>> = again.collect();
+            let wholes: Vec<Trial<'a>> = chosen.par_iter().filter_map(|t| self.over_whole(t)).collect();
+            trials = if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
+                wholes
+            } else {
+                chosen.into_iter().chain(rest.into_iter().map(|(trial, _)| trial)).collect()
+            };
+            best_first(&mut trials);
         }
         self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
@@ -140,15 +144,21 @@ impl<'a> Search<'a> {
 
     /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began
     /// with, as strong as it was found and twice as strong: where a step changes much, a fit from nothing may have stuck.
-    fn begun_again(&self, from: &Trial<'a>, trial: &Trial<'a>) -> Trial<'a> {
-        let enough = |trial: &Trial<'a>| trial.fitted.normalised() <= UNEXPLAINED;
-        let mut best = trial.clone();
-        for multiple in [1.0, 2.0] {
-            let mut added = trial.added.clone();
-            let Some(newest) = added.last_mut().filter(|_| !enough(&best)) else { break };
-            let [low, high] = newest.candidate.effect.strengths()[0].bounds;
-            newest.strengths[0] = (multiple * newest.strengths[0]).clamp(low, high);
-            let again = self.from(from, &added, 40);
+    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>) -> Trial<'a> {
+        const TIMES_AS_STRONG: [f64; 2] = [1.0, 2.0];
+        const ITERATIONS: usize = 40;
+        let mut best = trial;
+        let Some(stuck) = best.added.last().cloned() else { return best };
+        let first = &stuck.candidate.effect.strengths()[0];
+        for times in TIMES_AS_STRONG {
+            if best.fitted.normalised() <= UNEXPLAINED || first.neutral == Some(stuck.strengths[0]) {
+                break;
+            }
+            let mut newest = stuck.clone();
+            // A limit is the stronger the lower it is.
+            let strength = stuck.strengths[0] * if first.neutral == Some(0.0) { times } else { 1.0 / times };
+            newest.strengths[0] = strength.clamp(first.bounds[0], first.bounds[1]);
+            let again = self.from(from, &[from.added.as_slice(), &[newest]].concat(), ITERATIONS);
             best = again.filter(|again| again.fitted.chi2 < best.fitted.chi2).unwrap_or(best);
         }
         best

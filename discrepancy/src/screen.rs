@@ -3,7 +3,7 @@
 //! A score (Lagrange multiplier) test: source: C. R. Rao, Linear Statistical Inference and its Applications, 2nd edition
 //! (1973), section 6e.3.
 
-use mops_core::{Scope, Strength, Trials};
+use mops_core::{Port, Scope, Strength, Trials};
 use mops_models::WithEffects;
 use rayon::prelude::*;
 
@@ -161,9 +161,7 @@ pub fn screen(
     let looked: Vec<(Option<Screened>, Vec<f64>)> = candidates
         .par_iter()
         .filter_map(|candidate| {
-            let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
-            let of_place = if steps { sizes_with_steps } else { sizes };
-            let sizes = of_place(&candidate.port, model, &fit.pieces, &scene.trajectories)?;
+            let sizes = sizes_for(candidate, model, &fit.pieces, &scene.trajectories)?;
             best_of(candidate, &sizes, fit, model, scene, &draws)
         })
         .collect();
@@ -174,6 +172,25 @@ pub fn screen(
     let mut screened: Vec<Screened> = looked.into_iter().filter_map(|(screened, _)| screened).collect();
     screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Screening { screened, by_chance }
+}
+
+/// Typical sizes for a candidate: at its port; of a joint that is the companion of an actuator or sensor the position and speed.
+fn sizes_for(
+    candidate: &Candidate,
+    model: &WithEffects,
+    pieces: &[Piece],
+    trajectories: &[Trajectory],
+) -> Option<Sizes> {
+    let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
+    let of_place = if steps { sizes_with_steps } else { sizes };
+    let own = of_place(&candidate.port, model, pieces, trajectories)?;
+    match (&candidate.port, &candidate.companion) {
+        (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {
+            let Sizes { position, speed, .. } = sizes(joint, model, pieces, trajectories)?;
+            Some(Sizes { position, speed, ..own })
+        }
+        _ => Some(own),
+    }
 }
 
 /// Strengths with their trace in a piece.

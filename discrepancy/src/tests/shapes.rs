@@ -1,6 +1,10 @@
 //! Shapes: of those that no fit moves the value that the screening likes best need not be the right one, and the data may
 //! allow several; a wave along a rail need not be a whole number.
 
+use std::f64::consts::TAU;
+
+use mops_core::Input;
+
 use crate::diagnosis::StrengthValue;
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
@@ -67,4 +71,31 @@ fn a_rail_is_worn_at_distances_of_its_own() {
     let waves = &found[0].strengths[2];
     let [low, high] = waves.interval95.expect("it is told");
     assert!(waves.name == "n" && low < WAVES && WAVES < high && high - low < 1.0, "{waves:?}");
+}
+
+#[test]
+fn waves_of_a_linear_motor_are_looked_for_along_its_rail_whatever_the_unit_of_the_command() {
+    const MOTOR: &str = r#"
+        states     = { x = "m", v = "m/s" }
+        inputs     = { u = "mV" }
+        parameters = { k = "m/s^2", d = "1/s" }
+        der        = { x = "v", v = "v' = 1e-3*k*u - 40*x - d*v" }
+    "#;
+    const WAVES: f64 = 60.0;
+    let driven = |frequency: f64| {
+        let command = move |t: f64| 5.0 * (TAU * frequency * t).sin();
+        let ripple = |x: &[f64; 2]| 1.0 + 0.2 * (WAVES * x[0] + 0.7).sin();
+        let rates = |t: f64, x: &[f64; 2]| [x[1], 0.6 * command(t) * ripple(x) - 40.0 * x[0] - 2.0 * x[1]];
+        let mut record =
+            Record::of_first("x", &integrated(rates, [0.0, 0.0], 0.01, 400), 0.01, 1e-4, &frequency.to_string());
+        record.inputs = vec![("u", Input::Sine { amplitude: 5000.0, frequency, phase: 0.0, offset: 0.0 })];
+        record
+    };
+    let subject = subject(MOTOR, &[0.5, 1.5, 0.0, 0.0], 2, vec![driven(0.9), driven(0.5)]);
+    let some = catalogue(&["input-gain", "torque-ripple", "quadratic-input"]);
+    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let found = diagnose(&study(&subject), &some, &options, &()).expect("it simulates").found;
+    assert_eq!(found[0].effect, "torque-ripple");
+    let waves = &found[0].strengths[1];
+    assert!(waves.name == "n" && (waves.value / WAVES - 1.0).abs() < 0.02, "{waves:?}");
 }

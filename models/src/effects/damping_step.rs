@@ -19,7 +19,7 @@ impl Definition for DampingStep {
     const NAME: &'static str = "damping-step";
     const ABOUT: &'static str = "Viscous friction that becomes more or less once, as when something begins to rub.";
     const FORMULA: &'static str =
-        "-d s v with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 1 later";
+        "-d s v with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 later";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;

@@ -20,7 +20,7 @@ impl Definition for InputGainStep {
     const ABOUT: &'static str =
         "The command begins to act stronger or weaker, as when a supply or a valve fails in part.";
     const FORMULA: &'static str =
-        "u (1 + g s) with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 1 later";
+        "u (1 + g s) with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 later";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;

@@ -31,10 +31,10 @@ impl Definition for PositionDependentFriction {
         Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
         Strength::shape(
             "n",
-            "wave number: rad over the period, periods in a turn",
+            "wave number, rad over the period; of an angle the periods in a turn",
             Dimension::ONE.over(Dimension::POSITION),
             NOT_NEGATIVE,
-            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.0, 3.5, 5.0, 7.0, 9.5, 13.0]),
+            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0]),
         ),
         phase(),
     ];

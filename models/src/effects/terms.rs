@@ -58,7 +58,7 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
 }
 
-/// From 0 at `from` to 1 a `length` later, along half a period of a cosine.
+/// `(1 - cos(pi (t - from)/length))/2` from `from` on for a `length`, 0 before, 1 later; all in s.
 pub(super) fn risen<S: Scalar>(t: f64, from: S, length: S) -> S {
     let since = -from + t;
     if since.value() <= 0.0 {

@@ -29,10 +29,10 @@ impl Definition for TorqueRipple {
         Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
         Strength::shape(
             "n",
-            "wave number: rad over the period, periods in a turn",
+            "wave number, rad over the period; of an angle the periods in a turn",
             Dimension::ONE.over(Dimension::POSITION),
             NOT_NEGATIVE,
-            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0], &[3.5, 6.0, 9.0, 13.0, 18.0]),
+            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 11.0, 17.0]),
         ),
         phase(),
     ];

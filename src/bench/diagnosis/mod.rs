@@ -65,13 +65,14 @@ fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: B
     };
     let brute = beside.brute_force.then(|| row(read(tools).and_then(|study| tools.brute_force(&study))));
     let mut row = row(answer(tools));
-    row.agreeing = (1..=beside.orders)
-        .map(|order| {
+    if let Ok(first) = &row.answer {
+        let agreeing = (1..=beside.orders).map(|order| {
             let catalogue = shuffled(tools.catalogue, order);
-            let again = answer(Tools { catalogue: &catalogue, seed: tools.seed + order, ..tools });
-            matches!((&row.answer, &again), (Ok(first), Ok(again)) if first.agrees(again))
-        })
-        .collect();
+            let again = answer(Tools { catalogue: &catalogue, seed: tools.seed.wrapping_add(order), ..tools });
+            again.is_ok_and(|again| first.agrees(&again))
+        });
+        row.agreeing = agreeing.collect();
+    }
     (row, brute)
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
             let (forward, backward) = (of("forward"), of("backward"));
             vec![("c", 0.5 * (forward + backward)), ("skew", (forward - backward) / (forward + backward))]
         }
-        "position-dependent-friction" => vec![("c", of("torque")), ("a", of("depth"))],
+        "position-dependent-friction" => vec![("c", of("torque")), ("a", of("depth")), ("n", of("waves"))],
         "dahl" => vec![("c", of("torque")), ("y", of("torque") / of("stiffness"))],
         "viscous-friction" => vec![("d", of("damping"))],
         "quadratic-drag" | "cubic-damping" => vec![("k", of("drag"))],

@@ -14,15 +14,16 @@ fn athermal(plant: &Plant) -> Vec<Spot> {
     if plant.traits.thermal { Vec::new() } else { any_place(plant) }
 }
 
-/// Where the step of a parameter is drawn, in the calibration experiment only: a share of it that is 0 before, 1 after.
+/// A step of a parameter, in the calibration experiment only: its start and duration, s, and the share of it that acts: 0
+/// before, 1 after.
 fn step(s: &Scene<'_>) -> (f64, f64, impl Fn(&At<'_>) -> f64 + Send + Sync + Copy + 'static) {
     let end = s.setup.duration();
-    let (from, long) = (end * s.between(0.2, 0.7), end * s.between(0.01, 0.1));
+    let (from, length) = (end * s.between(0.2, 0.7), end * s.between(0.01, 0.1));
     let share = move |at: &At<'_>| {
-        let c = ((at.t - from) / long).clamp(0.0, 1.0);
+        let c = ((at.t - from) / length).clamp(0.0, 1.0);
         if at.experiment == 0 { c * c * (3.0 - 2.0 * c) } else { 0.0 }
     };
-    (from, long, share)
+    (from, length, share)
 }
 
 pub const ALL: &[Effect] = &[
@@ -96,7 +97,7 @@ pub const ALL: &[Effect] = &[
         name: "damping-drift",
         fits: any_joint,
         build: |s| {
-            // Where it falls, the base model has damping to lose: it grows here.
+            // It only grows: one that falls could make the damping negative.
             Family::up_to(2.0 * s.force / s.speed / s.setup.duration(), |r| {
                 (Law { force: Some(Box::new(move |at| -r * at.t * at.v)), ..Law::default() }, vec![("rate", r)])
             })
@@ -107,7 +108,8 @@ pub const ALL: &[Effect] = &[
         fits: real_actuator,
         build: |s| {
             let sign = s.sign();
-            Family::up_to(0.8 / s.setup.duration(), move |r| {
+            // Another experiment may be twice as long; no command changes its sign.
+            Family::up_to(0.45 / s.setup.duration(), move |r| {
                 let law = Law { actuate: Some(Box::new(move |at, u| u * (1.0 + sign * r * at.t))), ..Law::default() };
                 (law, vec![("rate", sign * r)])
             })
