@@ -32,7 +32,7 @@ pub struct Options {
 /// Residuals, in units of the noise, above which the best model does not explain the data.
 pub const UNEXPLAINED: f64 = 1.1;
 
-/// How often the verdict `unexplained` is right: 10 of 12 among 154 experiments of the test bed with errors of 20, 5 and 2 times
+/// How often the verdict `unexplained` is right: 10 of 12 among 167 experiments of the test bed with errors of 20, 5 and 2 times
 /// the noise (`mops bench diagnosis`), of which 13 lacked something outside of the catalogue; where it was wrong, one effect of
 /// the catalogue was missing whose shape was not found.
 const TRULY_UNEXPLAINED: f64 = 0.83;

@@ -150,8 +150,11 @@ impl<'a> Search<'a> {
         let mut best = trial;
         let Some(stuck) = best.added.last().cloned() else { return best };
         let first = &stuck.candidate.effect.strengths()[0];
+        if first.neutral == Some(stuck.strengths[0]) {
+            return best;
+        }
         for times in TIMES_AS_STRONG {
-            if best.fitted.normalised() <= UNEXPLAINED || first.neutral == Some(stuck.strengths[0]) {
+            if best.fitted.normalised() <= UNEXPLAINED {
                 break;
             }
             let mut newest = stuck.clone();

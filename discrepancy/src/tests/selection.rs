@@ -41,8 +41,7 @@ fn block(fast: Role, shift: f64) -> Subject {
 }
 
 fn named() -> Vec<Arc<dyn Effect>> {
-    let few = ["viscous-friction", "quadratic-drag", "cubic-drag"];
-    catalogue(&few)
+    catalogue(&["viscous-friction", "quadratic-drag", "cubic-drag"])
 }
 
 fn diagnosis(subject: &Subject) -> Diagnosis {

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, phase};
+use super::terms::{phase, waves};
 
 /// `cogging`.
 pub struct Cogging;
@@ -25,14 +25,7 @@ impl Definition for Cogging {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("a", "amplitude", Dimension::OUTPUT),
-        Strength::shape(
-            "n",
-            "periods in a turn",
-            Dimension::ONE.over(Dimension::POSITION),
-            NOT_NEGATIVE,
-            Trials::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0]),
-        )
-        .kept(),
+        waves(Trials::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0])).kept(),
         phase(),
     ];
 

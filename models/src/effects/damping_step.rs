@@ -1,9 +1,9 @@
 //! Friction in proportion to the speed that changes once.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, risen};
+use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
 
 /// `damping-step`.
 pub struct DampingStep;
@@ -11,8 +11,7 @@ pub struct DampingStep;
 /// At given strengths.
 struct AtStrengths<S> {
     d: S,
-    from: S,
-    length: S,
+    span: Span<S>,
 }
 
 impl Definition for DampingStep {
@@ -26,28 +25,22 @@ impl Definition for DampingStep {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::signed("d", "force per speed that is gained", Dimension::OUTPUT.over(Dimension::SPEED)),
-        Strength::shape(
-            "from",
-            "start",
-            Dimension::TIME,
-            NOT_NEGATIVE,
-            Trials::Moments(&[0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85]),
-        ),
-        Strength::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(&[0.03, 0.12])),
+        from(STEPS_BEGIN),
+        length(STEPS_LAST),
     ];
     const IS_ONE_OFF: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { d: s[0], from: s[1], length: s[2] })
+        Box::new(AtStrengths { d: s[0], span: Span::new(&s[1..]) })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn breaks(&self) -> Vec<f64> {
-        vec![self.from.value(), self.from.value() + self.length.value()]
+        self.span.breaks()
     }
 
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        -self.d * at.v * risen(at.t, self.from, self.length)
+        -self.d * at.v * self.span.risen(at.t)
     }
 }

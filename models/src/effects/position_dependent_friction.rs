@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, phase};
+use super::terms::{phase, waves};
 
 /// `position-dependent-friction`.
 pub struct PositionDependentFriction;
@@ -29,13 +29,7 @@ impl Definition for PositionDependentFriction {
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("c", "mean friction force", Dimension::OUTPUT),
         Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
-        Strength::shape(
-            "n",
-            "wave number, rad over the period; of an angle the periods in a turn",
-            Dimension::ONE.over(Dimension::POSITION),
-            NOT_NEGATIVE,
-            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0]),
-        ),
+        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
         phase(),
     ];
 

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, phase};
+use super::terms::{phase, waves};
 
 /// `position-ripple`.
 pub struct PositionRipple;
@@ -26,13 +26,7 @@ impl Definition for PositionRipple {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("a", "amplitude", Dimension::OUTPUT),
-        Strength::shape(
-            "n",
-            "wave number, rad over the period",
-            Dimension::ONE.over(Dimension::POSITION),
-            NOT_NEGATIVE,
-            Trials::Scaled(&[2.0, 3.5, 5.0, 7.0, 9.0, 12.0, 16.0, 21.0, 28.0, 36.0]),
-        ),
+        waves(Trials::Scaled(&[2.0, 3.5, 5.0, 7.0, 9.0, 12.0, 16.0, 21.0, 28.0, 36.0])),
         phase(),
     ];
 

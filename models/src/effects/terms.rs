@@ -58,14 +58,59 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
 }
 
-/// `(1 - cos(pi (t - from)/length))/2` from `from` on for a `length`, 0 before, 1 later; all in s.
-pub(super) fn risen<S: Scalar>(t: f64, from: S, length: S) -> S {
-    let since = -from + t;
-    if since.value() <= 0.0 {
-        S::from(0.0)
-    } else if since.value() >= length.value() {
-        S::from(1.0)
-    } else {
-        (-(since / length * PI).cos() + 1.0) * 0.5
+/// When something begins in an experiment, s, tried at these shares of the record.
+pub(super) const fn from(shares: &'static [f64]) -> Strength {
+    Strength::shape("from", "start", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(shares))
+}
+
+/// Shares of a record at which the step of a parameter is tried to begin.
+pub(super) const STEPS_BEGIN: &[f64] = &[0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85];
+
+/// Shares of a record that it is tried to take.
+pub(super) const STEPS_LAST: &[f64] = &[0.03, 0.12];
+
+/// How long it lasts, s, tried likewise.
+pub(super) const fn length(shares: &'static [f64]) -> Strength {
+    Strength::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(shares))
+}
+
+/// A wave number along a position.
+pub(super) const fn waves(trials: Trials) -> Strength {
+    let about = "wave number, rad over the period; of an angle the periods in a turn";
+    Strength::shape("n", about, Dimension::ONE.over(Dimension::POSITION), NOT_NEGATIVE, trials)
+}
+
+/// A stretch of time, of the strengths [`from`] and [`length`].
+pub(super) struct Span<S> {
+    from: S,
+    length: S,
+}
+
+impl<S: Scalar> Span<S> {
+    /// The stretch with these two strengths.
+    pub fn new(strengths: &[S]) -> Self {
+        Self { from: strengths[0], length: strengths[1] }
+    }
+
+    /// Its ends, s.
+    pub fn breaks(&self) -> Vec<f64> {
+        vec![self.from.value(), self.from.value() + self.length.value()]
+    }
+
+    /// The share of it that has passed at a time: 0 before, 1 after.
+    pub fn passed(&self, t: f64) -> S {
+        let since = -self.from + t;
+        if since.value() <= 0.0 {
+            S::from(0.0)
+        } else if since.value() >= self.length.value() {
+            S::from(1.0)
+        } else {
+            since / self.length
+        }
+    }
+
+    /// From 0 to 1 along half a period of a cosine: `(1 - cos(pi (t - from)/length))/2`, 0 before, 1 after.
+    pub fn risen(&self, t: f64) -> S {
+        (-(self.passed(t) * PI).cos() + 1.0) * 0.5
     }
 }

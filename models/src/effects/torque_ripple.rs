@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, phase};
+use super::terms::{phase, waves};
 
 /// `torque-ripple`.
 pub struct TorqueRipple;
@@ -27,13 +27,7 @@ impl Definition for TorqueRipple {
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
-        Strength::shape(
-            "n",
-            "wave number, rad over the period; of an angle the periods in a turn",
-            Dimension::ONE.over(Dimension::POSITION),
-            NOT_NEGATIVE,
-            Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 11.0, 17.0]),
-        ),
+        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 11.0, 17.0])),
         phase(),
     ];
 

@@ -1,9 +1,9 @@
 //! A push that comes once.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
-use super::terms::NOT_NEGATIVE;
+use super::terms::{Span, from, length};
 
 /// `wind-gust`.
 pub struct WindGust;
@@ -11,8 +11,7 @@ pub struct WindGust;
 /// At given strengths.
 struct AtStrengths<S> {
     a: S,
-    from: S,
-    length: S,
+    span: Span<S>,
 }
 
 impl Definition for WindGust {
@@ -25,32 +24,22 @@ impl Definition for WindGust {
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[
         Strength::signed("a", "largest value", Dimension::OUTPUT),
-        Strength::shape(
-            "from",
-            "start",
-            Dimension::TIME,
-            NOT_NEGATIVE,
-            Trials::Moments(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
-        ),
-        Strength::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(&[0.06, 0.15, 0.4])),
+        from(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
+        length(&[0.06, 0.15, 0.4]),
     ];
     const IS_ONE_OFF: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { a: s[0], from: s[1], length: s[2] })
+        Box::new(AtStrengths { a: s[0], span: Span::new(&s[1..]) })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn breaks(&self) -> Vec<f64> {
-        vec![self.from.value(), self.from.value() + self.length.value()]
+        self.span.breaks()
     }
 
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        let since = -self.from + at.t;
-        if since.value() <= 0.0 || since.value() >= self.length.value() {
-            return S::from(0.0);
-        }
-        self.a * 0.5 * (-(since / self.length * std::f64::consts::TAU).cos() + 1.0)
+        self.a * 0.5 * (-(self.span.passed(at.t) * std::f64::consts::TAU).cos() + 1.0)
     }
 }
