@@ -80,7 +80,7 @@ pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
 pub fn found(
     index: usize,
     last: &Trial<'_>,
-    after: &Calibrated,
+    after: &Calibrated<'_>,
     rounds: &[Arc<Round<'_>>],
     ranking: &[Ranked],
     dispersion: &Dispersion,
@@ -140,7 +140,7 @@ pub fn found(
 }
 
 /// Widens the intervals of strengths to those of another model with the same effects that the data allow as well.
-pub fn widen(found: &mut [Found], other: &Calibrated, last: &Trial<'_>, repeats: f64) {
+pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>, repeats: f64) {
     for (index, found) in found.iter_mut().enumerate() {
         let theirs = other.strengths(index, &last.variant, repeats);
         let strengths = last.added[index].candidate.effect.strengths();
@@ -197,7 +197,7 @@ pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject) -> Vec<Noticeabl
     all.into_iter().filter_map(one).collect()
 }
 
-pub fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<ParameterMove> {
+pub fn moves(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>) -> Vec<ParameterMove> {
     let one = |(k, &tuner): (usize, &usize)| {
         let tuner = &subject.study.tuners[tuner];
         let variance = after.covariance[(k, k)] * after.square;
@@ -212,7 +212,7 @@ pub fn moves(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<
     subject.globals.iter().enumerate().map(one).collect()
 }
 
-pub fn predictions(subject: &Subject, before: &Calibrated, after: &Calibrated) -> Vec<Prediction> {
+pub fn predictions(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>) -> Vec<Prediction> {
     let mut all = Vec::new();
     for (index, m) in subject.measurements.iter().enumerate() {
         for (k, s) in m.series.iter().enumerate() {
@@ -233,7 +233,7 @@ pub fn predictions(subject: &Subject, before: &Calibrated, after: &Calibrated) -
 }
 
 /// Start values of every experiment in the repaired model.
-pub fn starts(subject: &Subject, after: &Calibrated) -> Vec<(String, String, f64)> {
+pub fn starts(subject: &Subject, after: &Calibrated<'_>) -> Vec<(String, String, f64)> {
     let of = |(m, said): (&crate::subject::Measurement, &crate::repaired::Prognosis)| {
         said.starts.iter().map(|(name, value)| (m.name.clone(), name.clone(), *value)).collect::<Vec<_>>()
     };

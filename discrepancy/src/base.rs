@@ -2,10 +2,11 @@
 
 use std::sync::atomic::AtomicUsize;
 
-use mops_core::{Role, stream};
+use mops_core::{Role, Stream, stream};
 use rand::Rng;
 
 use crate::fit::{Fit, Fitted, Global, Piece, Point, Sets};
+use crate::least_squares::sum_of_squares;
 use crate::subject::Subject;
 use crate::windows::{cut, whole};
 
@@ -45,17 +46,19 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fi
         simulations,
     };
     let whole = problem(pieces(subject, |role| role == Role::Calibration));
+    let in_windows = |count: usize| {
+        let windows =
+            |p: &Piece| cut(p.measurement, &subject.measurements[p.measurement], subject.model.as_ref(), count);
+        problem(whole.pieces.iter().flat_map(windows).collect())
+    };
+    let begin =
+        |windows: &Fit<'_>, values: &[f64]| Point { globals: values.to_vec(), locals: first_locals(&windows.pieces) };
     let from = |start: Vec<f64>| -> Option<Fitted> {
         let mut values = start;
         let mut locals = first_locals(&whole.pieces);
         for count in [8, 4, 2] {
-            let windows: Vec<Piece> = whole
-                .pieces
-                .iter()
-                .flat_map(|p| cut(p.measurement, &subject.measurements[p.measurement], subject.model.as_ref(), count))
-                .collect();
-            let windows = problem(windows);
-            let point = Point { globals: values.clone(), locals: first_locals(&windows.pieces) };
+            let windows = in_windows(count);
+            let point = begin(&windows, &values);
             let Some(fitted) = windows.solve(point, 30) else { continue };
             values.clone_from(&fitted.point.globals);
             // The first window of a record says where the record starts.
@@ -85,24 +88,22 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fi
     // A model that lacks something cannot reach the noise: agreement of several starts is what tells.
     let mut random = stream(seed, "base fit");
     let mut agreeing = 0;
+    // The start values may lie where the model is not defined: then so may what is drawn around them, and of many the likeliest
+    // goes on.
+    let windows = in_windows(8);
+    let in_short = |values: &[f64]| windows.all(&begin(&windows, values)).map(|all| sum_of_squares(&all));
+    let draws = if in_short(&start).is_some() { 1 } else { 50 };
     for attempt in 0..40 {
-        // The start values themselves may lie where the model is not defined: then more is tried.
         if attempt >= 4 && best.is_some() {
             break;
         }
         if agreeing >= 2 || best.as_ref().is_some_and(|best| best.normalised() < 1.2) {
             break;
         }
-        let start: Vec<f64> = globals(subject)
-            .iter()
-            .zip(&start)
-            .map(|(global, &value)| {
-                let by: f64 = random.random_range(-0.7..0.7);
-                let moved = if global.log { value * by.exp() } else { value + by * global.scale };
-                moved.clamp(global.bounds[0], global.bounds[1])
-            })
-            .collect();
-        let Some(trial) = from(start) else { continue };
+        let drawn = (0..draws).map(|_| around(&start, &whole.globals, &mut random));
+        let drawn = drawn.map(|values| (in_short(&values).unwrap_or(f64::INFINITY), values));
+        let likeliest = drawn.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is one");
+        let Some(trial) = from(likeliest.1) else { continue };
         match &best {
             Some(known) if trial.chi2 > 0.999 * known.chi2 => {
                 agreeing += usize::from(trial.chi2 < 1.001 * known.chi2);
@@ -114,4 +115,14 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fi
         }
     }
     best
+}
+
+/// A random point around a start.
+fn around(start: &[f64], globals: &[Global], random: &mut Stream) -> Vec<f64> {
+    let one = |(global, &value): (&Global, &f64)| {
+        let by: f64 = random.random_range(-0.7..0.7);
+        let moved = if global.log { value * by.exp() } else { value + by * global.scale };
+        moved.clamp(global.bounds[0], global.bounds[1])
+    };
+    globals.iter().zip(start).map(one).collect()
 }

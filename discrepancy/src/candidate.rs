@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
+use crate::gap::{Gap, gap};
 use crate::quantum::quantum;
 
 /// An effect at a place.
@@ -86,12 +87,13 @@ pub fn candidates(
         .collect();
     let mut all = Vec::new();
     for effect in effects {
-        for (port, kind) in ports.iter().filter(|(_, kind)| effect.ports().contains(kind)) {
+        for (index, (port, kind)) in ports.iter().enumerate().filter(|(_, (_, kind))| effect.ports().contains(kind)) {
             let companions: Vec<Option<Port>> = match effect.companion() {
                 None => vec![None],
                 Some(wanted) => {
+                    let others = if effect.mutual() { &ports[index..] } else { &ports[..] };
                     let other = |(p, k): &&(&Port, PortKind)| *k == wanted && !(p == port && k == kind);
-                    ports.iter().filter(other).map(|(p, _)| Some((*p).clone())).collect()
+                    others.iter().filter(other).map(|(p, _)| Some((*p).clone())).collect()
                 }
             };
             for companion in companions {
@@ -137,6 +139,10 @@ pub struct Sizes {
     pub sample: f64,
     /// Size of the steps in which samples come, finer than [`MOST_STEPS`]; `None` where they do not, or nobody looked.
     pub quantum: Option<f64>,
+    /// A gap that samples show; `None` where they do not, or nobody looked.
+    pub gap: Option<Gap>,
+    /// Largest rate of a command.
+    pub fastest: f64,
 }
 
 impl Sizes {
@@ -161,6 +167,13 @@ impl Sizes {
             Trials::Within(shares) => {
                 shares.iter().map(|s| self.range[0] + s * (self.range[1] - self.range[0])).collect()
             }
+            Trials::WithinAndGap(shares) => {
+                let within = self.values(dimension, Trials::Within(shares), bounds);
+                within.into_iter().chain(self.gap.map(|gap| gap.middle)).collect()
+            }
+            Trials::ScaledAndGap(multiples) => scaled(multiples).chain(self.gap.map(|gap| gap.half_width)).collect(),
+            Trials::Fastest(shares) => shares.iter().map(|s| s * self.fastest).collect(),
+            Trials::Largest(shares) => shares.iter().map(|s| s * self.largest()).collect(),
             Trials::Plain(values) => values.to_vec(),
             Trials::Frequencies => {
                 let step = std::f64::consts::TAU / (1.5 * self.record);
@@ -178,10 +191,10 @@ impl Sizes {
         values.into_iter().filter(inside).collect()
     }
 
-    /// The same where the samples themselves tell the size of finer steps.
-    pub fn with_quantum_of(self, samples: &[f64], noise: f64) -> Self {
+    /// The same with what the samples themselves tell: the size of finer steps, and a gap.
+    pub fn told_by(self, samples: &[f64], noise: f64) -> Self {
         let quantum = quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS));
-        Self { quantum, ..self }
+        Self { quantum, gap: gap(samples, noise), ..self }
     }
 
     fn largest(&self) -> f64 {

@@ -13,7 +13,7 @@ use crate::drawn::draw;
 use crate::judge::{Judgement, judge};
 use crate::locate::locate;
 use crate::screen::Scene;
-use crate::search::{Limits, Search, Trial};
+use crate::search::{Limits, Search};
 use crate::stopgap::is_table;
 use crate::subject::Subject;
 use crate::weigh::Dispersion;
@@ -85,12 +85,10 @@ pub fn diagnose(
     let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
     if verdict == Verdict::Effect {
         // Without the declared terms that went.
-        let calibrated = |trial: &Trial<'_>| {
-            let mut trial = trial.clone();
+        let allowed = allowed.into_par_iter().filter_map(|mut trial| {
             held.iter().for_each(|&k| trial.fitted.point.globals[k] = last.fitted.point.globals[k]);
             search.calibrate(&trial, &held)
-        };
-        let allowed = allowed.par_iter().filter_map(calibrated);
+        });
         allowed.collect::<Vec<_>>().iter().for_each(|other| widen(&mut found, other, &last, dispersion.repeats));
     }
     let probability = match verdict {

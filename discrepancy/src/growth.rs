@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
                     break;
                 }
             };
-            growth.step("added", next);
+            growth.step("added", self.unstuck(next));
             growth.rounds.push(round);
             // What one effect stood in for may have its place once the next is in.
             while let Some(better) = self.exchange(&growth.last, &mut exchanges, watch) {

@@ -34,7 +34,7 @@ pub struct Judgement<'a> {
     /// Tuners of declared terms that it does not need.
     pub held: Vec<usize>,
     /// The same fitted to calibration data alone.
-    pub after: Calibrated,
+    pub after: Calibrated<'a>,
     /// What no effect explains.
     pub unexplained: Option<Unexplained>,
     /// A fact about what is left.
@@ -50,8 +50,9 @@ pub fn judge<'a>(
     located: &[Located],
     last: Trial<'a>,
     held: Vec<usize>,
-    after: Calibrated,
+    after: Calibrated<'a>,
 ) -> Judgement<'a> {
+    let (last, after) = if held.is_empty() { agreed(search, last, after) } else { (last, after) };
     let (left, note) = if last.fitted.normalised() > UNEXPLAINED { left(&last) } else { (0.0, None) };
     // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
     // little they determine.
@@ -94,12 +95,22 @@ impl<'a> Judgement<'a> {
     }
 }
 
+/// The model fitted to all data from where the fit to calibration data alone ended, where that contradicts it and leads on.
+fn agreed<'a>(search: &Search<'a>, last: Trial<'a>, after: Calibrated<'a>) -> (Trial<'a>, Calibrated<'a>) {
+    if last.added.is_empty() || !contradicts(contradiction(&last, &after), after.unknowns()) {
+        return (last, after);
+    }
+    let other = search.led_by(&after).filter(|other| other.fitted.chi2 < last.fitted.chi2);
+    let led = other.and_then(|other| Some((search.calibrate(&other, &[])?, other)));
+    led.map_or((last, after), |(after, last)| (last, after))
+}
+
 /// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.
-fn contradiction(last: &Trial<'_>, after: &Calibrated) -> f64 {
+fn contradiction(last: &Trial<'_>, after: &Calibrated<'_>) -> f64 {
     let own = |measurement: usize| last.fit.subject.measurements[measurement].role == Role::Calibration;
     let together = last.fit.pieces.iter().zip(&last.fitted.residuals).filter(|(piece, _)| own(piece.measurement));
     let together: f64 = together.map(|(_, residuals)| dot(residuals, residuals)).sum();
-    (together - after.chi2) / after.square
+    (together - after.fitted.chi2) / after.square
 }
 
 /// Whether a rise of the sum of squares over calibration data is more than the unknowns of a right model make it: at most a
@@ -128,7 +139,7 @@ fn left(last: &Trial<'_>) -> (f64, Option<String>) {
 
 /// Root mean square of the normalised errors on selection data; 0 without such data.
 #[allow(clippy::cast_precision_loss)]
-fn forecast(after: &Calibrated, subject: &Subject) -> f64 {
+fn forecast(after: &Calibrated<'_>, subject: &Subject) -> f64 {
     let errors = after.errors(&subject.measurements);
     let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()

@@ -35,6 +35,11 @@ impl Fit<'_> {
         globals + locals.map(|(local, &value)| far(local, value).powi(2)).sum::<f64>()
     }
 
+    /// What a fit makes least: the sum of the squares of the residuals, and of what something is expected of.
+    pub(crate) fn total(&self, fitted: &Fitted) -> f64 {
+        fitted.chi2 + self.unexpected(&fitted.point)
+    }
+
     fn unknowns(&self) -> usize {
         self.globals.len() + self.pieces.iter().map(|p| p.locals.len()).sum::<usize>()
     }
@@ -200,7 +205,7 @@ impl Fit<'_> {
         let mut fitted = Fitted { chi2: normal.chi2, count, point: start, residuals, normal: OnceLock::new() };
         let mut normal = normal;
         let mut damping = 1e-3;
-        let mut total = fitted.chi2 + self.unexpected(&fitted.point);
+        let mut total = self.total(&fitted);
         for iteration in 1..=iterations {
             let held = self.held_by_slopes(&fitted.point, &normal.gradient);
             let mut improved = None;

@@ -10,6 +10,7 @@ mod diagnosis;
 mod drawn;
 mod family;
 mod fit;
+mod gap;
 mod gaussian;
 mod growth;
 mod held_out;
@@ -20,6 +21,7 @@ mod locate;
 #[cfg(test)]
 mod locate_tests;
 mod plan;
+mod profile;
 mod quantum;
 mod reduced;
 mod removed;

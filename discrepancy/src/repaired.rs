@@ -5,24 +5,27 @@ use nalgebra::DMatrix;
 
 use crate::base;
 use crate::diagnosis::{ExperimentError, StrengthValue};
-use crate::fit::{Fit, Point};
+use crate::fit::{Fit, Fitted, Point};
+use crate::profile::interval95;
 use crate::search::{ASTRAY, Search, Trial};
 use crate::subject::Measurement;
 use crate::variant::{Added, Variant, problem};
 use crate::windows::whole;
 
 /// A model that was fitted to calibration data alone, and its predictions everywhere.
-pub struct Calibrated {
+pub struct Calibrated<'a> {
     /// Its effects.
     pub added: Vec<Added>,
     /// Values of the tuners of the study.
     pub tuners: Vec<f64>,
     /// Covariance of these, then of the strengths in the order of [`Calibrated::free`], for residuals of size 1.
     pub covariance: DMatrix<f64>,
+    /// The problem, and its solution.
+    pub fit: Fit<'a>,
+    /// The latter.
+    pub fitted: Fitted,
     /// Mean square of the residuals on calibration data, at least 1.
     pub square: f64,
-    /// Sum of the squares of the residuals on calibration data.
-    pub chi2: f64,
     /// For each strength that was fitted the effect and its index there.
     pub free: Vec<(usize, usize)>,
     /// For each experiment: predicted outputs by series, and the values of the model's locals.
@@ -37,10 +40,10 @@ pub struct Prognosis {
     pub starts: Vec<(String, f64)>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
     /// Fits the effects and the tuners to calibration data, from where a trial over all data ended, and the start values of
     /// the other experiments with these.
-    pub fn calibrate(&self, trial: &Trial<'_>, held: &[usize]) -> Option<Calibrated> {
+    pub fn calibrate(&self, trial: &Trial<'a>, held: &[usize]) -> Option<Calibrated<'a>> {
         let subject = self.subject;
         let pieces = base::pieces(subject, |role| role == Role::Calibration);
         let of_trial = |measurement: usize, count: usize| {
@@ -79,7 +82,7 @@ impl Search<'_> {
             });
         }
         let covariance = fit.covariance(&fitted);
-        Some(Calibrated { added, tuners, covariance, chi2: fitted.chi2, square, free, experiments })
+        Some(Calibrated { added, tuners, covariance, fit, fitted, square, free, experiments })
     }
 
     /// Start values of an experiment with everything else held, and what the model then says; `enough` is what it may leave.
@@ -115,7 +118,7 @@ fn prognosis(fit: &Fit<'_>, point: &Point, piece: usize, measurement: &Measureme
     Some(Prognosis { predicted, starts })
 }
 
-impl Calibrated {
+impl Calibrated<'_> {
     /// Number of unknowns that were fitted; tuners that were held have no variance.
     pub fn unknowns(&self) -> usize {
         self.covariance.diagonal().iter().filter(|&&variance| variance > 0.0).count()
@@ -149,17 +152,23 @@ impl Calibrated {
         let a = &self.added[index];
         let parameters = &mops_core::Model::interface(variant.model.as_ref()).parameters;
         let one = |(k, strength): (usize, &mops_core::Strength)| {
-            let place = self.free.iter().position(|&f| f == (index, k));
-            let variance = place.map(|place| self.covariance[(self.tuners.len() + place, self.tuners.len() + place)]);
-            let error = variance.map(|v| (v * self.square * repeats).sqrt()).filter(|e| e.is_finite() && *e > 0.0);
-            let value = a.strengths[k];
+            let place = self.free.iter().position(|&f| f == (index, k)).map(|place| self.tuners.len() + place);
+            let weight = self.square * repeats;
+            let error = |place: usize| (self.covariance[(place, place)] * weight).sqrt();
+            let known = place.map(|place| (place, error(place))).filter(|(_, e)| e.is_finite() && *e > 0.0);
+            let profile = |(place, error): (usize, f64)| {
+                if self.fit.globals[place].steps {
+                    let [low, high] = strength.bounds;
+                    return [-1.96, 1.96].map(|z| (a.strengths[k] + z * error).clamp(low, high));
+                }
+                interval95(&self.fit, &self.fitted, place, error, weight)
+            };
             StrengthValue {
                 name: strength.name.to_owned(),
-                value,
+                value: a.strengths[k],
                 unit: a.candidate.unit(strength, &parameters[variant.first[index] + k].variable.unit),
-                std_error: error,
-                interval95: error
-                    .map(|e| [-1.96, 1.96].map(|z| (value + z * e).clamp(strength.bounds[0], strength.bounds[1]))),
+                std_error: known.map(|(_, error)| error),
+                interval95: known.map(profile),
             }
         };
         a.candidate.effect.strengths().iter().enumerate().map(one).collect()

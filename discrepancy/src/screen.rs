@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Piece, Residuals, dot};
-use crate::trace_of::{View, sizes, sizes_with_steps};
+use crate::trace_of::{View, sizes, sizes_by_samples};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -181,8 +181,9 @@ fn sizes_for(
     pieces: &[Piece],
     trajectories: &[Trajectory],
 ) -> Option<Sizes> {
-    let steps = candidate.effect.strengths().iter().any(|s| s.trials == Trials::Steps);
-    let of_place = if steps { sizes_with_steps } else { sizes };
+    let asks_samples =
+        |s: &Strength| matches!(s.trials, Trials::Steps | Trials::WithinAndGap(_) | Trials::ScaledAndGap(_));
+    let of_place = if candidate.effect.strengths().iter().any(asks_samples) { sizes_by_samples } else { sizes };
     let own = of_place(&candidate.port, model, pieces, trajectories)?;
     match (&candidate.port, &candidate.companion) {
         (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {
@@ -257,7 +258,7 @@ fn best_of(
     let effect = candidate.effect.as_ref();
     let own: Vec<usize> =
         (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
-    let is_fixed = |&k: &usize| effect.strengths()[k].fixed || effect.strengths()[k].trials == Trials::Steps;
+    let is_fixed = |&k: &usize| effect.strengths()[k].fixed || effect.strengths()[k].trials.jumps();
     let fixed: Vec<usize> = (0..effect.strengths().len()).filter(is_fixed).collect();
     let mut found: Vec<Screened> = Vec::new();
     let mut by_chance = vec![0.0_f64; draws.len()];

@@ -8,7 +8,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::base;
 use crate::candidate::{Candidate, candidates};
+use crate::diagnose::UNEXPLAINED;
 use crate::fit::{Fit, Fitted, Piece, dot};
+use crate::repaired::Calibrated;
 use crate::round::Round;
 use crate::subject::{Local, Subject};
 use crate::variant::{Added, Variant, problem};
@@ -239,10 +241,40 @@ impl<'a> Search<'a> {
             return whole;
         }
         // What fits the calibration data may be out of step in other records.
-        let windows = self.trial(&[], tuners, base::first_locals(&self.pieces(8)), 8, 40);
-        let stretched = |part: Trial<'a>, windows| self.stretched(&part, windows);
-        let anew = windows.and_then(|windows| [4, 2, 1].into_iter().try_fold(windows, stretched));
-        closer(whole, anew)
+        closer(whole, self.through_windows(&[], tuners))
+    }
+
+    /// A variant fitted to all data that may choose, in windows that grow to whole records.
+    fn through_windows(&self, added: &[Added], tuners: &[f64]) -> Option<Trial<'a>> {
+        let windows = self.trial(added, tuners, base::first_locals(&self.pieces(8)), 8, 40)?;
+        [4, 2, 1].into_iter().try_fold(windows, |part, windows| self.stretched(&part, windows))
+    }
+
+    /// A model fitted to all data that may choose, from where its fit to calibration data alone ended.
+    pub fn led_by(&self, calibrated: &Calibrated<'a>) -> Option<Trial<'a>> {
+        let starts = calibrated.experiments.iter().zip(&self.subject.measurements);
+        let own = starts.filter(|(_, m)| m.role != Role::Validation);
+        let own = own.map(|(said, m)| said.starts[..m.locals.len()].iter().map(|(_, value)| *value).collect());
+        self.trial(&calibrated.added, &calibrated.tuners, own.collect(), 1, 40)
+    }
+
+    /// A trial over whole records that leaves something, where that is less after a fit in windows, or to calibration data
+    /// alone.
+    pub fn unstuck(&self, trial: Trial<'a>) -> Trial<'a> {
+        let through_windows = |trial: &Trial<'a>| {
+            let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
+            self.through_windows(&trial.added, tuners)
+        };
+        let through_calibration = |trial: &Trial<'a>| self.led_by(&self.calibrate(trial, &[])?);
+        let mut best = trial;
+        for through in [&through_windows as &dyn Fn(&Trial<'a>) -> Option<Trial<'a>>, &through_calibration] {
+            if best.windows > 1 || best.fitted.normalised() <= UNEXPLAINED {
+                break;
+            }
+            let other = through(&best).filter(|other| other.fitted.chi2 < best.fitted.chi2);
+            best = other.unwrap_or(best);
+        }
+        best
     }
 
     /// Fits a variant to all data that may choose.

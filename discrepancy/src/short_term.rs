@@ -18,7 +18,7 @@ const PERIODS: f64 = 4.0;
 
 impl Search<'_> {
     /// Errors of a model on every experiment, over whole records and in windows.
-    pub fn errors(&self, model: &Calibrated) -> Vec<ExperimentError> {
+    pub fn errors(&self, model: &Calibrated<'_>) -> Vec<ExperimentError> {
         let whole = model.errors(&self.subject.measurements).into_par_iter().enumerate();
         whole.map(|(index, error)| ExperimentError { in_windows: self.in_windows_of(model, index), ..error }).collect()
     }
@@ -26,7 +26,7 @@ impl Search<'_> {
     /// The errors of a model on an experiment in windows of [`PERIODS`] periods of its liveliest channel; `None` where the
     /// record has too few periods for two windows, or where a window cannot be simulated.
     #[allow(clippy::cast_precision_loss)]
-    fn in_windows_of(&self, model: &Calibrated, index: usize) -> Option<WindowErrors> {
+    fn in_windows_of(&self, model: &Calibrated<'_>, index: usize) -> Option<WindowErrors> {
         let measurement = &self.subject.measurements[index];
         let count = windows_of(measurement);
         if count < 2 {

@@ -1,4 +1,4 @@
-//! Search over the size of steps, which no slope tells: a value that crosses to the next step jumps.
+//! Search over the size of steps and the width of gaps, which no slope tells: a value that crosses to the next step jumps.
 
 use std::sync::OnceLock;
 

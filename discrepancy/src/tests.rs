@@ -6,6 +6,7 @@ mod correlated;
 mod derivatives;
 mod drawn;
 mod holds;
+mod intervals;
 mod namesakes;
 mod pairs;
 mod selection;

@@ -60,6 +60,13 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
+/// Largest rate of an input from sample to sample.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn steepest(input: &Input, sample: f64, horizon: f64) -> f64 {
+    let at = |k: u32| input.at(f64::from(k) * sample);
+    (0..(horizon / sample) as u32).map(|k| (at(k + 1) - at(k)).abs() / sample).fold(0.0, f64::max)
+}
+
 /// Typical sizes at a place, over the pieces in which it is measured.
 pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: &[Trajectory]) -> Option<Sizes> {
     let spots: Vec<(usize, Spot)> =
@@ -90,6 +97,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 record,
                 sample,
                 quantum: None,
+                gap: None,
+                fastest: f64::NAN,
             }
         }
         Spot::Process(w, s) => {
@@ -108,6 +117,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 record,
                 sample,
                 quantum: None,
+                gap: None,
+                fastest: f64::NAN,
             }
         }
         Spot::Actuator(input) => {
@@ -115,6 +126,9 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let fastest =
                 moments().map(|m| amplitude(m.rates.iter().copied()) / positive(amplitude(m.x.iter().copied())));
             let time = 1.0 / positive(fastest.fold(0.0, f64::max)).clamp(1.0 / record, 1.0 / sample);
+            let name = &model.model().interface().inputs[input].name;
+            let steepest =
+                |(i, _): &(usize, Spot)| Some(steepest(pieces[*i].case.input(name)?, sample, pieces[*i].horizon));
             Sizes {
                 output: value,
                 position: value,
@@ -125,6 +139,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 record,
                 sample,
                 quantum: None,
+                gap: None,
+                fastest: spots.iter().filter_map(steepest).fold(0.0, f64::max),
             }
         }
         Spot::Sensor(_) => {
@@ -146,14 +162,16 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 record,
                 sample,
                 quantum: None,
+                gap: None,
+                fastest: f64::NAN,
             }
         }
     };
     Some(Sizes { output: positive(sizes.output), ..sizes })
 }
 
-/// The same for an effect that comes in steps, whose size samples may tell.
-pub fn sizes_with_steps(
+/// The same with what samples tell.
+pub fn sizes_by_samples(
     place: &Port,
     model: &WithEffects,
     pieces: &[Piece],
@@ -167,7 +185,7 @@ pub fn sizes_with_steps(
             noise = noise.max(piece.series[series].noise);
         }
     }
-    Some(if samples.is_empty() { sizes } else { sizes.with_quantum_of(&samples, noise) })
+    Some(if samples.is_empty() { sizes } else { sizes.told_by(&samples, noise) })
 }
 
 /// A candidate's place in a piece, and what it sees there.

@@ -153,9 +153,13 @@ pub fn problem<'a>(
                 }
             } else {
                 let log = is_log(strength, value);
-                let steps = strength.trials == Trials::Steps;
-                // Half way to the next value that was tried.
-                let scale = if steps { 0.5 * a.sizes.gap_to_next_size(value) } else { scale };
+                let steps = strength.trials.jumps();
+                let scale = match strength.trials {
+                    // Half way to the next value that was tried.
+                    Trials::Steps => 0.5 * a.sizes.gap_to_next_size(value),
+                    Trials::ScaledAndGap(_) => 0.1 * value,
+                    _ => scale,
+                };
                 all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });
                 values.push(value);
             }

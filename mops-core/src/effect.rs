@@ -164,6 +164,14 @@ pub enum Trials {
     Scaled(&'static [f64]),
     /// These places between the smallest and the largest position (of a process: state; of an actuator or sensor: value).
     Within(&'static [f64]),
+    /// The same, and the middle of a gap that samples show at a sensor.
+    WithinAndGap(&'static [f64]),
+    /// These multiples of its typical size, and half the width of a gap that samples show at a sensor.
+    ScaledAndGap(&'static [f64]),
+    /// These shares of the largest size of a value.
+    Largest(&'static [f64]),
+    /// These shares of the largest rate of a command.
+    Fastest(&'static [f64]),
     /// These values.
     Plain(&'static [f64]),
     /// These values, then these multiples of its typical size: periods in a turn, and along a rail.
@@ -175,6 +183,13 @@ pub enum Trials {
     Steps,
     /// Times within the record, at these shares of its length.
     Moments(&'static [f64]),
+}
+
+impl Trials {
+    /// Whether no slope tells the strength, as samples that it moves jump: sizes of steps, the width of a gap.
+    pub fn jumps(&self) -> bool {
+        matches!(self, Self::Steps | Self::ScaledAndGap(_))
+    }
 }
 
 /// Whether a strength belongs to the plant or to one experiment.
@@ -375,12 +390,22 @@ pub trait Effect: Send + Sync {
     /// Its class.
     fn class(&self) -> EffectClass;
 
+    /// The effect in a wider sense that it is a form of: of backlash, play in a coupling.
+    fn form_of(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Ports that it acts at.
     fn ports(&self) -> &'static [PortKind];
 
     /// The sort of a second place that it needs: where drag comes from, a sensor that talks across.
     fn companion(&self) -> Option<PortKind> {
         None
+    }
+
+    /// Whether it is the same with its place and its companion exchanged.
+    fn mutual(&self) -> bool {
+        false
     }
 
     /// Its strengths; the first is the one that makes it vanish.

@@ -13,6 +13,9 @@ pub(super) fn page(effect: &dyn Effect) -> String {
         page += &format!(". Companion: {}", place(companion));
     }
     page += ".\n";
+    if let Some(wider) = effect.form_of() {
+        page += &format!("A form of: {wider}.\n");
+    }
     if effect.states() > 0 {
         let free = if effect.free_start() { ", with a free start value in each experiment" } else { "" };
         page += &format!("States of its own: {}{free}.\n", effect.states());

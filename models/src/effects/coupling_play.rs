@@ -23,8 +23,10 @@ impl Definition for CouplingPlay {
     const SOURCE: &'static str =
         "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Elastic;
+    const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
+    const MUTUAL: bool = true;
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("k", "stiffness of the coupling that has play", Dimension::OUTPUT.over(Dimension::POSITION)),
         Strength::shape(

@@ -49,6 +49,7 @@ mod quadratic_drag;
 mod quadratic_input;
 mod quadratic_loss;
 mod quadratic_stiffness;
+mod radiation_exchange;
 mod radiation_loss;
 mod second_order_lag;
 mod sensor_bias;
@@ -87,10 +88,14 @@ pub trait Definition: Send + Sync + 'static {
     const SOURCE: &'static str;
     /// [`Effect::class`].
     const CLASS: EffectClass;
+    /// [`Effect::form_of`].
+    const FORM_OF: Option<&'static str> = None;
     /// [`Effect::ports`].
     const PORTS: &'static [PortKind];
     /// [`Effect::companion`].
     const COMPANION: Option<PortKind> = None;
+    /// [`Effect::mutual`].
+    const MUTUAL: bool = false;
     /// [`Effect::strengths`].
     const STRENGTHS: &'static [Strength];
     /// [`Effect::states`].
@@ -132,8 +137,14 @@ impl<D: Definition> Effect for Defined<D> {
     fn ports(&self) -> &'static [PortKind] {
         D::PORTS
     }
+    fn form_of(&self) -> Option<&'static str> {
+        D::FORM_OF
+    }
     fn companion(&self) -> Option<PortKind> {
         D::COMPANION
+    }
+    fn mutual(&self) -> bool {
+        D::MUTUAL
     }
     fn strengths(&self) -> &'static [Strength] {
         D::STRENGTHS
@@ -200,6 +211,7 @@ pub fn effects() -> Vec<Arc<dyn Effect>> {
         effect::<flexible_mode::FlexibleMode>(),
         effect::<overflow::Overflow>(),
         effect::<radiation_loss::RadiationLoss>(),
+        effect::<radiation_exchange::RadiationExchange>(),
         effect::<mass_loss::MassLoss>(),
         effect::<added_mass::AddedMass>(),
         effect::<bouc_wen::BoucWen>(),

@@ -23,6 +23,7 @@ impl Definition for PositionRipple {
     const SOURCE: &'static str =
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
+    const FORM_OF: Option<&'static str> = Some("cogging");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("a", "amplitude", Dimension::OUTPUT),

@@ -1,8 +1,11 @@
 //! A spring that is stiffer to one side.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use std::f64::consts::PI;
+
+use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
+use super::terms::ANY;
 
 /// `quadratic-stiffness`.
 pub struct QuadraticStiffness;
@@ -10,29 +13,31 @@ pub struct QuadraticStiffness;
 /// At given strengths.
 struct AtStrengths<S> {
     k: S,
+    rest: S,
 }
 
 impl Definition for QuadraticStiffness {
     const NAME: &'static str = "quadratic-stiffness";
     const ABOUT: &'static str =
-        "A spring whose force has a share with the square of the position, so that it is stiffer to one side.";
-    const FORMULA: &'static str = "-k q^2";
+        "A spring whose force has a share with the square of the displacement, so that it is stiffer to one side.";
+    const FORMULA: &'static str = "-k (q - rest)^2";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed(
-        "k",
-        "force per squared displacement",
-        Dimension::OUTPUT.over(Dimension::POSITION.power(2)),
-    )];
+    const STRENGTHS: &'static [Strength] = &[
+        Strength::signed("k", "force per squared displacement", Dimension::OUTPUT.over(Dimension::POSITION.power(2))),
+        // Fitted, it would be at odds with the stiffness: the force is far from linear in both.
+        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Plain(&[0.0, PI])).kept(),
+    ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { k: s[0] })
+        Box::new(AtStrengths { k: s[0], rest: s[1] })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        -self.k * at.q * at.q
+        let d = at.q - self.rest;
+        -self.k * d * d
     }
 }

@@ -20,16 +20,17 @@ impl Definition for SensorGap {
     const FORMULA: &'static str = "centre where |y - centre| < width, else y";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
+    const FORM_OF: Option<&'static str> = Some("sensor-dead-zone");
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("width", "half the width of the gap", Dimension::VALUE)
-            .tried(Trials::Scaled(&[0.05, 0.1, 0.2, 0.4])),
+            .tried(Trials::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
         Strength::shape(
             "centre",
             "middle of the gap, and what is shown there",
             Dimension::VALUE,
             ANY,
-            Trials::Within(&[0.2, 0.35, 0.5, 0.65, 0.8]),
+            Trials::WithinAndGap(&[0.2, 0.35, 0.5, 0.65, 0.8]),
         ),
     ];
 

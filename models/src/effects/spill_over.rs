@@ -22,6 +22,7 @@ impl Definition for SpillOver {
     const FORMULA: &'static str = "-k max(x - level, 0)^n, and share times as much into the companion process";
     const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
     const CLASS: EffectClass = EffectClass::Flow;
+    const FORM_OF: Option<&'static str> = Some("overflow");
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const COMPANION: Option<PortKind> = Some(PortKind::Process);
     const STRENGTHS: &'static [Strength] = &[

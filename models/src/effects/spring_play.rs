@@ -21,6 +21,7 @@ impl Definition for SpringPlay {
     const SOURCE: &'static str =
         "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Elastic;
+    const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("k", "stiffness of the spring that has play", Dimension::OUTPUT.over(Dimension::POSITION)),

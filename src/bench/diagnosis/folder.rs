@@ -118,7 +118,7 @@ fn diagnosed(name: &str, text: &str, declared: &Declared, folder: &Path, tools: 
     let (diagnosis, seconds) = tools.diagnose(study)?;
     let after = |name: &str| diagnosis.after.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.normalised);
     Ok(Said {
-        json: answer(name, declared, &diagnosis, seconds),
+        json: answer(name, declared, &diagnosis, seconds, &tools.catalogue.effects),
         predictions: predictions(declared, &diagnosis, &times),
         errors: diagnosis.before.iter().map(|e| (e.name.clone(), [e.normalised, after(&e.name)])).collect(),
         answer: Answer::of(&diagnosis, seconds),

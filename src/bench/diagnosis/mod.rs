@@ -41,6 +41,8 @@ pub(crate) struct Beside {
     pub brute_force: bool,
     /// Further diagnoses, each with another order of the catalogue and another seed.
     pub orders: u64,
+    /// The catalogue has what is missing, and no more.
+    pub told: bool,
 }
 
 /// Runs a plan on so many threads.
@@ -57,6 +59,8 @@ pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, beside: Beside) ->
 fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: Beside) -> (Row, Option<Row>) {
     let size = if wish.kind == Kind::Nothing { 0.0 } else { plan.nearest(trial.truth.size) };
     let row = |answer| Row::new(trial, wish.kind, size, answer);
+    let missing = beside.told.then(|| only(tools.catalogue, trial));
+    let tools = Tools { catalogue: missing.as_ref().unwrap_or(tools.catalogue), ..tools };
     let read = |tools: Tools<'_>| tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files));
     let answer = |tools: Tools<'_>| {
         let guarded = std::panic::AssertUnwindSafe(|| tools.diagnose(read(tools)?));
@@ -74,6 +78,14 @@ fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: B
         row.agreeing = agreeing.collect();
     }
     (row, brute)
+}
+
+/// The catalogue with no more effects than are missing.
+fn only(catalogue: &Catalogue, trial: &Trial) -> Catalogue {
+    let missing = |name| trial.truth.effects.iter().any(|e| names::names(&e.class, &e.strengths).contains(&name));
+    let mut catalogue = catalogue.clone();
+    catalogue.effects.retain(|effect| missing(effect.name()));
+    catalogue
 }
 
 /// The catalogue with its effects in another order.

@@ -13,6 +13,9 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
         "constant-heat-gain" => vec!["constant-force"],
         // The same formula, for angles and for lengths.
         "cogging" => vec!["cogging", "position-ripple"],
+        "radiation-loss" => vec!["radiation-loss", "radiation-exchange"],
+        // Of a gear, of a coupling of two joints, of a spring.
+        "backlash" => vec!["backlash", "coupling-play", "spring-play"],
         "sensor-dead-zone" if told(strengths, "shifts") == 0.0 => vec!["sensor-gap"],
         "overflow" if told(strengths, "share") > 0.0 => vec!["spill-over"],
         same => vec![same],
@@ -73,7 +76,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "input-quantisation" | "sensor-quantisation" => vec![("step", of("step"))],
         "torque-ripple" => vec![("a", of("share")), ("n", of("waves"))],
         "rate-limit" => vec![("rate", of("rate"))],
-        "backlash" if effect.place.starts_with("actuator") => vec![("gap", 2.0 * of("gap"))],
+        "backlash" => vec![("gap", 2.0 * of("gap"))],
         "sensor-gain" => vec![("g", of("gain") - 1.0)],
         "sensor-drift" => vec![("r", of("rate"))],
         "sensor-dead-zone" => vec![("width", of("width")), ("centre", of("middle"))],

@@ -71,6 +71,9 @@ struct Diagnosis {
     /// Diagnose every case so many times more, with other orders of the catalogue and other seeds, and count what agrees.
     #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "folder")]
     orders: u64,
+    /// Try no more effects than are missing: what the intervals are worth, without the search.
+    #[arg(long, conflicts_with = "folder")]
+    told: bool,
     /// Diagnose the cases of a folder instead: a folder each, with case.json and data.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
@@ -108,7 +111,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let plan = plan(arguments)?;
     let progress = Progress::of_cases(!arguments.quiet);
     let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
-    let beside = Beside { brute_force: against, orders: arguments.orders };
+    let beside = Beside { brute_force: against, orders: arguments.orders, told: arguments.told };
     let results = diagnosis::run(&plan, tools, jobs, beside);
     progress.finish();
     let text = tables::all(&results);

@@ -387,7 +387,7 @@ fn what_stores_energy_gives_it_back() {
         ("constant-force", vec![0.7], |q| -0.7 * q),
         ("linear-stiffness", vec![3.0, 0.2], |q| 1.5 * (q - 0.2).powi(2)),
         ("cubic-stiffness", vec![3.0, 0.2], |q| 0.75 * (q - 0.2).powi(4)),
-        ("quadratic-stiffness", vec![0.3], |q| 0.1 * q.powi(3)),
+        ("quadratic-stiffness", vec![0.3, 0.2], |q| 0.1 * (q - 0.2).powi(3)),
         ("end-stop", vec![30.0, -0.3, 0.4, 0.0], |q| 15.0 * ((q - 0.4).max(0.0).powi(2) + (-0.3 - q).max(0.0).powi(2))),
         ("imbalance", vec![2.0, 0.3], |q| -2.0 * (q - 0.3).cos()),
         ("cogging", vec![2.0, 6.0, 0.3], |q| (6.0 * q + 0.3).cos() / 3.0),

@@ -1,16 +1,27 @@
 //! The answer of a case: verdict, effects in order, errors; and the outputs that the repaired model predicts.
 
 use std::fmt::Write;
+use std::sync::Arc;
 
+use mops_core::Effect;
 use mops_discrepancy::{Diagnosis, ExperimentError, Prediction};
 use serde_json::{Map, Value, json};
 
 use super::super::tool::spelt;
 use super::declared::{Declared, stem};
 
-/// The answer as a JSON text.
-pub(super) fn answer(case: &str, declared: &Declared, diagnosis: &Diagnosis, seconds: f64) -> String {
-    let entry = |effect: &str, place: &str| (effect.replace('-', "_"), located(place, &declared.locations));
+/// The answer as a JSON text; effects are named in their wider sense.
+pub(super) fn answer(
+    case: &str,
+    declared: &Declared,
+    diagnosis: &Diagnosis,
+    seconds: f64,
+    effects: &[Arc<dyn Effect>],
+) -> String {
+    let wider = |name: &str| effects.iter().find(|e| e.name() == name).and_then(|e| e.form_of());
+    let entry = |effect: &str, place: &str| {
+        (wider(effect).unwrap_or(effect).replace('-', "_"), located(place, &declared.locations))
+    };
     let mut ranked: Vec<(String, String, f64)> = Vec::new();
     let found = diagnosis.found.iter().map(|f| (&f.effect, &f.place, f.probability));
     let others = diagnosis.found.iter().flat_map(|f| &f.indistinguishable);
