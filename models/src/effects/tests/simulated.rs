@@ -116,6 +116,15 @@ fn a_loss_to_the_surroundings_decays_to_them() {
 }
 
 #[test]
+fn what_radiates_to_an_input_cools_as_stefan_says() {
+    let model = with(TANK, "radiation-exchange", "process:h", Some("actuator:u"));
+    // A T' = -k T^4 with nothing around: 1/T^3 = 1/T0^3 + 3 k t/A.
+    let times = [0.5, 2.0, 6.0];
+    let found = values(&model, &[2.0, 3.0, 0.1, 0.0], NOTHING, "h", &times);
+    close(&found, &times.map(|t| (1.0 / 27.0 + 0.15 * t).powf(-1.0 / 3.0)), 1e-6);
+}
+
+#[test]
 fn a_hidden_store_shares_what_there_is() {
     let model = with(TANK, "hidden-store", "process:h", None);
     // A = 2, k = 1, tau = 4: the hidden store holds k tau = 4. From h = 3 and z = 0: both end at 1, at the rate 1/2 + 1/4.
