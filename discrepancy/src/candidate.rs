@@ -92,7 +92,9 @@ pub fn candidates(
                 None => vec![None],
                 Some(wanted) => {
                     let others = if effect.mutual() { &ports[index..] } else { &ports[..] };
-                    let other = |(p, k): &&(&Port, PortKind)| *k == wanted && !(p == port && k == kind);
+                    let other = |(p, k): &&(&Port, PortKind)| {
+                        *k == wanted && !(p == port && k == kind) && could_be_alike(port, p, interface)
+                    };
                     others.iter().filter(other).map(|(p, _)| Some((*p).clone())).collect()
                 }
             };
@@ -107,6 +109,16 @@ pub fn candidates(
         }
     }
     all
+}
+
+/// Whether what a process takes from an input could be what its state is, such as a temperature: both have the same unit. All
+/// else goes together.
+fn could_be_alike(port: &Port, companion: &Port, interface: &Interface) -> bool {
+    let (Port::Process { state, .. }, Port::Actuator { input }) = (port, companion) else { return true };
+    let start = interface.states.iter().find(|s| s.name == *state).map(|s| &s.start);
+    let state = start.and_then(|start| interface.parameters.iter().find(|p| p.variable.name == *start));
+    let input = interface.inputs.iter().find(|i| i.name == *input);
+    state.zip(input).is_none_or(|(state, input)| state.variable.unit == input.unit)
 }
 
 /// Steps up to the largest value of which all sizes are tried: what is finer is read from samples, or as good as noise.
@@ -141,8 +153,8 @@ pub struct Sizes {
     pub quantum: Option<f64>,
     /// A gap that samples show; `None` where they do not, or nobody looked.
     pub gap: Option<Gap>,
-    /// Largest rate of a command.
-    pub fastest: f64,
+    /// Largest slew rate of a command; `None` elsewhere than at an actuator.
+    pub slew: Option<f64>,
 }
 
 impl Sizes {
@@ -172,8 +184,15 @@ impl Sizes {
                 within.into_iter().chain(self.gap.map(|gap| gap.middle)).collect()
             }
             Trials::ScaledAndGap(multiples) => scaled(multiples).chain(self.gap.map(|gap| gap.half_width)).collect(),
-            Trials::Fastest(shares) => shares.iter().map(|s| s * self.fastest).collect(),
-            Trials::Largest(shares) => shares.iter().map(|s| s * self.largest()).collect(),
+            Trials::SlewAndScaled(shares, multiples) => {
+                let slew = self.slew;
+                shares.iter().filter_map(|s| Some(s * slew?)).chain(scaled(multiples)).collect()
+            }
+            Trials::WithinSize(shares) => {
+                let crosses = self.range[0] < 0.0 && self.range[1] > 0.0;
+                let least = if crosses { 0.0 } else { self.range[0].abs().min(self.range[1].abs()) };
+                shares.iter().map(|s| least + s * (self.largest() - least)).collect()
+            }
             Trials::Plain(values) => values.to_vec(),
             Trials::Frequencies => {
                 let step = std::f64::consts::TAU / (1.5 * self.record);

@@ -10,7 +10,7 @@ use crate::account::{found, moves, next_experiment, noticeable, predictions, ran
 use crate::base;
 use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
-use crate::judge::{Judgement, judge};
+use crate::judge::{Judgement, agreed, judge};
 use crate::locate::locate;
 use crate::screen::Scene;
 use crate::search::{Limits, Search};
@@ -74,6 +74,15 @@ pub fn diagnose(
         Some(after) => (last, held, after, rounds),
         // What calibration data alone make of it cannot be simulated: it explains nothing.
         None => (declared.clone(), Vec::new(), search.calibrate(&declared, &[]).ok_or_else(lost)?, Vec::new()),
+    };
+    let led = if held.is_empty() { agreed(&search, &last, &after) } else { None };
+    let (last, after, rounds, allowed) = match led {
+        // Other shapes were allowed beside what it was before.
+        Some((last, after)) => {
+            let rounds = rounds.into_iter().map(|round| round.with(&last)).collect();
+            (last, after, rounds, Vec::new())
+        }
+        None => (last, after, rounds, allowed),
     };
     let ranked = ranking(&rounds, &last);
     let Judgement { verdict, last, held, after, unexplained, note } =

@@ -139,8 +139,9 @@ impl<'a> Search<'a> {
                     break;
                 }
             };
-            growth.step("added", self.unstuck(next));
-            growth.rounds.push(round);
+            let next = self.unstuck(next);
+            growth.rounds.push(round.with(&next));
+            growth.step("added", next);
             // What one effect stood in for may have its place once the next is in.
             while let Some(better) = self.exchange(&growth.last, &mut exchanges, watch) {
                 growth.step("exchanged", better);

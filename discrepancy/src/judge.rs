@@ -52,7 +52,6 @@ pub fn judge<'a>(
     held: Vec<usize>,
     after: Calibrated<'a>,
 ) -> Judgement<'a> {
-    let (last, after) = if held.is_empty() { agreed(search, last, after) } else { (last, after) };
     let (left, note) = if last.fitted.normalised() > UNEXPLAINED { left(&last) } else { (0.0, None) };
     // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
     // little they determine.
@@ -95,14 +94,19 @@ impl<'a> Judgement<'a> {
     }
 }
 
-/// The model fitted to all data from where the fit to calibration data alone ended, where that contradicts it and leads on.
-fn agreed<'a>(search: &Search<'a>, last: Trial<'a>, after: Calibrated<'a>) -> (Trial<'a>, Calibrated<'a>) {
-    if last.added.is_empty() || !contradicts(contradiction(&last, &after), after.unknowns()) {
-        return (last, after);
+/// A model fitted to all data from where its fit to calibration data alone ended, where that contradicts it and leads on, and
+/// that fit again; else none.
+pub fn agreed<'a>(
+    search: &Search<'a>,
+    last: &Trial<'a>,
+    after: &Calibrated<'a>,
+) -> Option<(Trial<'a>, Calibrated<'a>)> {
+    if last.added.is_empty() || !contradicts(contradiction(last, after), after.unknowns()) {
+        return None;
     }
-    let other = search.led_by(&after).filter(|other| other.fitted.chi2 < last.fitted.chi2);
-    let led = other.and_then(|other| Some((search.calibrate(&other, &[])?, other)));
-    led.map_or((last, after), |(after, last)| (last, after))
+    let other = search.led_by(after).filter(|other| other.fitted.chi2 < last.fitted.chi2)?;
+    let after = search.calibrate(&other, &[])?;
+    Some((other, after))
 }
 
 /// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.

@@ -11,22 +11,26 @@ const NEAR: f64 = 0.02;
 /// Fits for an end of an interval.
 const FITS: usize = 8;
 
-/// Iterations of each.
-const ITERATIONS: usize = 12;
+/// Iterations of each: a short fit, in which sizes of steps are looked for briefly.
+const ITERATIONS: usize = 9;
 
 /// How many times farther the next fit is at most where an end is not yet in sight.
 const FARTHER: f64 = 3.0;
 
-/// What was fitted with the unknown held: how far away, in standard errors, what that costs, and the point.
+/// Farthest end of an unknown on a logarithmic scale, as a logarithm.
+const MOST: f64 = 14.0;
+
+/// What was fitted with the unknown held: how far away, in standard errors, the profile t there, and the point.
 struct Held {
     away: f64,
-    cost: f64,
+    t: f64,
     point: Point,
 }
 
 /// The 95 % interval of the global `k`: where the sum of squares, all other unknowns fitted anew, rises by the quantile of
-/// chi-squared, `weight` units of it counted as one; but not nearer than the linearised one ends. `error` is the standard error
-/// with which the search begins; an end that is not found lies at the bound, or where the search ended.
+/// chi-squared, `weight` units of it counted as one; but not nearer than the linearised one ends, in the logarithm where the
+/// unknown has a logarithmic scale. `error` is the standard error with which the search begins; an end that is not found lies at
+/// the bound, or where the search ended.
 ///
 /// Source: D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (Wiley 1988), section 6.1: the profile
 /// t function, right also where the sum of squares is far from a parabola.
@@ -40,44 +44,45 @@ fn end(fit: &Fit<'_>, fitted: &Fitted, k: usize, step: f64, weight: f64) -> f64 
     let value = fitted.point.globals[k];
     let least = fit.total(fitted);
     let place = |away: f64| {
-        let place = if global.log { value * (away * step / value).exp() } else { value + away * step };
+        let place =
+            if global.log { value * (away * step / value).clamp(-MOST, MOST).exp() } else { value + away * step };
         place.clamp(global.bounds[0], global.bounds[1])
     };
     let mut held = fit.clone();
-    let mut cost = |from: &Point, away: f64| -> Option<Held> {
+    let mut at = |from: &Point, away: f64| -> Option<Held> {
         let mut start = from.clone();
         start.globals[k] = place(away);
         held.globals[k].bounds = [start.globals[k]; 2];
         let found = held.solve(start, ITERATIONS)?;
         let rise = (held.total(&found) - least).max(0.0);
-        Some(Held { away, cost: (rise / weight).sqrt(), point: found.point })
+        Some(Held { away, t: (rise / weight).sqrt(), point: found.point })
     };
     // A fit that stops early costs too much: it cannot tell that the end is nearer.
-    let mut inner = Held { away: 0.0, cost: 0.0, point: fitted.point.clone() };
+    let mut inner = Held { away: 0.0, t: 0.0, point: fitted.point.clone() };
     let mut outer: Option<(f64, f64)> = None;
     let mut away = QUANTILE;
     for _ in 0..FITS {
-        match cost(&inner.point, away) {
-            Some(found) if (found.cost - QUANTILE).abs() < NEAR || (away == QUANTILE && found.cost > QUANTILE) => {
-                return place(away);
-            }
-            Some(found) if found.cost < QUANTILE => {
+        match at(&inner.point, away) {
+            Some(found) if (found.t - QUANTILE).abs() < NEAR => return place(away),
+            Some(found) if found.t < QUANTILE => {
                 if place(away) == global.bounds[0] || place(away) == global.bounds[1] {
                     return place(away);
                 }
                 inner = found;
             }
-            Some(found) => outer = Some((found.away, found.cost)),
+            // A fit that stops early, or cannot be simulated, does not tell that the end is nearer than the linear one.
+            _ if away == QUANTILE => return place(away),
+            Some(found) => outer = Some((found.away, found.t)),
             None => outer = Some((away, f64::INFINITY)),
         }
         away = match outer {
-            None => inner.away * (QUANTILE / inner.cost).clamp(1.0 + NEAR, FARTHER),
-            Some((far, cost)) => {
-                let share = (QUANTILE - inner.cost) / (cost - inner.cost);
-                let share = if cost.is_finite() { share.clamp(0.1, 0.9) } else { 0.5 };
+            None => inner.away * (QUANTILE / inner.t).clamp(1.0 + NEAR, FARTHER),
+            Some((far, t)) => {
+                let share = (QUANTILE - inner.t) / (t - inner.t);
+                let share = if t.is_finite() { share.clamp(0.1, 0.9) } else { 0.5 };
                 inner.away + share * (far - inner.away)
             }
         };
     }
-    place(away)
+    place(inner.away)
 }

@@ -20,9 +20,9 @@ pub struct Calibrated<'a> {
     pub tuners: Vec<f64>,
     /// Covariance of these, then of the strengths in the order of [`Calibrated::free`], for residuals of size 1.
     pub covariance: DMatrix<f64>,
-    /// The problem, and its solution.
+    /// The problem of fitting it to calibration data.
     pub fit: Fit<'a>,
-    /// The latter.
+    /// The solution of that.
     pub fitted: Fitted,
     /// Mean square of the residuals on calibration data, at least 1.
     pub square: f64,
@@ -62,10 +62,8 @@ impl<'a> Search<'a> {
         let mut added = trial.added.clone();
         let mut free = Vec::new();
         for (index, a) in added.iter_mut().enumerate() {
+            a.take(index, &variant, &fit, &fitted.point);
             let strengths = a.candidate.effect.strengths();
-            let only = a.candidate.only;
-            let piece = fit.pieces.iter().position(|p| Some(p.measurement) == only).unwrap_or(0);
-            a.strengths = variant.strengths(&fit, &fitted.point, index, strengths.len(), piece);
             let shared = |k: &usize| strengths[*k].scope == mops_core::Scope::Study && !strengths[*k].fixed;
             free.extend((0..strengths.len()).filter(shared).map(|k| (index, k)));
         }

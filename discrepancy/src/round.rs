@@ -55,6 +55,23 @@ fn nearness(best: Option<&Trial<'_>>) -> impl Fn(&Trial<'_>) -> bool + use<> {
     move |trial| least > UNEXPLAINED || trial.fitted.normalised() <= FAR * least
 }
 
+impl<'a> Round<'a> {
+    /// The round with a better fit of one of its models; as it is where it has none with these effects.
+    pub fn with(self: Arc<Self>, better: &Trial<'a>) -> Arc<Self> {
+        let same = |t: &Trial<'a>| {
+            let pairs = t.added.iter().zip(&better.added);
+            t.added.len() == better.added.len() && pairs.into_iter().all(|(a, b)| a.candidate.is(&b.candidate))
+        };
+        let Some(index) = self.trials.iter().position(|t| same(t) && t.fitted.chi2 > better.fitted.chi2) else {
+            return self;
+        };
+        let mut round = Self::clone(&self);
+        round.trials[index] = better.clone();
+        best_first(&mut round.trials);
+        Arc::new(round)
+    }
+}
+
 fn white(count: usize) -> Vec<Vec<f64>> {
     let mut random = stream(0, "white");
     (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()

@@ -349,21 +349,8 @@ fn closer<'a>(a: Option<Trial<'a>>, b: Option<Trial<'a>>) -> Option<Trial<'a>> {
 impl<'a> Trial<'a> {
     /// Takes the strengths from the solution.
     pub(crate) fn read(mut self) -> Self {
-        for (index, a) in self.added.iter_mut().enumerate() {
-            let count = a.candidate.effect.strengths().len();
-            let in_piece = |m: usize| self.fit.pieces.iter().position(|p| p.measurement == m);
-            let (variant, fit, point) = (&self.variant, &self.fit, &self.fitted.point);
-            let piece = a.candidate.only.and_then(in_piece).unwrap_or(0);
-            a.strengths = variant.strengths(fit, point, index, count, piece);
-            let first = variant.first[index] + count;
-            let starts =
-                |piece: usize| fit.parameters(piece, point)[first..][..a.candidate.effect.free_starts()].to_vec();
-            a.starts = fit.pieces.iter().enumerate().map(|(k, piece)| (piece.measurement, starts(k))).collect();
-            for own in &mut a.own {
-                if let Some(piece) = in_piece(own.0) {
-                    own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
-                }
-            }
+        for (index, added) in self.added.iter_mut().enumerate() {
+            added.take(index, &self.variant, &self.fit, &self.fitted.point);
         }
         self
     }

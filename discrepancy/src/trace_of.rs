@@ -60,9 +60,9 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
-/// Largest rate of an input from sample to sample.
+/// Largest slew rate of an input from sample to sample.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn steepest(input: &Input, sample: f64, horizon: f64) -> f64 {
+fn slew_rate(input: &Input, sample: f64, horizon: f64) -> f64 {
     let at = |k: u32| input.at(f64::from(k) * sample);
     (0..(horizon / sample) as u32).map(|k| (at(k + 1) - at(k)).abs() / sample).fold(0.0, f64::max)
 }
@@ -98,7 +98,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 sample,
                 quantum: None,
                 gap: None,
-                fastest: f64::NAN,
+                slew: None,
             }
         }
         Spot::Process(w, s) => {
@@ -118,7 +118,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 sample,
                 quantum: None,
                 gap: None,
-                fastest: f64::NAN,
+                slew: None,
             }
         }
         Spot::Actuator(input) => {
@@ -127,8 +127,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 moments().map(|m| amplitude(m.rates.iter().copied()) / positive(amplitude(m.x.iter().copied())));
             let time = 1.0 / positive(fastest.fold(0.0, f64::max)).clamp(1.0 / record, 1.0 / sample);
             let name = &model.model().interface().inputs[input].name;
-            let steepest =
-                |(i, _): &(usize, Spot)| Some(steepest(pieces[*i].case.input(name)?, sample, pieces[*i].horizon));
+            let slew =
+                |(i, _): &(usize, Spot)| Some(slew_rate(pieces[*i].case.input(name)?, sample, pieces[*i].horizon));
             Sizes {
                 output: value,
                 position: value,
@@ -140,7 +140,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 sample,
                 quantum: None,
                 gap: None,
-                fastest: spots.iter().filter_map(steepest).fold(0.0, f64::max),
+                slew: Some(spots.iter().filter_map(slew).fold(0.0, f64::max)),
             }
         }
         Spot::Sensor(_) => {
@@ -163,7 +163,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 sample,
                 quantum: None,
                 gap: None,
-                fastest: f64::NAN,
+                slew: None,
             }
         }
     };

@@ -30,6 +30,25 @@ pub struct Added {
 }
 
 impl Added {
+    /// Takes what a solution says of the effect `index` of a variant: its strengths, and in the experiments of the fit those of
+    /// its own there and the start values of its states.
+    pub fn take(&mut self, index: usize, variant: &Variant, fit: &Fit<'_>, point: &Point) {
+        let count = self.candidate.effect.strengths().len();
+        let in_piece = |m: usize| fit.pieces.iter().position(|p| p.measurement == m);
+        let piece = self.candidate.only.and_then(in_piece).unwrap_or(0);
+        self.strengths = variant.strengths(fit, point, index, count, piece);
+        let first = variant.first[index] + count;
+        let free = self.candidate.effect.free_starts();
+        let starts = |piece: usize| fit.parameters(piece, point)[first..][..free].to_vec();
+        self.starts.retain(|(measurement, _)| in_piece(*measurement).is_none());
+        self.starts.extend(fit.pieces.iter().enumerate().map(|(k, piece)| (piece.measurement, starts(k))));
+        for own in &mut self.own {
+            if let Some(piece) = in_piece(own.0) {
+                own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
+            }
+        }
+    }
+
     /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the
     /// simpler part of one that was fitted.
     pub fn begun_like(&self, other: &Self) -> Self {
@@ -157,7 +176,7 @@ pub fn problem<'a>(
                 let scale = match strength.trials {
                     // Half way to the next value that was tried.
                     Trials::Steps => 0.5 * a.sizes.gap_to_next_size(value),
-                    Trials::ScaledAndGap(_) => 0.1 * value,
+                    Trials::ScaledAndGap(_) => 0.1 * scale,
                     _ => scale,
                 };
                 all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });

@@ -168,10 +168,10 @@ pub enum Trials {
     WithinAndGap(&'static [f64]),
     /// These multiples of its typical size, and half the width of a gap that samples show at a sensor.
     ScaledAndGap(&'static [f64]),
-    /// These shares of the largest size of a value.
-    Largest(&'static [f64]),
-    /// These shares of the largest rate of a command.
-    Fastest(&'static [f64]),
+    /// These places between the smallest and the largest size of a value, whatever its sign.
+    WithinSize(&'static [f64]),
+    /// These shares of the largest slew rate of a command, then these multiples of its typical size.
+    SlewAndScaled(&'static [f64], &'static [f64]),
     /// These values.
     Plain(&'static [f64]),
     /// These values, then these multiples of its typical size: periods in a turn, and along a rail.

@@ -23,7 +23,7 @@ impl Definition for InputRateLimit {
     const STRENGTHS: &'static [Strength] =
         &[Strength::positive("rate", "largest rate", Dimension::VALUE.over(Dimension::TIME))
             .neutral_at(f64::INFINITY)
-            .tried(Trials::Fastest(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95]))];
+            .tried(Trials::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
     const MEMORY: usize = 2;
     const FREE_START: bool = true;
 

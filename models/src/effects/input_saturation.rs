@@ -22,7 +22,7 @@ impl Definition for InputSaturation {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] = &[Strength::positive("limit", "limit", Dimension::VALUE)
         .neutral_at(f64::INFINITY)
-        .tried(Trials::Largest(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
+        .tried(Trials::WithinSize(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

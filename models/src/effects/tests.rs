@@ -119,9 +119,8 @@ fn first_trials_are_few_and_allowed() {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
                 }
-                Trials::Scaled(values) | Trials::Within(values) | Trials::Largest(values) | Trials::Fastest(values) => {
-                    count *= values.len()
-                }
+                Trials::Scaled(values) | Trials::Within(values) | Trials::WithinSize(values) => count *= values.len(),
+                Trials::SlewAndScaled(shares, multiples) => count *= shares.len() + multiples.len(),
                 Trials::WithinAndGap(values) | Trials::ScaledAndGap(values) => count *= values.len() + 1,
                 Trials::PlainAndScaled(values, multiples) => {
                     assert!(allowed(values), "{}", effect.name());

@@ -122,6 +122,9 @@ fn what_radiates_to_an_input_cools_as_stefan_says() {
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 0.1, 0.0], NOTHING, "h", &times);
     close(&found, &times.map(|t| (1.0 / 27.0 + 0.15 * t).powf(-1.0 / 3.0)), 1e-6);
+    // Fed by as much as it radiates: A T' = u - k ((T + 1)^4 - (u + 1)^4) rests where (T + 1)^4 = (u + 1)^4 + u/k.
+    let found = values(&model, &[2.0, 3.0, 0.1, 1.0], Input::Constant(0.5), "h", &[200.0]);
+    close(&found, &[(1.5_f64.powi(4) + 5.0).powf(0.25) - 1.0], 1e-6);
 }
 
 #[test]
