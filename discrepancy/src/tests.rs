@@ -1,6 +1,7 @@
 //! How a search for missing effects goes wrong, one file for each way, on experiments whose truth is known.
 
 mod absorbed;
+mod candidates;
 mod chance;
 mod correlated;
 mod derivatives;
@@ -17,5 +18,6 @@ mod stability;
 mod starts;
 mod steps;
 mod tangents;
+mod undefined;
 mod unidentified;
 mod untold;

@@ -1,0 +1,68 @@
+//! Where effects are tried, and at which values.
+
+use mops_core::{Dimension, Model, ModelOptions, Trials};
+use mops_models::equations::EquationsOptions;
+
+use crate::candidate::{Candidate, Sizes, candidates};
+use crate::testing::catalogue;
+
+/// Two masses on a spring.
+const COUPLED: &str = r#"
+states     = { x = "m", v = "m/s", y = "m", w = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", k = "N/m" }
+der        = { x = "v", v = "m*v' = u - k*(x - y)", y = "w", w = "m*w' = k*(x - y)" }
+"#;
+
+/// A heated room.
+const ROOM: &str = r#"
+states     = { T = "degC" }
+inputs     = { P = "kW", To = "degC" }
+parameters = { C = "kJ/K", k = "kW/K" }
+der        = { T = "C*T' = P - k*(T - To)" }
+"#;
+
+fn of(text: &str, effect: &str) -> Vec<Candidate> {
+    let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
+    let model: Box<dyn Model> = options.build().expect("it is a model");
+    candidates(&catalogue(&[effect]), model.interface(), &["x".to_owned(), "y".to_owned()], &[0])
+}
+
+#[test]
+fn play_in_a_coupling_is_one_candidate_from_either_end() {
+    assert_eq!(of(COUPLED, "coupling-play").len(), 1);
+    assert_eq!(of(COUPLED, "cross-talk").len(), 2, "what one sensor gets of the other is not what that gets of it");
+}
+
+#[test]
+fn a_room_radiates_to_temperatures_alone() {
+    let all = of(ROOM, "radiation-exchange");
+    let companions: Vec<String> = all.iter().map(|c| c.companion.as_ref().expect("it has one").to_string()).collect();
+    assert_eq!(companions, ["actuator:To"]);
+}
+
+#[test]
+fn limits_and_rates_are_tried_where_the_command_is() {
+    let sizes = |range: [f64; 2], slew: Option<f64>| Sizes {
+        output: 1.0,
+        position: 1.0,
+        speed: 1.0,
+        value: 2.0,
+        time: 0.5,
+        range,
+        record: 10.0,
+        sample: 0.01,
+        quantum: None,
+        gap: None,
+        slew,
+    };
+    let tried = |sizes: Sizes, trials| sizes.values(Dimension::VALUE, trials, [0.0, f64::INFINITY]);
+    let half = Trials::WithinSize(&[0.5]);
+    // Of a command of either sign half its largest size; of one with an offset half of the way that it moves.
+    assert_eq!(tried(sizes([-4.0, 1.0], None), half), [2.0]);
+    assert_eq!(tried(sizes([18.0, 22.0], None), half), [20.0]);
+    assert_eq!(tried(sizes([-22.0, -18.0], None), half), [20.0]);
+    let rates = Trials::SlewAndScaled(&[0.1], &[3.0]);
+    assert_eq!(tried(sizes([0.0, 1.0], Some(50.0)), rates), [5.0, 6.0]);
+    assert_eq!(tried(sizes([0.0, 1.0], None), rates), [6.0]);
+}
