@@ -22,7 +22,7 @@ pub struct Global {
     pub log: bool,
     /// Typical size of a change.
     pub scale: f64,
-    /// Whether it is a size of steps, of which slopes tell nothing.
+    /// Whether slopes tell nothing of it: a size of steps, the width of a gap.
     pub steps: bool,
 }
 

@@ -44,8 +44,8 @@ impl Fit<'_> {
         fitted
     }
 
-    /// A fit with the best size of steps that a compass search finds, the others following to first order: they make up for
-    /// most of a wrong size. `None` where the slopes cannot be had.
+    /// A fit with the best size of steps or width of a gap that a compass search finds, the others following to first order:
+    /// they make up for most of a wrong size. `None` where the slopes cannot be had.
     ///
     /// The share of samples that are a step off, and with it the sum of squares, grows in proportion to the distance from the
     /// true size. Source of the method: T. G. Kolda, R. M. Lewis, V. Torczon, Optimization by direct search, SIAM Review 45
