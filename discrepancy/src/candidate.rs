@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
-use crate::gap::{Gap, gap};
+use crate::gap::Gap;
 use crate::quantum::quantum;
 
 /// An effect at a place.
@@ -158,6 +158,21 @@ pub struct Sizes {
 }
 
 impl Sizes {
+    /// Sizes of which nothing is told.
+    pub const UNTOLD: Self = Self {
+        output: 1.0,
+        position: 1.0,
+        speed: 1.0,
+        value: 1.0,
+        time: 1.0,
+        range: [0.0; 2],
+        record: 1.0,
+        sample: 1.0,
+        quantum: None,
+        gap: None,
+        slew: None,
+    };
+
     /// The typical size of a strength.
     pub fn of(&self, dimension: Dimension) -> f64 {
         let power = |size: f64, n: i8| size.powi(n.into());
@@ -210,10 +225,9 @@ impl Sizes {
         values.into_iter().filter(inside).collect()
     }
 
-    /// The same with what the samples themselves tell: the size of finer steps, and a gap.
-    pub fn told_by(self, samples: &[f64], noise: f64) -> Self {
-        let quantum = quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS));
-        Self { quantum, gap: gap(samples, noise), ..self }
+    /// The size of finer steps, where samples tell it.
+    pub fn quantum_of(&self, samples: &[f64], noise: f64) -> Option<f64> {
+        quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS))
     }
 
     fn largest(&self) -> f64 {

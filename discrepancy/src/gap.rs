@@ -55,5 +55,10 @@ mod tests {
     #[test]
     fn a_motion_without_a_gap_shows_none() {
         assert_eq!(gap(&wave(0.0), NOISE), None);
+        // Samples far apart, each alone; and many between two of them that are not one value.
+        let sparse: Vec<f64> = (0..20).map(|k| 0.05 * f64::from(k)).collect();
+        assert_eq!(gap(&sparse, NOISE), None);
+        let spread: Vec<f64> = (0..40).map(|k| 0.3 + 1e-3 * f64::from(k)).chain([0.0, 1.0]).collect();
+        assert_eq!(gap(&spread, NOISE), None);
     }
 }

@@ -57,7 +57,6 @@ fn end(fit: &Fit<'_>, fitted: &Fitted, k: usize, step: f64, weight: f64) -> f64 
         let rise = (held.total(&found) - least).max(0.0);
         Some(Held { away, t: (rise / weight).sqrt(), point: found.point })
     };
-    // A fit that stops early costs too much: it cannot tell that the end is nearer.
     let mut inner = Held { away: 0.0, t: 0.0, point: fitted.point.clone() };
     let mut outer: Option<(f64, f64)> = None;
     let mut away = QUANTILE;

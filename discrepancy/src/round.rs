@@ -59,8 +59,8 @@ impl<'a> Round<'a> {
     /// The round with a better fit of one of its models; as it is where it has none with these effects.
     pub fn with(self: Arc<Self>, better: &Trial<'a>) -> Arc<Self> {
         let same = |t: &Trial<'a>| {
-            let pairs = t.added.iter().zip(&better.added);
-            t.added.len() == better.added.len() && pairs.into_iter().all(|(a, b)| a.candidate.is(&b.candidate))
+            let mut pairs = t.added.iter().zip(&better.added);
+            t.added.len() == better.added.len() && pairs.all(|(a, b)| a.candidate.is(&b.candidate))
         };
         let Some(index) = self.trials.iter().position(|t| same(t) && t.fitted.chi2 > better.fitted.chi2) else {
             return self;

@@ -181,10 +181,8 @@ fn sizes_for(
     pieces: &[Piece],
     trajectories: &[Trajectory],
 ) -> Option<Sizes> {
-    let asks_samples =
-        |s: &Strength| matches!(s.trials, Trials::Steps | Trials::WithinAndGap(_) | Trials::ScaledAndGap(_));
-    let of_place = if candidate.effect.strengths().iter().any(asks_samples) { sizes_by_samples } else { sizes };
-    let own = of_place(&candidate.port, model, pieces, trajectories)?;
+    let own = sizes(&candidate.port, model, pieces, trajectories)?;
+    let own = sizes_by_samples(own, candidate, model, pieces);
     match (&candidate.port, &candidate.companion) {
         (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {
             let Sizes { position, speed, .. } = sizes(joint, model, pieces, trajectories)?;

@@ -261,20 +261,18 @@ impl<'a> Search<'a> {
     /// A trial over whole records that leaves something, where that is less after a fit in windows, or to calibration data
     /// alone.
     pub fn unstuck(&self, trial: Trial<'a>) -> Trial<'a> {
-        let through_windows = |trial: &Trial<'a>| {
-            let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
-            self.through_windows(&trial.added, tuners)
-        };
-        let through_calibration = |trial: &Trial<'a>| self.led_by(&self.calibrate(trial, &[])?);
-        let mut best = trial;
-        for through in [&through_windows as &dyn Fn(&Trial<'a>) -> Option<Trial<'a>>, &through_calibration] {
-            if best.windows > 1 || best.fitted.normalised() <= UNEXPLAINED {
-                break;
-            }
-            let other = through(&best).filter(|other| other.fitted.chi2 < best.fitted.chi2);
-            best = other.unwrap_or(best);
+        let is_stuck = |trial: &Trial<'a>| trial.windows == 1 && trial.fitted.normalised() > UNEXPLAINED;
+        if !is_stuck(&trial) {
+            return trial;
         }
-        best
+        let tuners = &trial.fitted.point.globals[..self.subject.globals.len()];
+        let through = self.through_windows(&trial.added, tuners);
+        let best = through.filter(|through| through.fitted.chi2 < trial.fitted.chi2).unwrap_or(trial);
+        if !is_stuck(&best) {
+            return best;
+        }
+        let led = self.calibrate(&best, &[]).and_then(|calibrated| self.led_by(&calibrated));
+        led.filter(|led| led.fitted.chi2 < best.fitted.chi2).unwrap_or(best)
     }
 
     /// Fits a variant to all data that may choose.

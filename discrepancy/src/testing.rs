@@ -37,10 +37,15 @@ impl Record {
     }
 }
 
+/// A model by its equations.
+pub fn model(text: &str) -> Arc<dyn Model> {
+    let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
+    Arc::from(options.build().expect("it is a model"))
+}
+
 /// A subject with every parameter of the model unknown, those at the end named in `starts` for each record.
 pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Record>) -> Subject {
-    let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
-    let model: Arc<dyn Model> = Arc::from(options.build().expect("it is a model"));
+    let model = model(text);
     let globals = parameters.len() - starts;
     let tuner = |(k, &start): (usize, &f64)| Tuner {
         name: model.interface().parameters[k].variable.name.clone(),

@@ -1,9 +1,10 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Input, Port};
+use mops_core::{Acting, At, Input, Port, Trials};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
+use crate::gap::gap;
 use crate::trajectory::Trajectory;
 use mops_models::{Moment, WithEffects};
 
@@ -79,6 +80,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
     let sample = sample.fold(f64::INFINITY, f64::min);
     let moments = || spots.iter().flat_map(|(i, _)| trajectories[*i].moments.iter());
     let positive = |x: f64| if x.is_finite() && x > 1e-300 { x } else { 1.0 };
+    let common = Sizes { record, sample, ..Sizes::UNTOLD };
     let sizes = match spots.first()?.1 {
         Spot::Joint(w, q, v) => {
             let inputs = trajectories[0].inputs();
@@ -87,19 +89,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let output = size(accelerations) / positive(mobility);
             let speed = positive(amplitude(moments().map(|m| m.x[v])));
             let position = positive(amplitude(moments().map(|m| m.x[q])));
-            Sizes {
-                output,
-                position,
-                speed,
-                value: 1.0,
-                time: position / speed,
-                range: range(moments().map(|m| m.x[q])),
-                record,
-                sample,
-                quantum: None,
-                gap: None,
-                slew: None,
-            }
+            Sizes { output, position, speed, time: position / speed, range: range(moments().map(|m| m.x[q])), ..common }
         }
         Spot::Process(w, s) => {
             let inputs = trajectories[0].inputs();
@@ -111,14 +101,9 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 output: rate / positive(mobility),
                 position,
                 speed,
-                value: 1.0,
                 time: position / speed,
                 range: range(moments().map(|m| m.x[s])),
-                record,
-                sample,
-                quantum: None,
-                gap: None,
-                slew: None,
+                ..common
             }
         }
         Spot::Actuator(input) => {
@@ -136,11 +121,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 value,
                 time,
                 range: range(moments().map(|m| m.u[input])),
-                record,
-                sample,
-                quantum: None,
-                gap: None,
                 slew: Some(spots.iter().filter_map(slew).fold(0.0, f64::max)),
+                ..common
             }
         }
         Spot::Sensor(_) => {
@@ -159,33 +141,34 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 value,
                 time: value / speed,
                 range: range(values()),
-                record,
-                sample,
-                quantum: None,
-                gap: None,
-                slew: None,
+                ..common
             }
         }
     };
     Some(Sizes { output: positive(sizes.output), ..sizes })
 }
 
-/// The same with what samples tell.
-pub fn sizes_by_samples(
-    place: &Port,
-    model: &WithEffects,
-    pieces: &[Piece],
-    trajectories: &[Trajectory],
-) -> Option<Sizes> {
-    let sizes = sizes(place, model, pieces, trajectories)?;
+/// The same with what samples at a sensor tell of an effect whose strengths ask for it: the size of steps, a gap.
+pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects, pieces: &[Piece]) -> Sizes {
+    let asks = |wanted: fn(Trials) -> bool| candidate.effect.strengths().iter().any(|s| wanted(s.trials));
+    let of_steps = asks(|trials| trials == Trials::Steps);
+    let of_gap = asks(|trials| matches!(trials, Trials::WithinAndGap(_) | Trials::ScaledAndGap(_)));
+    if !(of_steps || of_gap) {
+        return sizes;
+    }
     let (mut samples, mut noise) = (Vec::new(), 0.0_f64);
     for piece in pieces {
-        if let Some(Spot::Sensor(series)) = spot(place, model, piece) {
+        if let Some(Spot::Sensor(series)) = spot(&candidate.port, model, piece) {
             samples.extend_from_slice(&piece.series[series].values);
             noise = noise.max(piece.series[series].noise);
         }
     }
-    Some(if samples.is_empty() { sizes } else { sizes.told_by(&samples, noise) })
+    if samples.is_empty() {
+        return sizes;
+    }
+    let quantum = of_steps.then(|| sizes.quantum_of(&samples, noise)).flatten();
+    let gap = of_gap.then(|| gap(&samples, noise)).flatten();
+    Sizes { quantum, gap, ..sizes }
 }
 
 /// A candidate's place in a piece, and what it sees there.

@@ -1,10 +1,9 @@
 //! Where effects are tried, and at which values.
 
-use mops_core::{Dimension, Model, ModelOptions, Trials};
-use mops_models::equations::EquationsOptions;
+use mops_core::{Dimension, Trials};
 
 use crate::candidate::{Candidate, Sizes, candidates};
-use crate::testing::catalogue;
+use crate::testing::{catalogue, model};
 
 /// Two masses on a spring.
 const COUPLED: &str = r#"
@@ -23,9 +22,7 @@ der        = { T = "C*T' = P - k*(T - To)" }
 "#;
 
 fn of(text: &str, effect: &str) -> Vec<Candidate> {
-    let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
-    let model: Box<dyn Model> = options.build().expect("it is a model");
-    candidates(&catalogue(&[effect]), model.interface(), &["x".to_owned(), "y".to_owned()], &[0])
+    candidates(&catalogue(&[effect]), model(text).interface(), &["x".to_owned(), "y".to_owned()], &[0])
 }
 
 #[test]
@@ -43,19 +40,7 @@ fn a_room_radiates_to_temperatures_alone() {
 
 #[test]
 fn limits_and_rates_are_tried_where_the_command_is() {
-    let sizes = |range: [f64; 2], slew: Option<f64>| Sizes {
-        output: 1.0,
-        position: 1.0,
-        speed: 1.0,
-        value: 2.0,
-        time: 0.5,
-        range,
-        record: 10.0,
-        sample: 0.01,
-        quantum: None,
-        gap: None,
-        slew,
-    };
+    let sizes = |range: [f64; 2], slew: Option<f64>| Sizes { value: 2.0, time: 0.5, range, slew, ..Sizes::UNTOLD };
     let tried = |sizes: Sizes, trials| sizes.values(Dimension::VALUE, trials, [0.0, f64::INFINITY]);
     let half = Trials::WithinSize(&[0.5]);
     // Of a command of either sign half its largest size; of one with an offset half of the way that it moves.

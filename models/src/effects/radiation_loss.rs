@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{ANY, NOT_NEGATIVE};
+use super::terms::{ANY, NOT_NEGATIVE, RADIATION, emission, radiated};
 
 /// `radiation-loss`.
 pub struct RadiationLoss;
@@ -19,16 +19,11 @@ impl Definition for RadiationLoss {
     const NAME: &'static str = "radiation-loss";
     const ABOUT: &'static str = "Heat radiated to the surroundings.";
     const FORMULA: &'static str = "-k ((T + zero)^4 - (around + zero)^4)";
-    const SOURCE: &'static str = "F. P. Incropera, D. P. DeWitt, T. L. Bergman, A. S. Lavine, Fundamentals of Heat and \
-                                  Mass Transfer, 6th edition (Wiley 2007), section 1.2.3";
+    const SOURCE: &'static str = RADIATION;
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive(
-            "k",
-            "emissivity times area times the Stefan-Boltzmann constant",
-            Dimension::OUTPUT.over(Dimension::POSITION.power(4)),
-        ),
+        emission(),
         Strength::shape(
             "around",
             "temperature of the surroundings, as the state counts",
@@ -53,7 +48,6 @@ impl Definition for RadiationLoss {
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        let fourth = |x: S| x * x * x * x;
-        -self.k * (fourth(at.q + self.zero) - fourth(self.around + self.zero))
+        -radiated(self.k, at.q, self.around, self.zero)
     }
 }

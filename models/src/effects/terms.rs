@@ -17,6 +17,25 @@ pub(super) const fn phase() -> Strength {
     Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
 }
 
+/// Where [`radiated`] and [`emission`] come from.
+pub(super) const RADIATION: &str = "F. P. Incropera, D. P. DeWitt, T. L. Bergman, A. S. Lavine, Fundamentals of Heat and \
+                                    Mass Transfer, 6th edition (Wiley 2007), section 1.2.3";
+
+/// How much heat a temperature radiates per difference of fourth powers.
+pub(super) const fn emission() -> Strength {
+    Strength::positive(
+        "k",
+        "emissivity times area times the Stefan-Boltzmann constant",
+        Dimension::OUTPUT.over(Dimension::POSITION.power(4)),
+    )
+}
+
+/// The heat that is radiated at a temperature to another one; `zero` makes them absolute.
+pub(super) fn radiated<S: Scalar>(k: S, temperature: S, around: S, zero: S) -> S {
+    let fourth = |x: S| x * x * x * x;
+    k * (fourth(temperature + zero) - fourth(around + zero))
+}
+
 /// The longest step within which the explicit method damps what decays in a time: at rest no error would tell it to keep to
 /// that, and tangents would grow. Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
 /// section IV.2: to 3.3 of these times along the real axis, to 1 along the imaginary one.

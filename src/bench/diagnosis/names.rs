@@ -1,5 +1,6 @@
 //! What the test bed and the catalogue call the same things.
 
+use mops_models::effects::effects;
 use mops_testbed::TrueEffect;
 
 /// Kinds of effect in the catalogue that are this effect of the test bed.
@@ -11,14 +12,15 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
         "cubic-damping" => vec!["cubic-drag"],
         "hidden-thermal-mass" => vec!["hidden-store"],
         "constant-heat-gain" => vec!["constant-force"],
-        // The same formula, for angles and for lengths.
-        "cogging" => vec!["cogging", "position-ripple"],
-        "radiation-loss" => vec!["radiation-loss", "radiation-exchange"],
-        // Of a gear, of a coupling of two joints, of a spring.
-        "backlash" => vec!["backlash", "coupling-play", "spring-play"],
         "sensor-dead-zone" if told(strengths, "shifts") == 0.0 => vec!["sensor-gap"],
         "overflow" if told(strengths, "share") > 0.0 => vec!["spill-over"],
-        same => vec![same],
+        // Here the test bed tells which form it is.
+        "sensor-dead-zone" | "overflow" => vec![class],
+        same => {
+            let forms =
+                effects().into_iter().filter(|effect| effect.form_of() == Some(same)).map(|effect| effect.name());
+            std::iter::once(same).chain(forms).collect()
+        }
     }
 }
 
@@ -93,7 +95,7 @@ mod tests {
     /// Names of strengths that the catalogue does not have would never be compared.
     #[test]
     fn every_effect_and_every_strength_of_the_test_bed_is_in_the_catalogue() {
-        let catalogue = mops_models::effects::effects();
+        let catalogue = effects();
         for effect in mops_testbed::effects() {
             for value in [0.0, 1.0] {
                 let told = ["shifts", "share"].map(|name| (name.to_owned(), value));
