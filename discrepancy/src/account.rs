@@ -12,7 +12,7 @@ use crate::screen::Screened;
 use crate::search::Trial;
 use crate::stability::stability;
 use crate::subject::Subject;
-use crate::weigh::{CLEARLY, Dispersion, criterion, probabilities, weighed};
+use crate::weigh::{CLEARLY, Dispersion, criterion, needed_gain, probabilities, weighed};
 
 /// Candidates by probability: those found first, then what else was fitted in each round.
 pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
@@ -83,7 +83,6 @@ pub fn found(
     after: &Calibrated<'_>,
     rounds: &[Arc<Round<'_>>],
     ranking: &[Ranked],
-    dispersion: &Dispersion,
 ) -> Found {
     let a = &last.added[index];
     let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
@@ -130,7 +129,7 @@ pub fn found(
         only: a.candidate.only.map(|only| last.fit.subject.measurements[only].name.clone()),
         class: effect.class().name().to_owned(),
         formula: effect.formula().to_owned(),
-        strengths: after.strengths(index, &last.variant, dispersion.repeats),
+        strengths: after.strengths(index, &last.variant),
         probability: own.map_or(1.0, |r| r.probability),
         bic_gain: own.map_or(f64::NAN, |r| r.bic_gain),
         indistinguishable: rivals,
@@ -140,9 +139,9 @@ pub fn found(
 }
 
 /// Widens the intervals of strengths to those of another model with the same effects that the data allow as well.
-pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>, repeats: f64) {
+pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>) {
     for (index, found) in found.iter_mut().enumerate() {
-        let theirs = other.strengths(index, &last.variant, repeats);
+        let theirs = other.strengths(index, &last.variant);
         let strengths = last.added[index].candidate.effect.strengths();
         for ((own, theirs), strength) in found.strengths.iter_mut().zip(theirs).zip(strengths) {
             // What no fit moves has no interval of its own.
@@ -173,8 +172,9 @@ pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<Str
 }
 
 /// The smallest strengths that would have been noticed, of the effects whose size is one number.
-pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject) -> Vec<Noticeable> {
+pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject, level: f64) -> Vec<Noticeable> {
     let Some(round) = rounds.first() else { return Vec::new() };
+    let needed = (needed_gain(level, round.directions) * Dispersion::of(&round.from).weight()).sqrt();
     let one = |s: &Screened| {
         let candidate = &s.added.candidate;
         let strength = &candidate.effect.strengths()[0];
@@ -185,7 +185,7 @@ pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject) -> Vec<Noticeabl
             place: candidate.place(),
             strength: StrengthValue {
                 name: strength.name.to_owned(),
-                value: s.noticed.filter(|n| n.is_finite())?,
+                value: s.unit_gain.filter(|n| n.is_finite())? * needed,
                 unit: candidate.unit(strength, &parameter.variable.unit),
                 std_error: None,
                 interval95: None,
@@ -200,7 +200,7 @@ pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject) -> Vec<Noticeabl
 pub fn moves(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>) -> Vec<ParameterMove> {
     let one = |(k, &tuner): (usize, &usize)| {
         let tuner = &subject.study.tuners[tuner];
-        let variance = after.covariance[(k, k)] * after.square;
+        let variance = after.covariance[(k, k)];
         ParameterMove {
             name: tuner.name.clone(),
             unit: tuner.unit.to_string(),

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::base;
 use crate::candidate::candidates;
+use crate::fit::Point;
 use crate::screen::{Scene, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, problem};
@@ -61,7 +62,8 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
         .map(|candidate| {
             let (fit, start, _) = of(std::slice::from_ref(&candidate.added));
             let fitted = fit.solve(start, ITERATIONS)?;
-            let more = fitted.point.globals.len() - declared.point.globals.len();
+            let unknowns = |point: &Point| point.globals.len() + point.locals.iter().map(Vec::len).sum::<usize>();
+            let more = unknowns(&fitted.point) - unknowns(&declared.point);
             Some(fitted.chi2 - declared.chi2 + more as f64 * (fitted.count as f64).ln())
         })
         .collect();

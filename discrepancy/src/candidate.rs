@@ -62,7 +62,7 @@ impl Candidate {
         self.effect.act(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
     }
 
-    /// Its place as results spell it. What an equation of its own gains is a process only where it is no joint.
+    /// Its place as results spell it, `kind:name`.
     pub fn place(&self) -> String {
         self.port.to_string()
     }
@@ -126,6 +126,10 @@ const MOST_STEPS: u32 = 24;
 
 /// The finest steps, in units of the noise, that samples tell: there the mean cosine is `exp(-2 pi^2/5^2)`, 0.45.
 const NOISES_PER_STEP: f64 = 5.0;
+
+/// Frequencies tried from one number of periods in the record to the next, and most periods.
+const PER_PERIOD: f64 = 1.5;
+const MOST_PERIODS: f64 = 160.0;
 
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
@@ -208,10 +212,10 @@ impl Sizes {
                 let least = if crosses { 0.0 } else { self.range[0].abs().min(self.range[1].abs()) };
                 shares.iter().map(|s| least + s * (self.largest() - least)).collect()
             }
-            Trials::Plain(values) => values.to_vec(),
+            Trials::Plain(values) | Trials::Jumps(values) => values.to_vec(),
             Trials::Frequencies => {
-                let step = std::f64::consts::TAU / (1.5 * self.record);
-                let highest = (0.5 * std::f64::consts::PI / self.sample).min(120.0 * step);
+                let step = std::f64::consts::TAU / (PER_PERIOD * self.record);
+                let highest = (0.5 * std::f64::consts::PI / self.sample).min(PER_PERIOD * MOST_PERIODS * step);
                 (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
             }
             Trials::Steps => {

@@ -16,7 +16,6 @@ use crate::screen::Scene;
 use crate::search::{Limits, Search};
 use crate::stopgap::is_table;
 use crate::subject::Subject;
-use crate::weigh::Dispersion;
 
 /// What a diagnosis is asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,16 +88,15 @@ pub fn diagnose(
         judge(&search, &base, &located, last, held, after);
 
     draw(&mut located, &last);
-    let dispersion = Dispersion::of(&last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
-    let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked, &dispersion)).collect();
+    let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked)).collect();
     if verdict == Verdict::Effect {
         // Without the declared terms that went.
         let allowed = allowed.into_par_iter().filter_map(|mut trial| {
             held.iter().for_each(|&k| trial.fitted.point.globals[k] = last.fitted.point.globals[k]);
             search.calibrate(&trial, &held)
         });
-        allowed.collect::<Vec<_>>().iter().for_each(|other| widen(&mut found, other, &last, dispersion.repeats));
+        allowed.collect::<Vec<_>>().iter().for_each(|other| widen(&mut found, other, &last));
     }
     let probability = match verdict {
         // Nothing at all was weighed among the others.
@@ -119,7 +117,7 @@ pub fn diagnose(
         before: search.errors(&before),
         after: search.errors(&after),
         parameters: moves(&subject, &before, &after),
-        noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject) } else { Vec::new() },
+        noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject, options.level) } else { Vec::new() },
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
         notes: subject.notes.iter().cloned().chain(note).collect(),

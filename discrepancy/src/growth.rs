@@ -180,7 +180,13 @@ impl<'a> Search<'a> {
                 growth.step("one for two", one);
                 growth.rounds.insert(0, round);
             }
-            if growth.last.added.len() < 2 || growth.last.windows > 1 {
+            let is_settled = match growth.last.added.len() {
+                0 => true,
+                // The round weighed it as white residuals do.
+                1 => Dispersion::of(&growth.last).repeats == 1.0,
+                _ => false,
+            };
+            if is_settled || growth.last.windows > 1 {
                 break;
             }
             watch.stage("each effect against its rivals", 0.81 + 0.03 * f64::from(settling));

@@ -1,12 +1,13 @@
 //! What the samples of a channel tell before any model is looked at: their noise, and samples that stand alone.
 
 /// Standard deviation of the noise of a channel, without a model: from what local parabolas over seven samples leave, by the
-/// median absolute deviation, so that a few jumps do not count.
+/// median absolute deviation, so that a few jumps do not count. `None` where fewer samples, or samples that never change, tell
+/// nothing of it.
 ///
 /// Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression,
 /// Biometrika 73 (1986) 625; P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4 (1.4826).
 #[allow(clippy::cast_precision_loss)]
-pub fn noise_of(times: &[f64], values: &[f64]) -> f64 {
+pub fn noise_of(times: &[f64], values: &[f64]) -> Option<f64> {
     let mut left: Vec<f64> = (3..values.len().saturating_sub(3))
         .filter_map(|i| {
             let x: Vec<f64> = (i - 3..=i + 3).map(|k| times[k] - times[i]).collect();
@@ -15,17 +16,15 @@ pub fn noise_of(times: &[f64], values: &[f64]) -> f64 {
             Some((values[i] - predicted).abs() / (1.0 + leverage).sqrt())
         })
         .collect();
-    if left.is_empty() {
-        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let power = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64;
-        return power.sqrt().max(f64::MIN_POSITIVE);
-    }
     left.sort_by(f64::total_cmp);
-    let median = left[left.len() / 2];
+    let median = left.get(left.len() / 2)?;
     // Coarse quantisation leaves many exact zeros: then the root mean square says more.
     let rms = (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt();
     let robust = 1.4826 * median;
-    if robust > 0.1 * rms { robust } else { rms.max(f64::MIN_POSITIVE) }
+    let noise = if robust > 0.1 * rms { robust } else { rms };
+    // What rounding leaves of a constant is none.
+    let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    (noise > 1e-12 * largest).then_some(noise)
 }
 
 /// The value at 0 of the parabola through the chosen samples, and the sum of the squares of the weights that give it.
@@ -88,7 +87,7 @@ mod tests {
     #[test]
     fn the_noise_on_a_sine_is_found() {
         let (times, values) = samples(0.02);
-        let noise = noise_of(&times, &values);
+        let noise = noise_of(&times, &values).expect("samples tell it");
         assert!((noise - 0.02).abs() < 0.005, "{noise}");
     }
 
@@ -101,5 +100,11 @@ mod tests {
         values[200] -= 0.5;
         values[300..].iter_mut().for_each(|v| *v += 0.5);
         assert_eq!(without_spikes(&times, &values, 0.001).2, 0);
+    }
+
+    #[test]
+    fn few_samples_and_samples_that_never_change_tell_no_noise() {
+        let (times, values) = samples(0.02);
+        assert!(noise_of(&times[..6], &values[..6]).is_none() && noise_of(&times, &[1.5; 400]).is_none());
     }
 }

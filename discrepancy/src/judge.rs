@@ -76,9 +76,12 @@ pub fn judge<'a>(
 impl<'a> Judgement<'a> {
     /// Puts a table at a place in, alone, where that is better.
     fn stand_in(&mut self, search: &Search<'a>, base: &Trial<'a>, place: &Located) -> Option<()> {
-        let (table, found) = stopgap(search, base, place)?;
+        let (table, mut found) = stopgap(search, base, place)?;
         let table = search.over_whole(&table)?;
         let calibrated = search.calibrate(&table, &[])?;
+        for (point, value) in found.table.iter_mut().zip(&calibrated.added.last()?.strengths) {
+            point[1] = *value;
+        }
         let now = forecast(&self.after, search.subject);
         let better = if self.last.added.is_empty() {
             table.fitted.chi2 < self.last.fitted.chi2
@@ -114,7 +117,7 @@ fn contradiction(last: &Trial<'_>, after: &Calibrated<'_>) -> f64 {
     let own = |measurement: usize| last.fit.subject.measurements[measurement].role == Role::Calibration;
     let together = last.fit.pieces.iter().zip(&last.fitted.residuals).filter(|(piece, _)| own(piece.measurement));
     let together: f64 = together.map(|(_, residuals)| dot(residuals, residuals)).sum();
-    (together - after.fitted.chi2) / after.square
+    (together - after.fitted.chi2) / after.dispersion.weight()
 }
 
 /// Whether a rise of the sum of squares over calibration data is more than the unknowns of a right model make it: at most a

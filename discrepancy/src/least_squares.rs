@@ -281,15 +281,17 @@ impl Fit<'_> {
         free.iter().enumerate().map(spared).sum()
     }
 
-    /// Inverse of the normal matrix over the globals, the locals eliminated: the covariance for white residuals of size 1; 0
-    /// for what stands at a bound against which the data press it, and where the slopes cannot be had.
-    pub fn covariance(&self, fitted: &Fitted) -> DMatrix<f64> {
+    /// Covariance of the globals, the locals eliminated, where `weight` units of the sum of squares count as one: the inverse of
+    /// the normal matrix over that, with what the bounds say; 0 for what stands at a bound against which the data press it, and
+    /// where the slopes cannot be had.
+    pub fn covariance(&self, fitted: &Fitted, weight: f64) -> DMatrix<f64> {
         let g = self.globals.len();
         let mut covariance = DMatrix::zeros(g, g);
         let Some(normal) = self.normal_at(fitted) else { return covariance };
         let stretch = |k: usize| self.stretch(k, fitted.point.globals[k]);
         let inverse = |free: &[usize]| {
-            let mut matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])]);
+            let mut matrix =
+                DMatrix::from_fn(free.len(), free.len(), |i, j| normal.matrix[(free[i], free[j])] / weight);
             // What the data do not tell is still known to lie between the bounds: uniform there.
             for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
                 let [low, high] = self.globals[k].bounds;
@@ -303,7 +305,7 @@ impl Fit<'_> {
         let pinned = |k: usize| k < g && self.globals[k].is_pinned();
         let all: Vec<usize> = (0..held.len()).filter(|&k| !pinned(k)).collect();
         let whole = inverse(&all);
-        let wanted = -(&whole * DVector::from_fn(all.len(), |i, _| normal.gradient[all[i]]));
+        let wanted = -(&whole * DVector::from_fn(all.len(), |i, _| normal.gradient[all[i]] / weight));
         // What would move beyond its bound by less than the data tell is not held by it, nor is what goes with it.
         for (i, &k) in all.iter().enumerate() {
             held[k] &= wanted[i].abs() > BEYOND * whole[(i, i)].sqrt();

@@ -3,7 +3,7 @@
 use crate::fit::{Fit, Fitted, Point};
 
 /// Standard normal quantile at 0.975.
-const QUANTILE: f64 = 1.959_964;
+pub const QUANTILE: f64 = 1.959_964;
 
 /// How near to the quantile an end of an interval is.
 const NEAR: f64 = 0.02;

@@ -14,6 +14,9 @@ impl<'a> Search<'a> {
 
     /// The trial without effects that the others make superfluous; `None` where each is needed.
     pub fn pruned(&self, trial: &Trial<'a>, level: f64) -> Option<Trial<'a>> {
+        /// Directions in which chance may look for a second effect beside a first that explains most: fewer than all, as
+        /// what is left out here was chosen among all before.
+        const DIRECTIONS: f64 = 30.0;
         let mut pruned: Option<Trial<'a>> = None;
         let mut index = 0;
         loop {
@@ -23,7 +26,7 @@ impl<'a> Search<'a> {
             }
             let superfluous = |without: &Trial<'a>| {
                 let loss = (without.fitted.chi2 - last.fitted.chi2) / Dispersion::of(last).weight();
-                by_chance(loss, 30.0) > level
+                by_chance(loss, DIRECTIONS) > level
             };
             match self.without(last, index).filter(superfluous) {
                 Some(without) => (pruned, index) = (Some(without), 0),
@@ -34,18 +37,18 @@ impl<'a> Search<'a> {
 
     /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that
     /// may be zero, and are no larger than their uncertainty.
-    #[allow(clippy::cast_precision_loss)]
     pub fn without_declared(&self, trial: Trial<'a>) -> (Trial<'a>, Vec<usize>) {
         let mut held = Vec::new();
         let mut trial = trial;
         if trial.added.is_empty() {
             return (trial, held);
         }
-        let mut covariance = trial.fit.covariance(&trial.fitted);
+        let covariance = |trial: &Trial<'_>| trial.fit.covariance(&trial.fitted, Dispersion::of(trial).weight());
+        let mut errors = covariance(&trial);
         for k in 0..self.subject.globals.len() {
             let global = &trial.fit.globals[k];
             let value = trial.fitted.point.globals[k];
-            let error = covariance[(k, k)].max(0.0).sqrt();
+            let error = errors[(k, k)].max(0.0).sqrt();
             let at_least = value <= global.bounds[0] * (1.0 + 1e-9);
             let [low, high] = global.bounds;
             let zero = (low <= 0.0 && high >= 0.0) || (global.log && low > 0.0);
@@ -58,12 +61,12 @@ impl<'a> Search<'a> {
             let all: Vec<usize> = held.iter().copied().chain([k]).collect();
             let made = problem(self.subject, &trial.added, own, &tuners, locals, &all, self.simulations);
             let Some(fitted) = made.0.solve(made.1, 40) else { continue };
-            let weight = Dispersion::of(&trial).weight();
-            if (fitted.chi2 - trial.fitted.chi2) / weight < (fitted.count as f64).ln() {
+            let of = Dispersion::of(&trial);
+            if (fitted.chi2 - trial.fitted.chi2) / of.weight() < of.worth(fitted.count) {
                 held = all;
                 let (added, windows) = (trial.added.clone(), trial.windows);
                 trial = Trial { added, windows, fit: made.0, variant: made.2, fitted }.read();
-                covariance = trial.fit.covariance(&trial.fitted);
+                errors = covariance(&trial);
             }
         }
         (trial, held)

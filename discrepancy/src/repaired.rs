@@ -6,10 +6,11 @@ use nalgebra::DMatrix;
 use crate::base;
 use crate::diagnosis::{ExperimentError, StrengthValue};
 use crate::fit::{Fit, Fitted, Point};
-use crate::profile::interval95;
+use crate::profile::{QUANTILE, interval95};
 use crate::search::{ASTRAY, Search, Trial};
 use crate::subject::Measurement;
 use crate::variant::{Added, Variant, problem};
+use crate::weigh::Dispersion;
 use crate::windows::whole;
 
 /// A model that was fitted to calibration data alone, and its predictions everywhere.
@@ -18,14 +19,14 @@ pub struct Calibrated<'a> {
     pub added: Vec<Added>,
     /// Values of the tuners of the study.
     pub tuners: Vec<f64>,
-    /// Covariance of these, then of the strengths in the order of [`Calibrated::free`], for residuals of size 1.
+    /// Covariance of these, then of the strengths in the order of [`Calibrated::free`].
     pub covariance: DMatrix<f64>,
     /// The problem of fitting it to calibration data.
     pub fit: Fit<'a>,
     /// The solution of that.
     pub fitted: Fitted,
-    /// Mean square of the residuals on calibration data, at least 1.
-    pub square: f64,
+    /// What is left of calibration data.
+    pub dispersion: Dispersion,
     /// For each strength that was fitted the effect and its index there.
     pub free: Vec<(usize, usize)>,
     /// For each experiment: predicted outputs by series, and the values of the model's locals.
@@ -68,9 +69,8 @@ impl<'a> Search<'a> {
             free.extend((0..strengths.len()).filter(shared).map(|k| (index, k)));
         }
         let tuners = fitted.point.globals[..subject.globals.len()].to_vec();
-        #[allow(clippy::cast_precision_loss)]
-        let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
-        let enough = ASTRAY * square.sqrt();
+        let dispersion = Dispersion::left(&fit, &fitted);
+        let enough = ASTRAY * dispersion.square.sqrt();
         let mut experiments = Vec::new();
         for (index, measurement) in subject.measurements.iter().enumerate() {
             let known = fit.pieces.iter().position(|p| p.measurement == index);
@@ -79,8 +79,8 @@ impl<'a> Search<'a> {
                 None => self.forecast(&added, &tuners, index, of_trial(index, measurement.locals.len()), enough)?,
             });
         }
-        let covariance = fit.covariance(&fitted);
-        Some(Calibrated { added, tuners, covariance, fit, fitted, square, free, experiments })
+        let covariance = fit.covariance(&fitted, dispersion.weight());
+        Some(Calibrated { added, tuners, covariance, fit, fitted, dispersion, free, experiments })
     }
 
     /// Start values of an experiment with everything else held, and what the model then says; `enough` is what it may leave.
@@ -145,28 +145,25 @@ impl Calibrated<'_> {
         measurements.iter().zip(&self.experiments).map(error).collect()
     }
 
-    /// The strengths of an effect, with what the data say of them; `repeats` samples are worth one.
-    pub fn strengths(&self, index: usize, variant: &Variant, repeats: f64) -> Vec<StrengthValue> {
+    /// The strengths of an effect, with what the data say of them.
+    pub fn strengths(&self, index: usize, variant: &Variant) -> Vec<StrengthValue> {
         let a = &self.added[index];
         let parameters = &mops_core::Model::interface(variant.model.as_ref()).parameters;
         let one = |(k, strength): (usize, &mops_core::Strength)| {
             let place = self.free.iter().position(|&f| f == (index, k)).map(|place| self.tuners.len() + place);
-            let weight = self.square * repeats;
-            let error = |place: usize| (self.covariance[(place, place)] * weight).sqrt();
-            let known = place.map(|place| (place, error(place))).filter(|(_, e)| e.is_finite() && *e > 0.0);
-            let profile = |(place, error): (usize, f64)| {
-                if self.fit.globals[place].steps {
-                    let [low, high] = strength.bounds;
-                    return [-1.96, 1.96].map(|z| (a.strengths[k] + z * error).clamp(low, high));
-                }
-                interval95(&self.fit, &self.fitted, place, error, weight)
-            };
+            let error = |place: usize| self.covariance[(place, place)].sqrt();
+            let by_steps = place.filter(|&place| self.fit.globals[place].is_stepped());
+            let known = place.filter(|_| by_steps.is_none()).map(|place| (place, error(place)));
+            let known = known.filter(|(_, e)| e.is_finite() && *e > 0.0);
+            let weight = self.dispersion.weight();
+            let profile = |(place, error)| interval95(&self.fit, &self.fitted, place, error, weight);
+            let scan = |place| self.fit.stepped_interval(&self.fitted, place, QUANTILE * QUANTILE * weight);
             StrengthValue {
                 name: strength.name.to_owned(),
                 value: a.strengths[k],
                 unit: a.candidate.unit(strength, &parameters[variant.first[index] + k].variable.unit),
                 std_error: known.map(|(_, error)| error),
-                interval95: known.map(profile),
+                interval95: known.map(profile).or_else(|| scan(by_steps?)),
             }
         };
         a.candidate.effect.strengths().iter().enumerate().map(one).collect()

@@ -98,7 +98,7 @@ impl<'a> Search<'a> {
         let (independent, screened) = (screening.independent(), screening.screened);
         let gaining = screened.iter().take_while(|s| s.gain > 0.0).count();
         let mut chosen: Vec<usize> = (0..gaining.min(self.limits.refits)).collect();
-        // Of every place the best, so that no place is lost for a bad linearisation.
+        // Of every place the best, as long as they are few, so that no place is lost for a bad linearisation.
         for (i, s) in screened.iter().enumerate().take(gaining) {
             let same = |k: &usize| screened[*k].added.candidate.port == s.added.candidate.port;
             if chosen.len() < 2 * self.limits.refits

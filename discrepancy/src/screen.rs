@@ -27,9 +27,6 @@ pub struct Scene {
     pub slopes: Vec<Residuals>,
 }
 
-/// Fall of the sum of squares at which an effect is noticed among all that are tried: about one chance in a hundred.
-const NOTICED: f64 = 21.0;
-
 /// Other values of shapes that no fit moves, or hardly, are fitted too: so many, of which the gain is at least this share of
 /// the best.
 const OTHERS: usize = 2;
@@ -50,8 +47,8 @@ pub struct Screened {
     pub pull: f64,
     /// Whether it has one sign only.
     pub one_sided: bool,
-    /// The smallest first strength that would have been noticed, where what it adds is proportional to it.
-    pub noticed: Option<f64>,
+    /// The first strength that lowers the sum of squares by one, where what it adds is proportional to it.
+    pub unit_gain: Option<f64>,
     /// Its trace with that taken out, of length 1.
     pub direction: Vec<f64>,
     /// Directions that were looked in, as many as independent ones: neighbouring shapes look alike.
@@ -145,7 +142,8 @@ impl Screening {
     #[allow(clippy::cast_precision_loss)]
     pub fn independent(&self) -> Option<f64> {
         let logarithms: f64 = self.by_chance.iter().map(|gain| (-(-0.5 * gain).exp()).ln_1p()).sum();
-        (logarithms < 0.0).then(|| -(self.by_chance.len() as f64) / logarithms)
+        // At least one: where all signs are wrong, draws gain nothing.
+        (logarithms < 0.0).then(|| (-(self.by_chance.len() as f64) / logarithms).max(1.0))
     }
 }
 
@@ -296,7 +294,7 @@ fn best_of(
             continue;
         }
         let mut strengths = group[0].clone();
-        let noticed = is_linear(first).then(|| strengths[0].abs() * (NOTICED / left.rest).sqrt());
+        let unit_gain = is_linear(first).then(|| strengths[0].abs() / left.rest.sqrt());
         if is_linear(first) && factor != 0.0 {
             strengths[0] *= factor;
         }
@@ -319,7 +317,7 @@ fn best_of(
             absorbed: 1.0 - left.rest / left.size,
             pull: along / length,
             one_sided: !is_linear(first) || first.bounds[0] >= 0.0,
-            noticed,
+            unit_gain,
             direction: left.trace.iter().map(|l| l / length).collect(),
             directions: (combinations.len() as f64).sqrt().max(f64::from(periods) / 2.0),
         };

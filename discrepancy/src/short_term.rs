@@ -34,7 +34,7 @@ impl Search<'_> {
         }
         let windows = cut(index, measurement, self.subject.model.as_ref(), count);
         let mut squares = vec![(0.0, 0_usize); measurement.series.len()];
-        let enough = ASTRAY * model.square.sqrt();
+        let enough = ASTRAY * model.dispersion.square.sqrt();
         for (k, window) in windows.iter().enumerate() {
             let first = window.locals.iter().map(|local| local.start).collect();
             // The first begins as the record does.

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::fit::{Fit, Fitted, Residuals, Slopes};
+use crate::fit::{Fit, Fitted, Global, Residuals, Slopes};
 use crate::least_squares::{damped_step, sum_of_squares};
 
 /// How thoroughly sizes are looked for.
@@ -60,23 +60,7 @@ impl Fit<'_> {
                 break;
             }
             let stride = global.scale * 0.5_f64.powi(halvings);
-            let beside = |by: f64| {
-                let mut point = best.point.clone();
-                point.globals[k] = (point.globals[k] + by).clamp(global.bounds[0], global.bounds[1]);
-                let residuals = self.all(&point)?.into_iter().zip(&slopes);
-                let all = residuals.map(|(r, slopes)| Residuals { r, j: slopes.j.clone() }).collect();
-                let normal = self.equations(&point, all);
-                let step = damped_step(&normal, &self.held_by_slopes(&point, &normal.gradient), 1e-3)?;
-                let point = self.moved(&point, &step);
-                let residuals = self.all(&point)?;
-                Some(Fitted {
-                    point,
-                    chi2: sum_of_squares(&residuals),
-                    residuals,
-                    normal: OnceLock::new(),
-                    count: best.count,
-                })
-            };
+            let beside = |by: f64| self.beside(&best, &slopes, k, by);
             let better = |fitted: &Fitted| fitted.chi2 < best.chi2;
             match [stride, -stride].into_iter().find_map(|by| beside(by).filter(better)) {
                 Some(moved) => best = moved,
@@ -84,5 +68,53 @@ impl Fit<'_> {
             }
         }
         Some(best)
+    }
+
+    /// The fit with the global `k` moved, the others following to first order; `slopes` are those where the search began.
+    fn beside(&self, fitted: &Fitted, slopes: &[Residuals], k: usize, by: f64) -> Option<Fitted> {
+        let [low, high] = self.globals[k].bounds;
+        let mut point = fitted.point.clone();
+        point.globals[k] = (point.globals[k] + by).clamp(low, high);
+        let residuals = self.all(&point)?.into_iter().zip(slopes);
+        let all = residuals.map(|(r, slopes)| Residuals { r, j: slopes.j.clone() }).collect();
+        let normal = self.equations(&point, all);
+        let step = damped_step(&normal, &self.held_by_slopes(&point, &normal.gradient), 1e-3)?;
+        let point = self.moved(&point, &step);
+        let residuals = self.all(&point)?;
+        let chi2 = sum_of_squares(&residuals);
+        Some(Fitted { point, chi2, residuals, normal: OnceLock::new(), count: fitted.count })
+    }
+
+    /// The interval around the global `k`, which no slope tells, beyond which the sum of squares is larger by `rise`, the others
+    /// following to first order: its ends by strides that double, then by bisection. `None` where the slopes cannot be had.
+    pub(crate) fn stepped_interval(&self, fitted: &Fitted, k: usize, rise: f64) -> Option<[f64; 2]> {
+        const DOUBLINGS: i32 = 16;
+        const BISECTIONS: usize = 6;
+        let slopes = self.looks(&fitted.point, Slopes::Free)?;
+        let Global { scale, bounds, .. } = self.globals[k];
+        let value = fitted.point.globals[k];
+        let is_within =
+            |by: f64| self.beside(fitted, &slopes, k, by).is_some_and(|there| there.chi2 <= fitted.chi2 + rise);
+        let end = |side: f64| {
+            let (mut inner, mut outer) = (0.0, f64::INFINITY);
+            for doubling in -THOROUGH.halvings..=DOUBLINGS - THOROUGH.halvings {
+                let by = side * scale * 2.0_f64.powi(doubling);
+                if !is_within(by) {
+                    outer = by;
+                    break;
+                }
+                inner = by;
+                if value + by <= bounds[0] || value + by >= bounds[1] {
+                    break;
+                }
+            }
+            for _ in 0..if outer.is_finite() { BISECTIONS } else { 0 } {
+                let by = 0.5 * (inner + outer);
+                *(if is_within(by) { &mut inner } else { &mut outer }) = by;
+            }
+            // What lies between is not known to be within.
+            (value + if outer.is_finite() { outer } else { inner }).clamp(bounds[0], bounds[1])
+        };
+        Some([end(-1.0), end(1.0)])
     }
 }

@@ -115,8 +115,13 @@ impl Subject {
                 let signals = &model.interface().signals;
                 let signal = signals.iter().position(|s| s.name == channel.signal).expect("checked by the study");
                 let estimate = noise_of(&channel.times, &channel.values);
-                let noise = channel.noise.unwrap_or(estimate);
-                let (times, values, dropped) = without_spikes(&channel.times, &channel.values, noise.max(estimate));
+                let noise = channel.noise.or(estimate).ok_or_else(|| {
+                    let fact = "too few samples, or samples that never change, tell nothing of the noise";
+                    Mistake::new(format!("experiments.{}.channels.{}", case.name, channel.signal), fact)
+                        .with_help("give its `noise`, the standard deviation")
+                })?;
+                let largest = estimate.map_or(noise, |estimate| noise.max(estimate));
+                let (times, values, dropped) = without_spikes(&channel.times, &channel.values, largest);
                 if dropped > 0 {
                     notes.push(format!(
                         "{dropped} samples of `{}` in `{}` stand alone, far from their neighbours, and are left out",

@@ -68,6 +68,17 @@ fn slew_rate(input: &Input, sample: f64, horizon: f64) -> f64 {
     (0..(horizon / sample) as u32).map(|k| (at(k + 1) - at(k)).abs() / sample).fold(0.0, f64::max)
 }
 
+/// The value at a time, along straight lines from sample to sample; before the first and after the last sample theirs.
+fn between(times: &[f64], values: &[f64], at: f64) -> f64 {
+    let next = times.partition_point(|&t| t < at);
+    match (next.checked_sub(1), values.get(next)) {
+        (None, Some(&first)) => first,
+        (Some(last), None) => values[last],
+        (Some(k), Some(&to)) => values[k] + (to - values[k]) * (at - times[k]) / (times[next] - times[k]),
+        (None, None) => 0.0,
+    }
+}
+
 /// Typical sizes at a place, over the pieces in which it is measured.
 pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: &[Trajectory]) -> Option<Sizes> {
     let spots: Vec<(usize, Spot)> =
@@ -108,9 +119,11 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
         }
         Spot::Actuator(input) => {
             let value = positive(amplitude(moments().map(|m| m.u[input])));
-            let fastest =
-                moments().map(|m| amplitude(m.rates.iter().copied()) / positive(amplitude(m.x.iter().copied())));
-            let time = 1.0 / positive(fastest.fold(0.0, f64::max)).clamp(1.0 / record, 1.0 / sample);
+            let states = moments().next().map_or(0, |m| m.x.len());
+            let quickness =
+                |s: usize| size(moments().map(|m| m.rates[s])) / positive(amplitude(moments().map(|m| m.x[s])));
+            let fastest = (0..states).map(quickness).fold(0.0, f64::max);
+            let time = 1.0 / positive(fastest).clamp(1.0 / record, 1.0 / sample);
             let name = &model.model().interface().inputs[input].name;
             let slew =
                 |(i, _): &(usize, Spot)| Some(slew_rate(pieces[*i].case.input(name)?, sample, pieces[*i].horizon));
@@ -131,7 +144,17 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
                 _ => &[],
             };
             let values = || spots.iter().flat_map(|&(i, s)| of(i, s).iter().copied());
-            let rates = spots.iter().flat_map(|&(i, s)| of(i, s).windows(2).map(|w| (w[1] - w[0]) / sample));
+            let rates = spots.iter().flat_map(|&(i, s)| {
+                let times = match s {
+                    Spot::Sensor(series) => pieces[i].series[series].times.as_slice(),
+                    _ => &[],
+                };
+                of(i, s)
+                    .windows(2)
+                    .zip(times.windows(2))
+                    .map(|(y, t)| (y[1] - y[0]) / (t[1] - t[0]))
+                    .collect::<Vec<_>>()
+            });
             let value = positive(amplitude(values()));
             let speed = positive(amplitude(rates.collect::<Vec<_>>().into_iter()));
             Sizes {
@@ -234,13 +257,23 @@ impl<'a> View<'a> {
     }
 
     fn at_sample(&self, series: usize, companion: Option<Spot>, k: usize) -> At<'a, f64> {
+        let at = self.piece.series[series].times[k];
         let other = match companion {
-            Some(Spot::Sensor(other)) => self.along.predicted[other].get(k).copied().unwrap_or(0.0),
+            Some(Spot::Sensor(other)) => between(&self.piece.series[other].times, &self.along.predicted[other], at),
             _ => 0.0,
         };
         let y = self.along.predicted[series][k];
-        let t = self.piece.series[series].times[k] + self.piece.case.begins;
-        At { t, value: y, q: y, v: 0.0, a: 0.0, mobility: 0.0, other, other_speed: 0.0, u: &[] }
+        At {
+            t: at + self.piece.case.begins,
+            value: y,
+            q: y,
+            v: 0.0,
+            a: 0.0,
+            mobility: 0.0,
+            other,
+            other_speed: 0.0,
+            u: &[],
+        }
     }
 
     /// What the candidate at these strengths adds to the residuals of the piece; `None` where that is not finite.

@@ -38,7 +38,7 @@ impl Added {
         let piece = self.candidate.only.and_then(in_piece).unwrap_or(0);
         self.strengths = variant.strengths(fit, point, index, count, piece);
         let first = variant.first[index] + count;
-        let free = self.candidate.effect.free_starts();
+        let free = self.candidate.effect.free_starts().len();
         let starts = |piece: usize| fit.parameters(piece, point)[first..][..free].to_vec();
         self.starts.retain(|(measurement, _)| in_piece(*measurement).is_none());
         self.starts.extend(fit.pieces.iter().enumerate().map(|(k, piece)| (piece.measurement, starts(k))));
@@ -105,7 +105,7 @@ impl Variant {
         for a in added {
             first.push(next);
             let effect = &a.candidate.effect;
-            next += effect.strengths().len() + effect.free_starts();
+            next += effect.strengths().len() + effect.free_starts().len();
         }
         Self { model: Arc::new(model), first }
     }
@@ -177,6 +177,7 @@ pub fn problem<'a>(
                     // Half way to the next value that was tried.
                     Trials::Steps => 0.5 * a.sizes.gap_to_next_size(value),
                     Trials::ScaledAndGap(_) => 0.1 * scale,
+                    Trials::Jumps(_) => 0.5 * scale,
                     _ => scale,
                 };
                 all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });
@@ -189,9 +190,9 @@ pub fn problem<'a>(
         }
         let known = known_starts(a, &pieces);
         for ((piece, locals), known) in pieces.iter_mut().zip(&mut locals).zip(known) {
-            for state in 0..effect.free_starts() {
+            for (state, &dimension) in effect.free_starts().iter().enumerate() {
                 let parameter = first + effect.strengths().len() + state;
-                let scale = if state == 0 { a.sizes.position } else { a.sizes.speed };
+                let scale = a.sizes.of(dimension);
                 let bounds = [-10.0 * scale, 10.0 * scale];
                 let start = known.map_or(0.0, |known| known[state].clamp(bounds[0], bounds[1]));
                 piece.locals.push(Local { parameter, bounds, start, scale: 0.1 * scale });

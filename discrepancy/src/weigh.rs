@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::fit::{Fit, Fitted};
 use crate::search::Trial;
 use crate::variant::Added;
 
@@ -25,12 +26,17 @@ impl Dispersion {
     /// White residuals of the size of the noise.
     pub const WHITE: Self = Self { square: 1.0, repeats: 1.0 };
 
+    /// Of what a trial leaves.
+    pub fn of(trial: &Trial<'_>) -> Self {
+        Self::left(&trial.fit, &trial.fitted)
+    }
+
     /// Of what a model leaves.
     #[allow(clippy::cast_precision_loss)]
-    pub fn of(trial: &Trial<'_>) -> Self {
-        let square = (trial.fitted.chi2 / trial.fitted.count.max(1) as f64).max(1.0);
+    pub fn left(fit: &Fit<'_>, fitted: &Fitted) -> Self {
+        let square = (fitted.chi2 / fitted.count.max(1) as f64).max(1.0);
         let (mut product, mut power, mut pairs) = (0.0, 0.0, 0.0);
-        for (piece, residuals) in trial.fit.pieces.iter().zip(&trial.fitted.residuals) {
+        for (piece, residuals) in fit.pieces.iter().zip(&fitted.residuals) {
             let mut at = 0;
             for s in &piece.series {
                 let r = &residuals[at..at + s.times.len()];
@@ -121,6 +127,11 @@ pub fn by_chance(gain: f64, directions: f64) -> f64 {
     -((directions * (-(-0.5 * gain).exp()).ln_1p()).exp_m1())
 }
 
+/// The gain of which [`by_chance`] gives this probability.
+pub fn needed_gain(level: f64, directions: f64) -> f64 {
+    -2.0 * (-((-level).ln_1p() / directions).exp_m1()).ln()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,5 +148,8 @@ mod tests {
         assert!((by_chance(2.0 * 100.0_f64.ln(), 1.0) - 0.01).abs() < 1e-12);
         assert!((by_chance(2.0 * 10_000.0_f64.ln(), 100.0) - 0.01).abs() < 1e-4);
         assert_eq!(by_chance(0.0, 10.0), 1.0);
+        for (level, directions) in [(0.01, 1.0), (1e-6, 500.0), (0.5, 40.0)] {
+            assert!((by_chance(needed_gain(level, directions), directions) / level - 1.0).abs() < 1e-9);
+        }
     }
 }

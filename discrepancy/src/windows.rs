@@ -21,7 +21,8 @@ pub fn whole(index: usize, measurement: &Measurement) -> Piece {
     }
 }
 
-/// The experiment in `count` windows of equal length; all states with a start value are free in each.
+/// The experiment in `count` windows of equal length; all states with a start value are free in each, but at the beginning of
+/// the record only those that are free there or measured.
 #[allow(clippy::cast_precision_loss)]
 pub fn cut(index: usize, measurement: &Measurement, model: &dyn Model, count: usize) -> Vec<Piece> {
     let length = measurement.horizon / count as f64;
@@ -71,7 +72,12 @@ fn starts(measurement: &Measurement, model: &dyn Model, at: f64, length: f64) ->
             (Some(shown), ..) => shown,
             (None, Some(rate), _) => rate,
             (None, None, Some(local)) => (local.start, local.scale),
-            (None, None, None) => return None,
+            (None, None, None) if at == 0.0 => return None,
+            // A hidden state has moved on from where the record began.
+            (None, None, None) => {
+                let begun = interface.parameters[parameter].default.unwrap_or(0.0);
+                (begun, if begun == 0.0 { 1.0 } else { begun.abs() })
+            }
         };
         // Bounds that the study gives are those of the beginning.
         let range = interface.parameters[parameter].range;

@@ -174,9 +174,12 @@ pub enum Trials {
     SlewAndScaled(&'static [f64], &'static [f64]),
     /// These values.
     Plain(&'static [f64]),
+    /// These values, of a strength at whose changes samples jump: a level at which what stands still breaks away.
+    Jumps(&'static [f64]),
     /// These values, then these multiples of its typical size: periods in a turn, and along a rail.
     PlainAndScaled(&'static [f64], &'static [f64]),
-    /// Frequencies in rad/s that the record can resolve, from one period in the record on.
+    /// Frequencies in rad/s that the record can resolve: from two thirds of a period in the record to 160 periods, or four samples
+    /// a period.
     Frequencies,
     /// Sizes of steps: the largest value over numbers of steps from one on, so close together that about every eighth sample of a
     /// neighbour is a step off.
@@ -186,9 +189,10 @@ pub enum Trials {
 }
 
 impl Trials {
-    /// Whether no slope tells the strength, as samples that it moves jump: sizes of steps, the width of a gap.
+    /// Whether no slope tells the strength, as samples that it moves jump: sizes of steps, the width of a gap, a level at which
+    /// what stands still breaks away.
     pub fn jumps(&self) -> bool {
-        matches!(self, Self::Steps | Self::ScaledAndGap(_))
+        matches!(self, Self::Steps | Self::ScaledAndGap(_) | Self::Jumps(_))
     }
 }
 
@@ -416,24 +420,15 @@ pub trait Effect: Send + Sync {
         0
     }
 
-    /// Whether the start values of its states, or the first value that it remembers, matter so much that an experiment leaves
-    /// them free.
-    fn free_start(&self) -> bool {
-        false
-    }
-
     /// Number of values that it remembers from one moment to the next; the first of them is what it let through.
     fn memory(&self) -> usize {
         0
     }
 
-    /// Number of start values that an experiment leaves free: those of its states, or that of what it lets through.
-    fn free_starts(&self) -> usize {
-        match (self.free_start(), self.memory()) {
-            (false, _) => 0,
-            (true, 0) => self.states(),
-            (true, _) => 1,
-        }
+    /// Dimensions of the start values that an experiment leaves free as they matter: those of all its states, or that of what
+    /// an effect with a memory lets through.
+    fn free_starts(&self) -> &'static [Dimension] {
+        &[]
     }
 
     /// Whether it asks for the acceleration: its force is proportional to it.

@@ -17,10 +17,10 @@ pub(super) fn page(effect: &dyn Effect) -> String {
         page += &format!("A form of: {wider}.\n");
     }
     if effect.states() > 0 {
-        let free = if effect.free_start() { ", with a free start value in each experiment" } else { "" };
+        let free = if effect.free_starts().is_empty() { "" } else { ", with a free start value in each experiment" };
         page += &format!("States of its own: {}{free}.\n", effect.states());
     }
-    if effect.memory() > 0 && effect.free_start() {
+    if effect.memory() > 0 && !effect.free_starts().is_empty() {
         page += "The first value that it lets through is free in each experiment.\n";
     }
     page += "\nStrengths:\n";

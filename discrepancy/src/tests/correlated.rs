@@ -6,7 +6,7 @@ use mops_models::effects::effects;
 
 use crate::search::{Limits, Search, Trial};
 use crate::subject::Subject;
-use crate::testing::{Record, study, subject, white};
+use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::weigh::{Dispersion, criterion};
 use crate::{Options, Verdict, diagnose};
 
@@ -16,14 +16,27 @@ parameters = { k = "1/s" }
 der        = { x = "-k*x" }
 "#;
 
+/// A pendulum: `w' = -g sin(th) - b w`.
+const PENDULUM: &str = r#"
+states     = { th = "rad", w = "rad/s" }
+parameters = { g = "1/s^2", b = "1/s" }
+der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
+"#;
+
+/// Errors with the correlation `r` from one to the next, and variance 1.
+fn errors(r: f64, label: &str, count: usize) -> Vec<f64> {
+    let mut error = 0.0;
+    let follow = |e: f64| {
+        error = r * error + (1.0 - r * r).sqrt() * e;
+        error
+    };
+    white(label, 1.0, count).into_iter().map(follow).collect()
+}
+
 /// A decay whose errors have the correlation `r` from sample to sample, and variance 1.
 fn decay(r: f64, label: &str) -> Subject {
     let times: Vec<f64> = (0..4000_u32).map(|k| 0.005 * f64::from(k)).collect();
-    let mut error = 0.0;
-    let errors = white(label, 1.0, times.len()).into_iter().map(|e| {
-        error = r * error + (1.0 - r * r).sqrt() * e;
-        error
-    });
+    let errors = errors(r, label, times.len());
     let values = times.iter().zip(errors).map(|(t, e)| 50.0 * (-0.3 * t).exp() + e).collect();
     subject(CREEP, &[0.3, 50.0], 1, vec![Record { inputs: Vec::new(), times, signals: vec![("x", values, 1.0)] }])
 }
@@ -79,5 +92,25 @@ fn noise_that_is_correlated_is_not_taken_for_an_effect() {
         let diagnosis = diagnosis.expect("it simulates");
         let names: Vec<_> = diagnosis.found.iter().map(|f| (&f.effect, &f.place)).collect();
         assert_eq!(diagnosis.verdict, Verdict::None, "{label}: {names:?}");
+    }
+}
+
+#[test]
+fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
+    const STEP: f64 = 0.01;
+    const NOISE: f64 = 0.01;
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.8 * (x[1] / 1e-3).tanh()];
+    let some = catalogue(&["coulomb-friction", "asymmetric-friction", "stribeck-friction"]);
+    for label in ["one", "two", "three", "four"] {
+        let states = integrated(rates, [1.2, 0.0], STEP, 600);
+        let times = (0..600_u32).map(|k| STEP * f64::from(k)).collect();
+        let values = states.iter().zip(errors(0.95, label, 600)).map(|(x, e)| x[0] + NOISE * e).collect();
+        let record = Record { inputs: Vec::new(), times, signals: vec![("th", values, NOISE)] };
+        let subject = subject(PENDULUM, &[17.0, 0.2, 1.2, 0.0], 2, vec![record]);
+        let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+        let told = diagnose(&study(&subject), &some, &options, &()).expect("it simulates");
+        let names: Vec<_> = told.found.iter().map(|f| f.effect.as_str()).collect();
+        assert_eq!(names, ["coulomb-friction"], "{label}");
+        assert!(told.found[0].indistinguishable.iter().all(|rival| rival.bic_behind >= 0.0), "{label}");
     }
 }

@@ -32,7 +32,7 @@ fn an_interval_ends_where_the_profile_of_the_sum_of_squares_does() {
     let subject = subject(DECAY, &[2.0, 1.0], 1, vec![record]);
     let simulations = AtomicUsize::new(0);
     let (fit, _, fitted, _) = fitted(&subject, &simulations);
-    let (best, error) = (fitted.point.globals[0], fit.covariance(&fitted)[(0, 0)].sqrt());
+    let (best, error) = (fitted.point.globals[0], fit.covariance(&fitted, 1.0)[(0, 0)].sqrt());
     let end = |mut inside: f64, mut outside: f64| {
         for _ in 0..60 {
             let middle = 0.5 * (inside + outside);

@@ -60,7 +60,7 @@ fn weighed(subject: &Subject) -> (Vec<(String, f64)>, StrengthValue) {
     let shares = probabilities(&round.trials.iter().map(|t| criterion(t, &shared)).collect::<Vec<_>>());
     let names = round.trials.iter().map(|t| t.added[0].candidate.effect.name().to_owned());
     let best = search.calibrate(&round.trials[0], &[]).expect("it simulates");
-    let strength = best.strengths(0, &round.trials[0].variant, 1.0).swap_remove(0);
+    let strength = best.strengths(0, &round.trials[0].variant).swap_remove(0);
     (names.zip(shares).collect(), strength)
 }
 

@@ -4,7 +4,7 @@ use mops_core::{EffectClass, Hold, Input};
 use mops_models::effects::effects;
 
 use crate::testing::{Record, integrated, study, subject, white};
-use crate::{Options, diagnose};
+use crate::{Options, Verdict, diagnose};
 
 const SWING: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -35,6 +35,7 @@ fn an_oscillation_that_is_driven_by_its_speed_is_never_put_down_to_negative_fric
     let diagnosis = diagnose(&study(&subject), &takes, &Options { max_effects: 2, level: 0.05, seed: 1 }, &())
         .expect("it simulates");
     assert!(diagnosis.before[0].normalised > 3.0, "{:?}", diagnosis.before);
+    assert_eq!(diagnosis.verdict, Verdict::Unexplained, "{:?}", diagnosis.found);
     let strengths = diagnosis.found.iter().flat_map(|f| f.strengths.first().map(|s| (&f.effect, s)));
     let strengths = strengths.chain(diagnosis.ranked.iter().flat_map(|r| r.strengths.first().map(|s| (&r.effect, s))));
     for (effect, strength) in strengths {

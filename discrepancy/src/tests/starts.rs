@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Hold, Input};
 
+use crate::base::first_locals;
 use crate::search::{Limits, Search};
 use crate::testing::{Record, catalogue, integrated, subject, white};
 
@@ -42,4 +43,34 @@ fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise(
     // The lag begins with what the motor pulled beyond the command, `6 - (-2)`.
     let start = best.fitted.point.locals[0][2];
     assert!((start - (pull - command(0.0))).abs() < 0.4, "{start}");
+}
+
+/// The same cart behind a motor whose pull `f` follows the command with a lag, as the model says.
+const MOTOR: &str = r#"
+states     = { f = "N", x = "m", v = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", d = "N s/m", tau = "s" }
+der        = { f = "(u - f)/tau", x = "v", v = "m*v' = f - d*v" }
+"#;
+
+#[test]
+fn a_state_that_nobody_measures_begins_anew_in_every_window() {
+    const STEP: f64 = 0.02;
+    const COUNT: u32 = 250;
+    let [m, d, tau, pull] = [2.0, 0.8, 0.4, 0.0];
+    let command = |t: f64| if (t / 1.1 + 1e-7).floor() % 2.0 < 1.0 { -2.0 } else { 3.0 };
+    let rates = |t: f64, x: &[f64; 3]| [(command(t) - x[0]) / tau, x[2], (x[0] - d * x[2]) / m];
+    let states = integrated(rates, [pull, 0.0, 0.0], STEP, COUNT as usize);
+    let times: Vec<f64> = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
+    let values = states.iter().zip(white("motor", 2e-3, states.len())).map(|(s, e)| s[1] + e).collect();
+    let samples = times.iter().map(|&t| command(t)).collect();
+    let inputs = vec![("u", Input::Sampled { times: times.clone(), values: samples, hold: Hold::Zero })];
+    let record = Record { inputs, times, signals: vec![("x", values, 2e-3)] };
+    // Where the pull begins is known; where it is as a window begins is not.
+    let subject = subject(MOTOR, &[m, d, tau, pull, 0.0, 0.0], 2, vec![record]);
+    let simulations = AtomicUsize::new(0);
+    let search = Search::new(&subject, &[], Limits::at(0.01), &simulations);
+    let locals = first_locals(&search.pieces(8));
+    let windows = search.trial(&[], &subject.start(), locals, 8, 40).expect("it simulates");
+    assert!(windows.fitted.normalised() < 1.1, "{}", windows.fitted.normalised());
 }

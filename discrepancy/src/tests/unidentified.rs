@@ -27,7 +27,7 @@ fn of_ratios_that_alone_are_known_no_part_is_certain() {
             fit.globals[0].bounds = [0.0, 20.0];
             fit.globals[0].bounds[side] = value[0];
         }
-        let covariance = fit.covariance(&fitted);
+        let covariance = fit.covariance(&fitted, 1.0);
         let error = |k: usize| covariance[(k, k)].sqrt() / value[k].abs();
         assert!((0..3).all(|k| error(k) > 0.2), "{at_bound:?}: {:?}", [0, 1, 2].map(error));
         let ratio = DVector::from_vec(vec![-1.0 / value[0], 1.0 / value[1], 0.0]);

@@ -24,7 +24,7 @@ impl Definition for Backlash {
     const STRENGTHS: &'static [Strength] =
         &[Strength::positive("gap", "width of the gap", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.15, 0.4]))];
     const MEMORY: usize = 1;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { gap: s[0] })

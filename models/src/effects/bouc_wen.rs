@@ -46,7 +46,7 @@ impl Definition for BoucWen {
         Strength::shape("n", "sharpness of the yielding", Dimension::ONE, [1.0, 10.0], Trials::Plain(&[1.0, 2.0])),
     ];
     const STATES: usize = 1;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { c: s[0], y: s[1], sigma: s[2], n: s[3] })

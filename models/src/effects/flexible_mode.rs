@@ -39,7 +39,7 @@ impl Definition for FlexibleMode {
         Strength::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], Trials::Plain(&[0.02, 0.2])),
     ];
     const STATES: usize = 2;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION, Dimension::SPEED];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { m: s[0], w: s[1], d: s[2] })

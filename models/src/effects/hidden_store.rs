@@ -33,7 +33,7 @@ impl Definition for HiddenStore {
         ),
     ];
     const STATES: usize = 1;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { k: s[0], tau: s[1] })

@@ -25,7 +25,7 @@ impl Definition for InputRateLimit {
             .neutral_at(f64::INFINITY)
             .tried(Trials::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
     const MEMORY: usize = 2;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { rate: s[0] })

@@ -74,7 +74,7 @@ mod wind_gust;
 
 use std::sync::Arc;
 
-use mops_core::{Acting, Along, Effect, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{Acting, Along, Dimension, Effect, EffectClass, PortKind, Scalar, Strength};
 
 /// What the file of an effect says; see [`Effect`] for the meaning of each.
 pub trait Definition: Send + Sync + 'static {
@@ -100,8 +100,8 @@ pub trait Definition: Send + Sync + 'static {
     const STRENGTHS: &'static [Strength];
     /// [`Effect::states`].
     const STATES: usize = 0;
-    /// [`Effect::free_start`].
-    const FREE_START: bool = false;
+    /// [`Effect::free_starts`].
+    const FREE_STARTS: &'static [Dimension] = &[];
     /// [`Effect::memory`].
     const MEMORY: usize = 0;
     /// [`Effect::is_inertial`].
@@ -152,8 +152,8 @@ impl<D: Definition> Effect for Defined<D> {
     fn states(&self) -> usize {
         D::STATES
     }
-    fn free_start(&self) -> bool {
-        D::FREE_START
+    fn free_starts(&self) -> &'static [Dimension] {
+        D::FREE_STARTS
     }
     fn memory(&self) -> usize {
         D::MEMORY

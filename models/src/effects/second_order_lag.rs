@@ -27,7 +27,7 @@ impl Definition for SecondOrderLag {
         Strength::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], Trials::Plain(&[0.3, 0.8, 1.5])),
     ];
     const STATES: usize = 2;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE, Dimension::VALUE.over(Dimension::TIME)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { tau: s[0], d: s[1] })

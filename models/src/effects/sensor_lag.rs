@@ -24,7 +24,7 @@ impl Definition for SensorLag {
         &[Strength::positive("tau", "time constant", Dimension::TIME)
             .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
     const STATES: usize = 1;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { tau: s[0] })

@@ -3,6 +3,7 @@
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
+use super::terms::NOT_NEGATIVE;
 
 /// `stiction`.
 pub struct Stiction;
@@ -10,31 +11,31 @@ pub struct Stiction;
 /// At given strengths.
 struct AtStrengths<S> {
     c: S,
-    share: S,
+    rise: S,
 }
 
 impl Definition for Stiction {
     const NAME: &'static str = "stiction";
     const ABOUT: &'static str = "Dry friction with a larger force at rest than in motion.";
-    const FORMULA: &'static str = "-share c sgn(v); at rest whatever holds it, up to c";
+    const FORMULA: &'static str = "-c sgn(v); at rest whatever holds it, up to c (1 + rise)";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "force at which the joint breaks away", Dimension::OUTPUT),
+        Strength::positive("c", "friction force in motion", Dimension::OUTPUT),
         Strength::shape(
-            "share",
-            "force of sliding over that of breaking away",
+            "rise",
+            "friction force at rest over that in motion, less 1",
             Dimension::ONE,
-            [0.0, 1.0],
-            Trials::Plain(&[0.0, 0.4, 0.8]),
+            NOT_NEGATIVE,
+            Trials::Jumps(&[0.0, 0.5]),
         ),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { c: s[0], share: s[1] })
+        Box::new(AtStrengths { c: s[0], rise: s[1] })
     }
 }
 
@@ -44,7 +45,6 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
     }
 
     fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
-        let sliding = [self.c * self.share; 2];
-        Some(DryFriction { sliding, limit: [self.c; 2] })
+        Some(DryFriction { sliding: [self.c; 2], limit: [self.c * (self.rise + 1.0); 2] })
     }
 }

@@ -115,7 +115,7 @@ fn first_trials_are_few_and_allowed() {
             let allowed = |values: &[f64]| values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]);
             match of.trials {
                 Trials::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
-                Trials::Plain(values) => {
+                Trials::Plain(values) | Trials::Jumps(values) => {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
                 }

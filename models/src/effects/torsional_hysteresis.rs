@@ -41,7 +41,7 @@ impl Definition for TorsionalHysteresis {
         ),
     ];
     const STATES: usize = 1;
-    const FREE_START: bool = true;
+    const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

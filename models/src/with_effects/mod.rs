@@ -85,11 +85,16 @@ impl WithEffects {
                 let default = strength.neutral;
                 interface.parameters.push(Parameter { variable, default, range: strength.bounds });
             }
-            let starts = effect.free_start().then_some(interface.parameters.len());
-            for k in 0..effect.free_starts() {
+            let starts = (!effect.free_starts().is_empty()).then_some(interface.parameters.len());
+            for (k, &dimension) in effect.free_starts().iter().enumerate() {
                 let parameter = format!("{name}.start{}", k + 1);
-                let about = "start value of a state of the effect, over where it would rest";
-                interface.parameters.push(Parameter::new(&parameter, "1", about).with_default(0.0));
+                let variable = Variable {
+                    name: parameter.clone(),
+                    unit: unit(dimension, &placement.port, placement.companion.as_ref(), of),
+                    about: "start value of a state of the effect, over where it would rest".to_owned(),
+                };
+                let range = [f64::NEG_INFINITY, f64::INFINITY];
+                interface.parameters.push(Parameter { variable, default: Some(0.0), range });
                 let name = format!("{name}.{}", k + 1);
                 interface.states.push(State { name, start: parameter, signal: None, rate_of: None });
             }

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use mops_core::Unit;
 use mops_core::file::Files;
 
+use super::guarded;
 use super::tool::{Answer, Tools};
 use crate::bench::each;
 use answer::{answer, predictions};
@@ -103,12 +104,12 @@ fn reply(folder: &Path, tools: Tools<'_>, against: bool) -> Reply {
         Ok(read) => read,
         Err(why) => return Reply { name, study: String::new(), said: Err(why), brute: None },
     };
-    let guarded = std::panic::AssertUnwindSafe(|| diagnosed(&name, &study, &declared, folder, tools));
-    let said = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
-    let brute = against.then(|| {
+    let said = guarded(|| diagnosed(&name, &study, &declared, folder, tools));
+    let ask = || {
         let read = tools.study(&format!("{name}.toml"), &study, &Data { folder, declared: &declared })?;
         tools.brute_force(&read)
-    });
+    };
+    let brute = against.then(|| guarded(ask));
     Reply { name, study, said, brute }
 }
 

@@ -34,7 +34,7 @@ pub(crate) struct Judgement {
     pub verdict: bool,
     /// The decision is right: the verdict, and with an effect a true one, or one that no data could tell from it, first.
     pub decision: bool,
-    /// A true effect is first, at a place that is right.
+    /// A true effect, or one that no data could tell from it, is first, at a place that is right.
     pub first: bool,
     /// A true effect is in the set of what the data cannot tell apart.
     pub in_set: bool,

@@ -56,6 +56,12 @@ pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, beside: Beside) ->
     Results { rows, brute: brute.into_iter().flatten().collect(), unmade }
 }
 
+/// What is asked for; a panic is a failure as any other.
+fn guarded<T>(ask: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    let broke = |_| Err("the program broke".to_owned());
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(ask)).unwrap_or_else(broke)
+}
+
 fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: Beside) -> (Row, Option<Row>) {
     let size = if wish.kind == Kind::Nothing { 0.0 } else { plan.nearest(trial.truth.size) };
     let row = |answer| Row::new(trial, wish.kind, size, answer);
@@ -63,11 +69,9 @@ fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, beside: B
     let tools = Tools { catalogue: missing.as_ref().unwrap_or(tools.catalogue), ..tools };
     let read = |tools: Tools<'_>| tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files));
     let answer = |tools: Tools<'_>| {
-        let guarded = std::panic::AssertUnwindSafe(|| tools.diagnose(read(tools)?));
-        let diagnosed = std::panic::catch_unwind(guarded).unwrap_or_else(|_| Err("the program broke".to_owned()));
-        diagnosed.map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
+        guarded(|| tools.diagnose(read(tools)?)).map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
     };
-    let brute = beside.brute_force.then(|| row(read(tools).and_then(|study| tools.brute_force(&study))));
+    let brute = beside.brute_force.then(|| row(guarded(|| tools.brute_force(&read(tools)?))));
     let mut row = row(answer(tools));
     if let Ok(first) = &row.answer {
         let agreeing = (1..=beside.orders).map(|order| {

@@ -37,7 +37,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "stribeck-friction" => {
             vec![("c", of("coulomb")), ("rise", of("static") / of("coulomb") - 1.0), ("vs", of("speed"))]
         }
-        "stiction" => vec![("c", of("static")), ("share", of("coulomb") / of("static"))],
+        "stiction" => vec![("c", of("coulomb")), ("rise", of("static") / of("coulomb") - 1.0)],
         "asymmetric-friction" => {
             let (forward, backward) = (of("forward"), of("backward"));
             vec![("c", 0.5 * (forward + backward)), ("skew", (forward - backward) / (forward + backward))]

@@ -20,7 +20,8 @@ pub(super) struct Declared {
     parameters: Vec<Parameter>,
     #[serde(default)]
     constants: Map<String, Value>,
-    #[serde(default)]
+    /// The first word counts; of what it holds nothing is said where it is absent.
+    #[serde(default = "zero")]
     input_hold: String,
     #[serde(default)]
     pub locations: Vec<String>,
@@ -48,7 +49,7 @@ pub(super) struct Output {
     /// An expression, where it is more than a state.
     #[serde(alias = "equation", alias = "equals")]
     expression: Option<String>,
-    #[serde(alias = "noise_std")]
+    #[serde(alias = "noise_std", alias = "noise")]
     noise_std_total: Option<f64>,
 }
 
@@ -60,6 +61,10 @@ struct Parameter {
     guess: f64,
     lower: f64,
     upper: f64,
+}
+
+fn zero() -> String {
+    "zero".to_owned()
 }
 
 /// A text as TOML writes it.
@@ -104,7 +109,7 @@ impl Declared {
     /// The study file of the case, whose data are in the folder.
     ///
     /// # Errors
-    /// The equations do not give every state a derivative.
+    /// The equations do not give every state a derivative; nobody knows how the inputs are held.
     pub fn study(&self, name: &str, folder: &Path) -> Result<String, String> {
         let mut text = format!("[study]\nname = {}\ntask = \"diagnosis\"\n\n[models.plant.equations]\n", quoted(name));
         let mut line = |key: &str, value: String| writeln!(text, "{key} = {value}").expect("a text takes everything");
@@ -138,21 +143,33 @@ impl Declared {
             writeln!(text, "{name} = {{ start = {guess:?}, min = {lower:?}, max = {upper:?}{scale} }}")
                 .expect("a text takes everything");
         }
+        let hold = self.hold()?;
         for file in &self.files {
-            text.push_str(&self.experiment(file, folder));
+            text.push_str(&self.experiment(file, hold, folder));
         }
         Ok(text)
     }
 
-    fn experiment(&self, file: &str, folder: &Path) -> String {
+    /// What the inputs do from sample to sample, as a study says it.
+    fn hold(&self) -> Result<&'static str, String> {
+        let says = |words: &[&str]| words.iter().any(|word| self.input_hold.starts_with(word));
+        match () {
+            () if self.inputs.is_empty() || says(&["zoh", "zero"]) => Ok("zero"),
+            () if says(&["foh", "first", "linear"]) => Ok("first"),
+            () if says(&["band-limited"]) => Ok("band-limited"),
+            () => {
+                Err(format!("case.json: `input_hold` is none of zero, first and band-limited: `{}`", self.input_hold))
+            }
+        }
+    }
+
+    fn experiment(&self, file: &str, hold: &str, folder: &Path) -> String {
         let (stem, path) = (stem(file), std::path::absolute(folder.join(file)).unwrap_or_else(|_| folder.join(file)));
         let role = match stem {
             _ if stem.starts_with("calibration") => "calibration",
             _ if stem.starts_with("validation") || stem.starts_with("selection") => "selection",
             _ => "validation",
         };
-        let hold =
-            if self.input_hold.starts_with("foh") || self.input_hold.contains("linear") { "first" } else { "zero" };
         let inputs = self.inputs.iter().map(|i| {
             let column = quoted(i.column.as_deref().unwrap_or(&i.name));
             (i.name.clone(), format!("{{ column = {column}, hold = \"{hold}\" }}"))
