@@ -94,6 +94,22 @@ fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
 }
 
 #[test]
+fn a_break_away_force_that_no_slope_tells_is_found() {
+    // The mass sticks and slips: by slopes alone the fit stayed where it left 2.1 times the noise, with a third too much.
+    let case = generate("spring", Missing::Effects(&["stiction"]), 5.0, 3_337_189_589_112).expect("it can be made");
+    let mut few = catalogue();
+    few.effects.retain(|effect| effect.name() == "stiction");
+    let diagnosis = diagnosis_among(&case, few, 1);
+    assert_eq!(found(&diagnosis), [("stiction", "joint:x")]);
+    let truth = |name: &str| case.truth.effects[0].strengths.iter().find(|s| s.0 == name).expect("it has it").1;
+    let truths = [truth("coulomb"), truth("static") / truth("coulomb") - 1.0];
+    for (strength, truth) in diagnosis.found[0].strengths.iter().zip(truths) {
+        let [low, high] = strength.interval95.expect("it has one");
+        assert!(low < truth && truth < high && high - low < 0.5 * truth, "{strength:?} {truth}");
+    }
+}
+
+#[test]
 fn where_nothing_is_missing_nothing_is_found() {
     for plant in ["pendulum", "servo"] {
         let case = case(plant, Missing::Nothing, 0.0);

@@ -7,7 +7,6 @@ use mops_core::{Effect, Mistake, Role, Study};
 use rayon::prelude::*;
 
 use crate::base;
-use crate::candidate::candidates;
 use crate::fit::Point;
 use crate::screen::{Scene, screen};
 use crate::subject::Subject;
@@ -51,12 +50,7 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
     let (fit, _, variant) = of(&[]);
     let scene = Scene::new(&fit, &variant.model, &declared).ok_or_else(failed)?;
 
-    let measurements = &subject.measurements;
-    let measured: Vec<String> = measurements.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();
-    let calibration: Vec<usize> =
-        (0..measurements.len()).filter(|&i| measurements[i].role == Role::Calibration).collect();
-    let all = candidates(effects, subject.model.interface(), &measured, &calibration);
-    let screened = screen(&all, &fit, &variant.model, &scene, &[]).screened;
+    let screened = screen(&subject.candidates(effects), &fit, &variant.model, &scene, &[]).screened;
     let refitted: Vec<Option<f64>> = screened
         .par_iter()
         .map(|candidate| {

@@ -64,6 +64,16 @@ pub struct Piece {
     pub fixed: Vec<(usize, f64)>,
 }
 
+impl Piece {
+    /// The measured signals, by index, each once.
+    pub fn signals(&self) -> Vec<usize> {
+        let mut signals: Vec<usize> = self.series.iter().map(|s| s.signal).collect();
+        signals.sort_unstable();
+        signals.dedup();
+        signals
+    }
+}
+
 /// Unknowns and their values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
@@ -161,15 +171,21 @@ pub enum Slopes {
 }
 
 impl Fit<'_> {
-    /// Values of the model's parameters in a piece.
-    pub fn parameters(&self, piece: usize, point: &Point) -> Vec<f64> {
-        let p = &self.pieces[piece];
+    /// Values of the tuners of the study.
+    fn tuners(&self, point: &Point) -> Vec<f64> {
         let mut tuners = self.subject.start();
         for (global, &value) in self.globals.iter().zip(&point.globals) {
             if let Sets::Tuner(k) = global.sets {
                 tuners[k] = value;
             }
         }
+        tuners
+    }
+
+    /// Values of the model's parameters in a piece.
+    pub fn parameters(&self, piece: usize, point: &Point) -> Vec<f64> {
+        let p = &self.pieces[piece];
+        let tuners = self.tuners(point);
         let mut values = self.subject.parameters(p.measurement, &tuners);
         let declared = &self.model.interface().parameters;
         let further = declared[values.len()..].iter().map(|p| p.default.unwrap_or(1.0));
@@ -187,12 +203,7 @@ impl Fit<'_> {
     /// The unknowns as directions of the model's parameters.
     fn seeds(&self, piece: usize, point: &Point, count: usize, slopes: Slopes) -> Vec<Vec<f64>> {
         let p = &self.pieces[piece];
-        let mut tuners = self.subject.start();
-        for (global, &value) in self.globals.iter().zip(&point.globals) {
-            if let Sets::Tuner(k) = global.sets {
-                tuners[k] = value;
-            }
-        }
+        let tuners = self.tuners(point);
         let overridden = |k: usize| p.fixed.iter().any(|f| f.0 == k) || p.locals.iter().any(|l| l.parameter == k);
         let global = |global: &Global| {
             let mut seed = match global.sets {
@@ -231,9 +242,7 @@ impl Fit<'_> {
     pub fn look(&self, piece: usize, point: &Point, slopes: Slopes) -> Option<Residuals> {
         let p = &self.pieces[piece];
         let parameters = self.parameters(piece, point);
-        let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
-        signals.sort_unstable();
-        signals.dedup();
+        let signals = p.signals();
         let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let all = self.seeds(piece, point, parameters.len(), slopes);

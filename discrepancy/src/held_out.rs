@@ -13,7 +13,8 @@ const BLOCKS: f64 = 25.0;
 const FOLDS: usize = 5;
 
 /// By which share the free signal at a place lowers the error on samples left out: 0.1 is 10 %, and below 0 it does harm.
-/// The unknowns of the fit are estimated anew, to first order, with the signal and without it.
+/// The unknowns of the fit are estimated anew, to first order, with the signal and without it; how smooth and how large the
+/// signal is expected to be is not, but stays as all samples want it.
 ///
 /// Source: M. Stone, Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical
 /// Society B 36 (1974) 111; blocks as residuals next to each other are alike.

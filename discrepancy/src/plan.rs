@@ -52,9 +52,7 @@ fn outputs(trial: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<Ve
     p.locals[..own].iter().for_each(|local| parameters[local.parameter] *= start);
     let inputs = p.case.inputs.iter().map(|(name, given)| (name.clone(), scaled(given, input)));
     let case = Case { inputs: inputs.collect(), ..p.case.clone() };
-    let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
-    signals.sort_unstable();
-    signals.dedup();
+    let signals = p.signals();
     let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: p.horizon };
     let analysis = trial.fit.model.analyse(&job).ok()?;
     let sample = |s: &crate::subject::Series| {

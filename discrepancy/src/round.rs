@@ -58,13 +58,8 @@ fn nearness(best: Option<&Trial<'_>>) -> impl Fn(&Trial<'_>) -> bool + use<> {
 impl<'a> Round<'a> {
     /// The round with a better fit of one of its models; as it is where it has none with these effects.
     pub fn with(self: Arc<Self>, better: &Trial<'a>) -> Arc<Self> {
-        let same = |t: &Trial<'a>| {
-            let mut pairs = t.added.iter().zip(&better.added);
-            t.added.len() == better.added.len() && pairs.all(|(a, b)| a.candidate.is(&b.candidate))
-        };
-        let Some(index) = self.trials.iter().position(|t| same(t) && t.fitted.chi2 > better.fitted.chi2) else {
-            return self;
-        };
+        let is_worse = |t: &Trial<'a>| t.has_effects_of(better) && t.fitted.chi2 > better.fitted.chi2;
+        let Some(index) = self.trials.iter().position(is_worse) else { return self };
         let mut round = Self::clone(&self);
         round.trials[index] = better.clone();
         best_first(&mut round.trials);

@@ -7,7 +7,7 @@ use mops_core::{Effect, Role, Scope, Strength, stream};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::base;
-use crate::candidate::{Candidate, candidates};
+use crate::candidate::Candidate;
 use crate::diagnose::UNEXPLAINED;
 use crate::fit::{Fit, Fitted, Piece, dot};
 use crate::repaired::Calibrated;
@@ -322,20 +322,13 @@ impl<'a> Search<'a> {
 
     /// Candidates beside effects that are in.
     pub fn candidates(&self, added: &[Added]) -> Vec<Candidate> {
-        let interface = self.subject.model.interface();
-        let of = &self.subject.measurements;
-        let mut measured: Vec<String> = of.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();
-        measured.sort();
-        measured.dedup();
-        let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
         let taken = |c: &Candidate| {
             added.iter().any(|a| {
                 a.candidate.is(c)
                     || (a.candidate.port == c.port && a.candidate.is_dry_friction() && c.is_dry_friction())
             })
         };
-        let all = candidates(self.effects, interface, &measured, &calibration);
-        all.into_iter().filter(|c| !taken(c)).collect()
+        self.subject.candidates(self.effects).into_iter().filter(|c| !taken(c)).collect()
     }
 }
 
@@ -363,9 +356,14 @@ impl<'a> Trial<'a> {
     pub(crate) fn is_like(&self, other: &Self) -> bool {
         const SHARE: f64 = 1e-5;
         self.windows == other.windows
-            && self.added.len() == other.added.len()
-            && self.added.iter().zip(&other.added).all(|(a, b)| a.candidate.is(&b.candidate))
+            && self.has_effects_of(other)
             && (self.fitted.chi2 - other.fitted.chi2).abs() <= SHARE * self.fitted.chi2
+    }
+
+    /// Whether it has the same effects.
+    pub(crate) fn has_effects_of(&self, other: &Self) -> bool {
+        let mut pairs = self.added.iter().zip(&other.added);
+        self.added.len() == other.added.len() && pairs.all(|(a, b)| a.candidate.is(&b.candidate))
     }
 
     /// The effect that was added last; `None` in the declared model.

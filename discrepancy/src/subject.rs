@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mops_core::{Case, Dual, Job, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
+use mops_core::{Case, Dual, Effect, Job, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
 
+use crate::candidate::{Candidate, candidates};
 use crate::hygiene::{noise_of, without_spikes};
 
 /// A measured signal.
@@ -175,6 +176,16 @@ impl Subject {
             notes,
             pace: OnceLock::new(),
         })
+    }
+
+    /// Effects at the places of the model and at what is measured.
+    pub fn candidates(&self, effects: &[Arc<dyn Effect>]) -> Vec<Candidate> {
+        let of = &self.measurements;
+        let mut measured: Vec<String> = of.iter().flat_map(|m| m.series.iter().map(|s| s.name.clone())).collect();
+        measured.sort();
+        measured.dedup();
+        let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
+        candidates(effects, self.model.interface(), &measured, &calibration)
     }
 
     /// Notes how many steps the declared model takes with these globals: candidates are allowed as many, and more.

@@ -74,7 +74,10 @@ fn between(times: &[f64], values: &[f64], at: f64) -> f64 {
     match (next.checked_sub(1), values.get(next)) {
         (None, Some(&first)) => first,
         (Some(last), None) => values[last],
-        (Some(k), Some(&to)) => values[k] + (to - values[k]) * (at - times[k]) / (times[next] - times[k]),
+        (Some(k), Some(&to)) => {
+            let share = (at - times[k]) / (times[next] - times[k]);
+            values[k] + share * (to - values[k])
+        }
         (None, None) => 0.0,
     }
 }
@@ -207,7 +210,7 @@ pub struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// Of a candidate in a piece; `None` where it cannot act there.
+    /// Of a candidate in a piece; `None` where it cannot act there, or has more states than can be followed.
     pub fn new(
         candidate: &'a Candidate,
         model: &'a WithEffects,
@@ -217,6 +220,9 @@ impl<'a> View<'a> {
         let mut view = Self { candidate, piece, along, here: Spot::Actuator(0), seen: Vec::new(), input: None };
         if candidate.only.is_some_and(|only| only != piece.measurement) {
             return Some(view);
+        }
+        if candidate.effect.states() > MOST_STATES {
+            return None;
         }
         view.here = spot(&candidate.port, model, piece)?;
         let companion = match &candidate.companion {
@@ -320,42 +326,25 @@ impl<'a> View<'a> {
 
     /// The signal that an effect adds at the nodes of a motion, and its column.
     fn signal(&self, acting: &dyn Acting<f64>) -> Option<(usize, Vec<f64>)> {
-        let (effect, along) = (self.candidate.effect.as_ref(), self.along);
+        let along = self.along;
         let inputs = along.inputs();
-        let mut z = vec![0.0; effect.states()];
-        let mut memory = vec![f64::NAN; effect.memory()];
-        let mut signal = Vec::with_capacity(self.seen.len());
+        let begins = self.piece.case.begins;
         let command = |t: f64| self.input.map_or(0.0, |input| input.at(t.max(0.0)));
-        let delay = acting.delay();
-        for (k, at) in self.seen.iter().enumerate() {
-            if k == 0 {
-                acting.start(at, &mut z);
-            } else if !z.is_empty() {
-                advance(acting, &self.seen[k - 1], at, &mut z);
+        let delayed = |k: usize, delay: f64| command(self.seen[k].t - begins - delay);
+        let change = |at: &At<'_, f64>, value: f64, z: &[f64]| match self.here {
+            Spot::Actuator(_) => value - at.value,
+            _ => {
+                let friction = acting.friction(at, z).map_or(0.0, |f| match at.v {
+                    v if v > 0.0 => -f.sliding[0],
+                    v if v < 0.0 => f.sliding[1],
+                    _ => 0.0,
+                });
+                value + friction
             }
-            let value = if let Some(delay) = delay {
-                command(at.t - self.piece.case.begins - delay)
-            } else if memory.is_empty() {
-                acting.value(at, &z)
-            } else {
-                acting.remember(at, &mut memory);
-                acting.recall(at, &memory)
-            };
-            let change = match self.here {
-                Spot::Actuator(_) => value - at.value,
-                _ => {
-                    let friction = acting.friction(at, &z).map_or(0.0, |f| match at.v {
-                        v if v > 0.0 => -f.sliding[0],
-                        v if v < 0.0 => f.sliding[1],
-                        _ => 0.0,
-                    });
-                    value + friction
-                }
-            };
-            if !change.is_finite() {
-                return None;
-            }
-            signal.push(change);
+        };
+        let mut signal = self.followed(acting, delayed, change);
+        if !signal.iter().all(|s| s.is_finite()) {
+            return None;
         }
         let column = match self.here {
             Spot::Joint(w, ..) | Spot::Process(w, _) => {
@@ -368,9 +357,39 @@ impl<'a> View<'a> {
         Some((column, signal))
     }
 
+    /// What is made of each moment, of the value of the effect there and of its states, which move on from moment to moment;
+    /// `delayed` is what came so much earlier.
+    fn followed(
+        &self,
+        acting: &dyn Acting<f64>,
+        delayed: impl Fn(usize, f64) -> f64,
+        made: impl Fn(&At<'_, f64>, f64, &[f64]) -> f64,
+    ) -> Vec<f64> {
+        let effect = self.candidate.effect.as_ref();
+        let mut z = vec![0.0; effect.states()];
+        let mut memory = vec![f64::NAN; effect.memory()];
+        let delay = acting.delay();
+        let one = |(k, at): (usize, &At<'_, f64>)| {
+            if k == 0 {
+                acting.start(at, &mut z);
+            } else if !z.is_empty() {
+                advance(acting, &self.seen[k - 1], at, &mut z);
+            }
+            let value = if let Some(delay) = delay {
+                delayed(k, delay)
+            } else if memory.is_empty() {
+                acting.value(at, &z)
+            } else {
+                acting.remember(at, &mut memory);
+                acting.recall(at, &memory)
+            };
+            made(at, value, &z)
+        };
+        self.seen.iter().enumerate().map(one).collect()
+    }
+
     /// What an effect changes at a sensor, in units of the noise.
     fn measured(&self, acting: &dyn Acting<f64>, series: usize) -> Vec<f64> {
-        let effect = self.candidate.effect.as_ref();
         let s = &self.piece.series[series];
         let y = &self.along.predicted[series];
         let interpolate = |t: f64| {
@@ -381,30 +400,11 @@ impl<'a> View<'a> {
                 let (first, second) = ((y1 - y0) / (t1 - t0), (y2 - y1) / (t2 - t1));
                 return y0 + (t - t0) * (first + (t - t1) * (second - first) / (t2 - t0));
             }
-            let k = s.times.partition_point(|&x| x <= t).clamp(1, s.times.len() - 1);
-            let share = ((t - s.times[k - 1]) / (s.times[k] - s.times[k - 1])).clamp(0.0, 1.0);
-            y[k - 1] + share * (y[k] - y[k - 1])
+            between(&s.times, y, t)
         };
-        let mut z = vec![0.0; effect.states()];
-        let mut memory = vec![f64::NAN; effect.memory()];
-        let delay = acting.delay();
-        let change = |(k, at): (usize, &At<'_, f64>)| {
-            if k == 0 {
-                acting.start(at, &mut z);
-            } else if !z.is_empty() {
-                advance(acting, &self.seen[k - 1], at, &mut z);
-            }
-            let value = if let Some(delay) = delay {
-                interpolate(s.times[k] - delay)
-            } else if memory.is_empty() {
-                acting.value(at, &z)
-            } else {
-                acting.remember(at, &mut memory);
-                acting.recall(at, &memory)
-            };
-            (value - y[k]) / s.noise
-        };
-        self.seen.iter().enumerate().map(change).collect()
+        let delayed = |k: usize, delay: f64| interpolate(s.times[k] - delay);
+        // At a sensor the value of a moment is the sample.
+        self.followed(acting, delayed, |at, value, _| (value - at.value) / s.noise)
     }
 }
 
@@ -444,5 +444,5 @@ fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &m
     }
 }
 
-/// The largest number of states that an effect may have to be screened.
+/// The largest number of states of an effect that is screened.
 const MOST_STATES: usize = 8;

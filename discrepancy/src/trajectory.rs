@@ -56,9 +56,7 @@ impl Trajectory {
     pub fn new(fit: &Fit<'_>, model: &WithEffects, piece: usize, point: &Point) -> Result<Self, Failure> {
         let p = &fit.pieces[piece];
         let parameters = fit.parameters(piece, point);
-        let mut signals: Vec<usize> = p.series.iter().map(|s| s.signal).collect();
-        signals.sort_unstable();
-        signals.dedup();
+        let signals = p.signals();
         let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
         let mut sampled: Vec<f64> = p.series.iter().flat_map(|s| s.times.iter().copied()).chain([0.0]).collect();
         sampled.sort_by(f64::total_cmp);

@@ -415,7 +415,7 @@ pub trait Effect: Send + Sync {
     /// Its strengths; the first is the one that makes it vanish.
     fn strengths(&self) -> &'static [Strength];
 
-    /// Number of its states.
+    /// Number of its states; one that has more than eight is no candidate of a diagnosis.
     fn states(&self) -> usize {
         0
     }
