@@ -1,6 +1,6 @@
 //! The repaired model: its parameters from calibration data alone, its errors on every experiment.
 
-use mops_core::Role;
+use mops_core::{Port, Role};
 use nalgebra::DMatrix;
 
 use crate::base;
@@ -157,7 +157,15 @@ impl Calibrated<'_> {
             let known = known.filter(|(_, e)| e.is_finite() && *e > 0.0);
             let weight = self.dispersion.weight();
             let profile = |(place, error)| interval95(&self.fit, &self.fitted, place, error, weight);
-            let scan = |place| self.fit.stepped_interval(&self.fitted, place, QUANTILE * QUANTILE * weight);
+            let scan = |place| {
+                let [low, high] = self.fit.stepped_interval(&self.fitted, place, QUANTILE * QUANTILE * weight)?;
+                // At a sensor samples that stay on their step tell the size of the steps by slopes.
+                let told = matches!(a.candidate.port, Port::Sensor { .. }).then(|| QUANTILE * error(place));
+                let told = told.filter(|told| told.is_finite()).unwrap_or(0.0);
+                let [lowest, highest] = strength.bounds;
+                let [least, most] = [-told, told].map(|by| (a.strengths[k] + by).clamp(lowest, highest));
+                Some([low.min(least), high.max(most)])
+            };
             StrengthValue {
                 name: strength.name.to_owned(),
                 value: a.strengths[k],
