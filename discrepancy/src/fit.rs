@@ -22,7 +22,7 @@ pub struct Global {
     pub log: bool,
     /// Typical size of a change.
     pub scale: f64,
-    /// Whether slopes tell nothing of it: a size of steps, the width of a gap.
+    /// Whether slopes tell nothing of it: a size of steps, the width of a gap, a force at which something breaks away.
     pub steps: bool,
 }
 

@@ -11,7 +11,7 @@ use crate::locate::{Located, locate};
 use crate::repaired::Calibrated;
 use crate::screen::Scene;
 use crate::search::{Search, Trial};
-use crate::stopgap::stopgap;
+use crate::stopgap::{stopgap, unexplained};
 use crate::subject::Subject;
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
@@ -76,20 +76,18 @@ pub fn judge<'a>(
 impl<'a> Judgement<'a> {
     /// Puts a table at a place in, alone, where that is better.
     fn stand_in(&mut self, search: &Search<'a>, base: &Trial<'a>, place: &Located) -> Option<()> {
-        let (table, mut found) = stopgap(search, base, place)?;
-        let table = search.over_whole(&table)?;
-        let calibrated = search.calibrate(&table, &[])?;
-        for (point, value) in found.table.iter_mut().zip(&calibrated.added.last()?.strengths) {
-            point[1] = *value;
-        }
+        let (trial, table) = stopgap(search, base, place)?;
+        let trial = search.over_whole(&trial)?;
+        let calibrated = search.calibrate(&trial, &[])?;
+        let found = unexplained(place, &table, &calibrated.added.last()?.strengths);
         let now = forecast(&self.after, search.subject);
         let better = if self.last.added.is_empty() {
-            table.fitted.chi2 < self.last.fitted.chi2
+            trial.fitted.chi2 < self.last.fitted.chi2
         } else {
             now > MISTAKEN && forecast(&calibrated, search.subject) < now
         };
         if better {
-            (self.after, self.last, self.unexplained) = (calibrated, table, Some(found));
+            (self.after, self.last, self.unexplained) = (calibrated, trial, Some(found));
             // Every declared term was fitted with it.
             self.held.clear();
         }

@@ -9,7 +9,7 @@ use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
 use crate::screen::Scene;
 use crate::search::{Limits, Search};
-use crate::stopgap::stopgap;
+use crate::stopgap::{stopgap, unexplained};
 use crate::subject::Subject;
 use crate::testing::{Record, fitted, integrated, subject, white};
 
@@ -145,7 +145,9 @@ fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
     let scene = Scene::new(&trial.fit, &trial.variant.model, &trial.fitted).expect("it simulates");
     let found = locate(&trial.fit, &trial.variant.model, &scene);
     assert_eq!(found[0].evidence.place, "joint:x", "{:?}", shown(&found));
-    let (repaired, unexplained) = stopgap(&search, &trial, &found[0]).expect("it can be fitted");
+    let (repaired, table) = stopgap(&search, &trial, &found[0]).expect("it can be fitted");
+    let values = &repaired.added.last().expect("the table is in").strengths;
+    let unexplained = unexplained(&found[0], &table, values);
     assert_eq!(unexplained.over, "position");
     assert!(
         trial.fitted.normalised() > 50.0 && repaired.fitted.normalised() < 1.05,

@@ -14,8 +14,7 @@ impl<'a> Search<'a> {
 
     /// The trial without effects that the others make superfluous; `None` where each is needed.
     pub fn pruned(&self, trial: &Trial<'a>, level: f64) -> Option<Trial<'a>> {
-        /// Directions in which chance may look for a second effect beside a first that explains most: fewer than all, as
-        /// what is left out here was chosen among all before.
+        /// Directions that chance is allowed. An assumption: the rounds that found the effects looked in other numbers of them.
         const DIRECTIONS: f64 = 30.0;
         let mut pruned: Option<Trial<'a>> = None;
         let mut index = 0;

@@ -151,29 +151,31 @@ impl Calibrated<'_> {
         let parameters = &mops_core::Model::interface(variant.model.as_ref()).parameters;
         let one = |(k, strength): (usize, &mops_core::Strength)| {
             let place = self.free.iter().position(|&f| f == (index, k)).map(|place| self.tuners.len() + place);
-            let error = |place: usize| self.covariance[(place, place)].sqrt();
-            let by_steps = place.filter(|&place| self.fit.globals[place].is_stepped());
-            let known = place.filter(|_| by_steps.is_none()).map(|place| (place, error(place)));
-            let known = known.filter(|(_, e)| e.is_finite() && *e > 0.0);
-            let weight = self.dispersion.weight();
-            let profile = |(place, error)| interval95(&self.fit, &self.fitted, place, error, weight);
-            let scan = |place| {
-                let [low, high] = self.fit.stepped_interval(&self.fitted, place, QUANTILE * QUANTILE * weight)?;
-                // At a sensor samples that stay on their step tell the size of the steps by slopes.
-                let told = matches!(a.candidate.port, Port::Sensor { .. }).then(|| QUANTILE * error(place));
-                let told = told.filter(|told| told.is_finite()).unwrap_or(0.0);
-                let [lowest, highest] = strength.bounds;
-                let [least, most] = [-told, told].map(|by| (a.strengths[k] + by).clamp(lowest, highest));
-                Some([low.min(least), high.max(most)])
-            };
+            let (std_error, interval95) = place.map_or((None, None), |place| self.told(place, &a.candidate.port));
             StrengthValue {
                 name: strength.name.to_owned(),
                 value: a.strengths[k],
                 unit: a.candidate.unit(strength, &parameters[variant.first[index] + k].variable.unit),
-                std_error: known.map(|(_, error)| error),
-                interval95: known.map(profile).or_else(|| scan(by_steps?)),
+                std_error,
+                interval95,
             }
         };
         a.candidate.effect.strengths().iter().enumerate().map(one).collect()
+    }
+
+    /// Standard error and interval of a global that sets a strength at a port, as far as the data tell them.
+    fn told(&self, place: usize, port: &Port) -> (Option<f64>, Option<[f64; 2]>) {
+        let weight = self.dispersion.weight();
+        let error = Some(self.covariance[(place, place)].sqrt()).filter(|error| error.is_finite() && *error > 0.0);
+        let global = &self.fit.globals[place];
+        if !global.is_stepped() {
+            return (error, error.map(|error| interval95(&self.fit, &self.fitted, place, error, weight)));
+        }
+        let scanned = self.fit.stepped_interval(&self.fitted, place, QUANTILE * QUANTILE * weight);
+        // At a sensor samples that stay on their step tell the size of the steps by slopes.
+        let told = error.filter(|_| matches!(port, Port::Sensor { .. })).map_or(0.0, |error| QUANTILE * error);
+        let value = self.fitted.point.globals[place];
+        let [least, most] = [-told, told].map(|by| (value + by).clamp(global.bounds[0], global.bounds[1]));
+        (None, scanned.map(|[low, high]| [low.min(least), high.max(most)]))
     }
 }

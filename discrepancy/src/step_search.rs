@@ -1,4 +1,4 @@
-//! Search over the size of steps and the width of gaps, which no slope tells: a value that crosses to the next step jumps.
+//! Search over what no slope tells, as samples jump: the size of steps, the width of gaps, the force at which a joint breaks away.
 
 use std::sync::OnceLock;
 
@@ -96,24 +96,23 @@ impl Fit<'_> {
         let is_within =
             |by: f64| self.beside(fitted, &slopes, k, by).is_some_and(|there| there.chi2 <= fitted.chi2 + rise);
         let end = |side: f64| {
-            let (mut inner, mut outer) = (0.0, f64::INFINITY);
-            for doubling in -THOROUGH.halvings..=DOUBLINGS - THOROUGH.halvings {
-                let by = side * scale * 2.0_f64.powi(doubling);
-                if !is_within(by) {
-                    outer = by;
-                    break;
+            let place = |by: f64| (value + by).clamp(bounds[0], bounds[1]);
+            let mut inner = 0.0;
+            let mut outer = side * scale * 0.5_f64.powi(THOROUGH.halvings);
+            let farthest = outer.abs() * 2.0_f64.powi(DOUBLINGS);
+            while is_within(outer) {
+                if place(outer) == bounds[0] || place(outer) == bounds[1] || outer.abs() >= farthest {
+                    return place(outer);
                 }
-                inner = by;
-                if value + by <= bounds[0] || value + by >= bounds[1] {
-                    break;
-                }
+                inner = outer;
+                outer *= 2.0;
             }
-            for _ in 0..if outer.is_finite() { BISECTIONS } else { 0 } {
-                let by = 0.5 * (inner + outer);
-                *(if is_within(by) { &mut inner } else { &mut outer }) = by;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (inner + outer);
+                *(if is_within(middle) { &mut inner } else { &mut outer }) = middle;
             }
             // What lies between is not known to be within.
-            (value + if outer.is_finite() { outer } else { inner }).clamp(bounds[0], bounds[1])
+            place(outer)
         };
         Some([end(-1.0), end(1.0)])
     }

@@ -135,7 +135,7 @@ const GOOD: f64 = 1.15;
 
 /// The trial with a table at a place, fitted with everything else; and the table. Tried are what explains most and what
 /// comes close, from the linear estimate and from nothing. `None` where no table can be fitted.
-pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> Option<(Trial<'a>, Unexplained)> {
+pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> Option<(Trial<'a>, Table)> {
     let scene = crate::screen::Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
     let sizes = sizes(&located.port, &from.variant.model, &from.fit.pieces, &scene.trajectories)?;
     let ports = &search.subject.model.interface().ports;
@@ -171,13 +171,15 @@ pub fn stopgap<'a>(search: &Search<'a>, from: &Trial<'a>, located: &Located) -> 
             }
         }
     }
-    let (trial, table) = best?;
-    let values = &trial.added.last()?.strengths;
-    let unexplained = Unexplained {
+    best
+}
+
+/// What no effect explains at a place, as a table with these values.
+pub fn unexplained(located: &Located, table: &Table, values: &[f64]) -> Unexplained {
+    Unexplained {
         place: located.evidence.place.clone(),
         share: located.evidence.share,
         over: table.over.name().to_owned(),
         table: table.points.iter().zip(values).map(|(p, &y)| [p[0], y]).collect(),
-    };
-    Some((trial, unexplained))
+    }
 }

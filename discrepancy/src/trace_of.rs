@@ -142,21 +142,14 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             }
         }
         Spot::Sensor(_) => {
-            let of = |i: usize, s: Spot| match s {
-                Spot::Sensor(series) => trajectories[i].predicted[series].as_slice(),
-                _ => &[],
+            let of = |&(i, s): &(usize, Spot)| match s {
+                Spot::Sensor(k) => (pieces[i].series[k].times.as_slice(), trajectories[i].predicted[k].as_slice()),
+                _ => (&[][..], &[][..]),
             };
-            let values = || spots.iter().flat_map(|&(i, s)| of(i, s).iter().copied());
-            let rates = spots.iter().flat_map(|&(i, s)| {
-                let times = match s {
-                    Spot::Sensor(series) => pieces[i].series[series].times.as_slice(),
-                    _ => &[],
-                };
-                of(i, s)
-                    .windows(2)
-                    .zip(times.windows(2))
-                    .map(|(y, t)| (y[1] - y[0]) / (t[1] - t[0]))
-                    .collect::<Vec<_>>()
+            let values = || spots.iter().flat_map(|spot| of(spot).1.iter().copied());
+            let rates = spots.iter().flat_map(|spot| {
+                let (times, values) = of(spot);
+                values.windows(2).zip(times.windows(2)).map(|(y, t)| (y[1] - y[0]) / (t[1] - t[0]))
             });
             let value = positive(amplitude(values()));
             let speed = positive(amplitude(rates.collect::<Vec<_>>().into_iter()));
@@ -446,3 +439,15 @@ fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &m
 
 /// The largest number of states of an effect that is screened.
 const MOST_STATES: usize = 8;
+
+#[cfg(test)]
+mod tests {
+    use super::between;
+
+    #[test]
+    fn a_sensor_of_another_rate_is_read_along_straight_lines_and_keeps_its_ends() {
+        let (times, values) = ([0.0, 0.5, 2.0], [1.0, 2.0, -1.0]);
+        let read = [-1.0, 0.0, 0.25, 0.5, 1.0, 2.0, 3.0].map(|t| between(&times, &values, t));
+        assert_eq!(read, [1.0, 1.0, 1.5, 2.0, 1.0, -1.0, -1.0]);
+    }
+}

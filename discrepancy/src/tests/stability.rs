@@ -58,4 +58,7 @@ fn what_is_chosen_by_chance_is_not_chosen_again() {
     let either_way = &["quadratic-stiffness", "sensor-drift"];
     let (_, stability) = chosen(either_way, vec![record("one", 0.0, 0.0), record("two", 0.0, 0.0)]);
     assert!(stability.share < 0.95, "{stability:?}");
+    let share = |noise: &str| chosen(&["sensor-drift", "damping-drift"], vec![record(noise, 0.0, 0.0)]).1.share;
+    let shares = ["one", "two", "three", "four", "five"].map(share);
+    assert!(shares.iter().sum::<f64>() < 0.9 * 5.0, "{shares:?}");
 }

@@ -251,6 +251,14 @@ fn tangents_are_those_of_differences() {
 }
 
 #[test]
+fn free_start_values_are_those_of_all_states_or_that_of_a_memory() {
+    for effect in effects() {
+        let all = if effect.memory() > 0 { 1 } else { effect.states() };
+        assert!([0, all].contains(&effect.free_starts().len()), "{}", effect.name());
+    }
+}
+
+#[test]
 fn the_catalogue_has_the_effects_that_engineers_name() {
     let named = "coulomb-friction stribeck-friction stiction viscous-friction quadratic-drag cubic-stiffness \
                  linear-stiffness sensor-dead-zone sensor-bias sensor-gain sensor-delay sensor-lag sensor-drift input-delay \

@@ -182,6 +182,20 @@ mod tests {
     }
 
     #[test]
+    fn inputs_are_held_as_the_case_says_and_an_unknown_word_is_a_mistake() {
+        let study = |hold: &str| {
+            let case = CASE.replacen("\"states\"", &format!("\"input_hold\": \"{hold}\", \"states\""), 1);
+            Declared::read(&case).unwrap().study("c", Path::new("folder"))
+        };
+        for (said, hold) in
+            [("zoh (held)", "zero"), ("foh", "first"), ("piecewise linear", "first"), ("band-limited", "band-limited")]
+        {
+            assert!(study(said).unwrap().contains(&format!("hold = \"{hold}\"")), "{said}");
+        }
+        assert!(study("cubic").unwrap_err().contains("`cubic`"));
+    }
+
+    #[test]
     fn places_are_spelt_as_the_case_spells_them() {
         let declared = Declared::read(CASE).unwrap();
         assert_eq!(answer::located("joint:x", &declared.locations), "process:x");

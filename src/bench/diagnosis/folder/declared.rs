@@ -20,9 +20,8 @@ pub(super) struct Declared {
     parameters: Vec<Parameter>,
     #[serde(default)]
     constants: Map<String, Value>,
-    /// The first word counts; of what it holds nothing is said where it is absent.
-    #[serde(default = "zero")]
-    input_hold: String,
+    /// What inputs do from sample to sample, its first word first; as a computer holds them where it is absent.
+    input_hold: Option<String>,
     #[serde(default)]
     pub locations: Vec<String>,
     #[serde(default)]
@@ -61,10 +60,6 @@ struct Parameter {
     guess: f64,
     lower: f64,
     upper: f64,
-}
-
-fn zero() -> String {
-    "zero".to_owned()
 }
 
 /// A text as TOML writes it.
@@ -152,14 +147,16 @@ impl Declared {
 
     /// What the inputs do from sample to sample, as a study says it.
     fn hold(&self) -> Result<&'static str, String> {
-        let says = |words: &[&str]| words.iter().any(|word| self.input_hold.starts_with(word));
-        match () {
-            () if self.inputs.is_empty() || says(&["zoh", "zero"]) => Ok("zero"),
-            () if says(&["foh", "first", "linear"]) => Ok("first"),
-            () if says(&["band-limited"]) => Ok("band-limited"),
-            () => {
-                Err(format!("case.json: `input_hold` is none of zero, first and band-limited: `{}`", self.input_hold))
-            }
+        let said = self.input_hold.as_deref().unwrap_or("zero");
+        let begins = |words: &[&str]| words.iter().any(|word| said.starts_with(word));
+        if self.inputs.is_empty() || begins(&["zoh", "zero"]) {
+            Ok("zero")
+        } else if begins(&["foh", "first"]) || said.contains("linear") {
+            Ok("first")
+        } else if begins(&["band-limited"]) {
+            Ok("band-limited")
+        } else {
+            Err(format!("case.json: `input_hold` is none of zero, first and band-limited: `{said}`"))
         }
     }
 
