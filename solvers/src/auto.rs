@@ -11,15 +11,17 @@ use crate::nsga3::Nsga3Options;
 use crate::pattern_search::PatternSearchOptions;
 use crate::quasi_newton::QuasiNewton;
 use crate::relay::Relay;
+use crate::second_opinion::SecondOpinion;
 use crate::sqp::SqpOptions;
 use crate::texture::{Texture, texture};
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp`. One criterion without constraints is looked at along two lines near the start: where it is
-/// noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`. Each begins at
-/// several starts: the study's own, and the best points of a sample of the box. Where the objective is no sum of squares a
-/// pattern search goes on from the end of the first run and, after all starts, from the best point found, because an optimum
+/// numbers or lists, else `sqp`. One criterion without constraints is looked at along two or three lines near the start: where
+/// it is noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`, with a
+/// pattern search from the study's own start as a second opinion on where that leads. Each begins at several starts: the
+/// study's own, and the best points of a sample of the box. Where the objective is neither a sum of squares nor found smooth a
+/// pattern search goes on from the end of the first run, and, after all starts, from the best point found, because an optimum
 /// may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
 /// best point until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is
 /// `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria
@@ -90,12 +92,12 @@ impl Solver for Auto {
             self.stage = Some(Stage::Front(front));
             return Ok(());
         }
-        let local = choose(oracle, start)?;
-        let mut global = Multistart::new(local, self.options.starts);
-        global = if oracle.shape().residuals > 0 {
-            global.until_nothing_changes()
-        } else {
-            global.with_second(PatternSearchOptions::default().build())
+        let Choice { first, local } = choose(oracle, start)?;
+        let global = Multistart::new(local, self.options.starts);
+        let mut global = match first {
+            _ if oracle.shape().residuals > 0 => global.until_nothing_changes(),
+            Some(first) => global.with_first(first),
+            None => global.with_second(PatternSearchOptions::default().build()),
         };
         global.begin(oracle, start)?;
         self.stage = Some(Stage::Global(global));
@@ -194,26 +196,41 @@ fn front(shape: &Shape) -> Box<dyn Solver> {
     if objectives <= 2 { Nsga2Options::default().build() } else { Nsga3Options::default().build() }
 }
 
+/// What runs from several starts, and what from the study's own where that is something else.
+struct Choice {
+    first: Option<Box<dyn Solver>>,
+    local: Box<dyn Solver>,
+}
+
+impl From<Box<dyn Solver>> for Choice {
+    fn from(local: Box<dyn Solver>) -> Self {
+        Self { first: None, local }
+    }
+}
+
 /// The local solver of a problem.
-fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Box<dyn Solver>, Halt> {
+fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     let shape = oracle.shape().clone();
     // The starts are counted here, not in the chosen solver.
     let least_squares = LevenbergMarquardtOptions::default().local();
     if least_squares.accepts(&shape).is_ok() {
-        return Ok(least_squares);
+        return Ok(least_squares.into());
     }
     let sqp = SqpOptions::default().build();
     if sqp.accepts(&shape).is_err() || start.is_empty() {
-        return Ok(PatternSearchOptions::default().build());
+        return Ok(PatternSearchOptions::default().build().into());
     }
     // Where there are several rows a kink is mostly one between them; they are not looked at.
     let one = Box::new(QuasiNewton::default());
     if one.accepts(&shape).is_err() {
-        return Ok(sqp);
+        return Ok(sqp.into());
     }
     Ok(match texture(oracle, start)? {
-        Texture::Noisy => PatternSearchOptions::default().build(),
-        Texture::Kinked => sqp,
-        Texture::Smooth => Box::new(Relay::new(one, sqp)),
+        Texture::Noisy => PatternSearchOptions::default().build().into(),
+        Texture::Kinked => sqp.into(),
+        Texture::Smooth => Choice {
+            first: Some(Box::new(SecondOpinion::new(|| SqpOptions::default().build()))),
+            local: Box::new(Relay::new(one, sqp)),
+        },
     })
 }

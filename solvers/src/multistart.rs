@@ -1,13 +1,16 @@
 //! Runs a local solver from several starts, one after the other: the study's own first, then the best of a sample of the
 //! box, then, if wanted, around the best point found, again and again until nothing changes.
 
-use mops_core::{Evaluation, Halt, Linearisation, Merit, Oracle, Progress, Shape, Solver, Stream};
+use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Solver};
 
+use crate::own::Own;
 use crate::start::{best_of, latin_hypercube};
 
 /// A local solver with a list of starts.
 pub struct Multistart {
     local: Box<dyn Solver>,
+    /// What runs from the study's own start in its place.
+    first: Option<Box<dyn Solver>>,
     /// What goes on from where the first run ends, and whether it does now.
     second: Option<Box<dyn Solver>>,
     in_second: bool,
@@ -50,6 +53,7 @@ impl Multistart {
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
         Self {
             local,
+            first: None,
             second: None,
             in_second: false,
             extra: starts.saturating_sub(1),
@@ -62,6 +66,12 @@ impl Multistart {
             own: None,
             ends: Vec::new(),
         }
+    }
+
+    /// Another solver begins at the study's own start.
+    #[must_use]
+    pub fn with_first(self, first: Box<dyn Solver>) -> Self {
+        Self { first: Some(first), ..self }
     }
 
     /// Another solver goes on from the best point of the first run, before the other starts.
@@ -116,7 +126,7 @@ impl Multistart {
 
     fn begin_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.own = None;
-        self.local.begin(&mut Own { oracle, best: &mut self.own }, start)
+        self.first.as_mut().unwrap_or(&mut self.local).begin(&mut Own { oracle, best: &mut self.own }, start)
     }
 
     /// An iteration of the present run, or the beginning of the next.
@@ -125,7 +135,8 @@ impl Multistart {
     /// The run is over.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let mut own = Own { oracle: &mut *oracle, best: &mut self.own };
-        let solver = self.second.as_mut().filter(|_| self.in_second).unwrap_or(&mut self.local);
+        let solver = if self.in_second { &mut self.second } else { &mut self.first };
+        let solver = solver.as_mut().unwrap_or(&mut self.local);
         let progress = solver.step(&mut own)?;
         if progress == Progress::Continue {
             return Ok(progress);
@@ -138,7 +149,7 @@ impl Multistart {
             self.in_second = true;
             return Ok(Progress::Continue);
         }
-        (self.second, self.in_second) = (None, false);
+        (self.first, self.second, self.in_second) = (None, None, false);
         self.ends.push(self.own.as_ref().map_or(Merit::FAILED, |best| best.merit));
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
@@ -190,39 +201,5 @@ impl Multistart {
         let mut random = oracle.stream("multistart");
         let sample = latin_hypercube(self.extra * 5 * (n + 1), n, &mut random);
         best_of(oracle, &sample, self.extra)
-    }
-}
-
-/// The oracle of one run: its best is the best of that run.
-struct Own<'a> {
-    oracle: &'a mut dyn Oracle,
-    best: &'a mut Option<Evaluation>,
-}
-
-impl Oracle for Own<'_> {
-    fn shape(&self) -> &Shape {
-        self.oracle.shape()
-    }
-
-    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
-        let answers = self.oracle.evaluate(points)?;
-        for answer in &answers {
-            if self.best.as_ref().is_none_or(|best| answer.merit.is_better_than(&best.merit)) {
-                *self.best = Some(answer.clone());
-            }
-        }
-        Ok(answers)
-    }
-
-    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
-        self.oracle.linearise(point, reach)
-    }
-
-    fn best(&self) -> Option<&Evaluation> {
-        self.best.as_ref()
-    }
-
-    fn stream(&self, label: &str) -> Stream {
-        self.oracle.stream(label)
     }
 }

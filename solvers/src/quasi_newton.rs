@@ -15,6 +15,23 @@ use crate::start::usable_start;
 #[derive(Default)]
 pub struct QuasiNewton {
     state: Option<State>,
+    /// Whether it ends where little more is to be had.
+    rough: bool,
+}
+
+impl QuasiNewton {
+    /// One that ends where steps bring less than a millionth of the value; with [`QuasiNewton::refine`] it goes on.
+    pub fn rough() -> Self {
+        Self { rough: true, ..Self::default() }
+    }
+
+    /// Goes on to the end.
+    pub fn refine(&mut self) {
+        self.rough = false;
+        if let Some(state) = &mut self.state {
+            state.idle = 0;
+        }
+    }
 }
 
 struct State {
@@ -38,6 +55,9 @@ struct State {
 /// Share of the promised decrease that a step must keep.
 const ENOUGH: f64 = 1e-4;
 
+/// The same of a step whose length nothing is known of: a longer one may lead over a valley to where all is flat.
+const AT_FIRST: f64 = 0.3;
+
 /// Share of the slope that may be left after a step.
 const LEFT: f64 = 0.9;
 
@@ -53,6 +73,10 @@ const REACH: [f64; 2] = [1.0, 1e-6];
 /// Relative change of the value that is none; so many in a row are the end.
 const IDLE: f64 = 1e-11;
 const MOST_IDLE: usize = 4;
+
+/// The same of a rough end.
+const IDLE_ROUGHLY: f64 = 1e-6;
+const MOST_IDLE_ROUGHLY: usize = 2;
 
 /// Share of the change of the slope along a step by which the trapezoid rule is off beyond a kink; for smooth rows it is far
 /// less. So many such steps in a row are left to those who look for kinks.
@@ -100,18 +124,19 @@ impl Solver for QuasiNewton {
         }
         let direction = state.direction();
         let steepness = -state.slope.dot(&direction);
-        if steepness <= IDLE * IDLE * state.value.abs() || !steepness.is_finite() {
-            return state.renew(oracle);
-        }
-        if state.kinks >= MOST_KINKS {
+        let is_level = steepness <= IDLE * IDLE * state.value.abs() || !steepness.is_finite();
+        if !is_level && state.kinks >= MOST_KINKS {
             return Ok(Progress::Stalled);
         }
         let before = state.value;
-        if !state.search(oracle, &direction, steepness)? {
-            return state.renew(oracle);
+        let (idle, most) = if self.rough { (IDLE_ROUGHLY, MOST_IDLE_ROUGHLY) } else { (IDLE, MOST_IDLE) };
+        if !is_level && state.search(oracle, &direction, steepness)? {
+            state.idle = if before - state.value <= idle * before.abs() { state.idle + 1 } else { 0 };
+            if state.idle < most {
+                return Ok(Progress::Continue);
+            }
         }
-        state.idle = if before - state.value <= IDLE * before.abs() { state.idle + 1 } else { 0 };
-        if state.idle >= MOST_IDLE { state.renew(oracle) } else { Ok(Progress::Continue) }
+        if self.rough { Ok(Progress::Converged) } else { state.renew(oracle) }
     }
 }
 
@@ -175,7 +200,8 @@ impl State {
             }
             let answer = oracle.evaluate(std::slice::from_ref(&point))?.pop().expect("one point, one answer");
             let value = answer.scaled.as_ref().map_or(f64::INFINITY, |_| answer.merit.objective);
-            if !(value <= self.value - ENOUGH * t * steepness && value < self.value) {
+            let enough = if self.learned { ENOUGH } else { AT_FIRST };
+            if !(value <= self.value - enough * t * steepness && value < self.value) {
                 high = t;
                 // Where the parabola through both values has its minimum; halfway where a step before was good.
                 let parabola = 0.5 * t * t * steepness / (value - self.value + t * steepness);
@@ -191,7 +217,8 @@ impl State {
             let (value, slope) = row(oracle.shape(), &at);
             let left = -slope.dot(direction);
             reached = Some((at, value, slope));
-            if left <= LEFT * steepness || t >= room {
+            // Of what is promised next to nothing, slopes by differences tell nothing either.
+            if left <= LEFT * steepness || t >= room || t * steepness <= IDLE * value.abs() {
                 break;
             }
             low = t;

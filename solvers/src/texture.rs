@@ -20,6 +20,9 @@ const VALUES: usize = 7;
 /// Distance of neighbouring ones, in the unit box: noise that is smooth at a smaller distance does nobody harm there.
 const APART: f64 = 1e-3;
 
+/// The same where values so far apart may be those of smooth rows that bend more.
+const CLOSER: f64 = 1e-4;
+
 /// Distance over which slopes are taken, in the unit box.
 const NEAR: f64 = 1e-5;
 
@@ -43,21 +46,21 @@ const ROUGH: f64 = 2.2;
 /// The run is over.
 pub fn texture(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Texture, Halt> {
     let mut random = oracle.stream("texture");
+    // From a little beside the start, where kinks are made on purpose, towards the middle of the box.
+    let mut line = |apart: f64| -> Vec<[f64; 2]> {
+        let coordinate = |u: &f64| {
+            let towards = if *u < 0.5 { 1.0 } else { -1.0 };
+            [u + towards * APART * random.random::<f64>(), towards * apart * random.random_range(0.5..1.0)]
+        };
+        start.iter().map(coordinate).collect()
+    };
     let mut ratios: Vec<f64> = Vec::new();
     for _ in 0..2 {
-        // From a little beside the start, where kinks are made on purpose, towards the middle of the box.
-        let line: Vec<[f64; 2]> = start
-            .iter()
-            .map(|u| {
-                let towards = if *u < 0.5 { 1.0 } else { -1.0 };
-                [u + towards * APART * random.random::<f64>(), towards * APART * random.random_range(0.5..1.0)]
-            })
-            .collect();
+        let line = line(APART);
         let Some(rows) = along(oracle, &line, 0.0)? else { return Ok(Texture::Smooth) };
         ratios.resize(rows.len(), 1.0);
         for (values, ratio) in rows.iter().zip(&mut ratios) {
-            let size = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-            if of_values(values).is_none_or(|noise| noise <= NONE * size) {
+            if fade(values) {
                 *ratio = 0.0;
             }
         }
@@ -72,8 +75,12 @@ pub fn texture(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Texture, Halt> 
         }
     }
     // The geometric mean of both lines.
-    let noisy = ratios.iter().any(|ratio| *ratio > ROUGH * ROUGH);
-    Ok(if noisy { Texture::Noisy } else { Texture::Kinked })
+    if ratios.iter().any(|ratio| *ratio > ROUGH * ROUGH) {
+        return Ok(Texture::Noisy);
+    }
+    // What bends within a few distances looks like a kink, until one looks closer.
+    let Some(rows) = along(oracle, &line(CLOSER), 0.0)? else { return Ok(Texture::Kinked) };
+    Ok(if rows.iter().all(|values| fade(values)) { Texture::Smooth } else { Texture::Kinked })
 }
 
 /// Values of every row that counts along a line, each a part of the distance further; `None` where a point fails.
@@ -91,6 +98,12 @@ fn along(oracle: &mut dyn Oracle, line: &[[f64; 2]], further: f64) -> Result<Opt
 fn spread(values: &[f64]) -> f64 {
     let squares: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     (squares / (values.len() - 1) as f64).sqrt()
+}
+
+/// Whether differences of values at equal distances fade from order to order.
+fn fade(values: &[f64]) -> bool {
+    let size = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    of_values(values).is_none_or(|noise| noise <= NONE * size)
 }
 
 /// The noise of values at equal distances; `None` where none is found.

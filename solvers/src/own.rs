@@ -1,0 +1,39 @@
+//! What one solver among several has seen itself.
+
+use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape, Stream};
+
+/// The oracle of one run: its best is the best of that run.
+pub struct Own<'a> {
+    /// That of all.
+    pub oracle: &'a mut dyn Oracle,
+    /// The best point of this run.
+    pub best: &'a mut Option<Evaluation>,
+}
+
+impl Oracle for Own<'_> {
+    fn shape(&self) -> &Shape {
+        self.oracle.shape()
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        let answers = self.oracle.evaluate(points)?;
+        for answer in &answers {
+            if self.best.as_ref().is_none_or(|best| answer.merit.is_better_than(&best.merit)) {
+                *self.best = Some(answer.clone());
+            }
+        }
+        Ok(answers)
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        self.oracle.linearise(point, reach)
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref()
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        self.oracle.stream(label)
+    }
+}

@@ -1,0 +1,100 @@
+//! Two solvers of different kinds from one start, the first to rough accuracy until the other has been heard.
+
+use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+
+use crate::own::Own;
+use crate::pattern_search::PatternSearchOptions;
+use crate::quasi_newton::QuasiNewton;
+use crate::relay::Relay;
+
+/// For one smooth row: BFGS to rough accuracy; then a pattern search from the same start, whose models of a wider neighbourhood
+/// may lead to another basin, until it comes near to where slopes have led; then BFGS again, from the better end.
+pub struct SecondOpinion {
+    slopes: QuasiNewton,
+    /// What goes on where slopes meet kinks.
+    at_kinks: fn() -> Box<dyn Solver>,
+    start: Vec<f64>,
+    stage: Stage,
+}
+
+enum Stage {
+    /// Slopes, to rough accuracy.
+    Rough,
+    /// The other from the start: where slopes ended, and the best that it has seen itself.
+    Other { pattern: Box<dyn Solver>, end: Evaluation, own: Option<Evaluation> },
+    /// Slopes on from where they ended.
+    Fine,
+    /// Another solver from the best point on.
+    Last(Box<dyn Solver>),
+}
+
+/// Share of the way from the start to an end within which another end is the same.
+const NEAR: f64 = 0.3;
+
+impl SecondOpinion {
+    /// With what goes on from the best point where slopes meet kinks.
+    pub fn new(at_kinks: fn() -> Box<dyn Solver>) -> Self {
+        Self { slopes: QuasiNewton::rough(), at_kinks, start: Vec::new(), stage: Stage::Rough }
+    }
+
+    fn go_on_with(&mut self, mut last: Box<dyn Solver>, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
+        last.begin(oracle, &best)?;
+        self.stage = Stage::Last(last);
+        Ok(Progress::Continue)
+    }
+}
+
+impl Solver for SecondOpinion {
+    fn accepts(&self, shape: &Shape) -> Result<(), String> {
+        self.slopes.accepts(shape)
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.start = start.to_vec();
+        self.slopes = QuasiNewton::rough();
+        self.stage = Stage::Rough;
+        self.slopes.begin(oracle, start)
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        match &mut self.stage {
+            Stage::Rough => match (self.slopes.step(oracle)?, oracle.best().cloned()) {
+                (Progress::Converged, Some(end)) => {
+                    let mut pattern = PatternSearchOptions::default().build();
+                    let mut own = None;
+                    pattern.begin(&mut Own { oracle, best: &mut own }, &self.start)?;
+                    self.stage = Stage::Other { pattern, end, own };
+                    Ok(Progress::Continue)
+                }
+                (Progress::Stalled, _) => self.go_on_with((self.at_kinks)(), oracle),
+                (progress, _) => Ok(progress),
+            },
+            Stage::Other { pattern, end, own } => {
+                let progress = pattern.step(&mut Own { oracle: &mut *oracle, best: own })?;
+                let is_better = own.as_ref().is_some_and(|own| own.merit.is_better_than(&end.merit));
+                let way = distance(&self.start, &end.point);
+                let is_near = own.as_ref().is_some_and(|own| distance(&own.point, &end.point) <= NEAR * way);
+                if progress == Progress::Continue && (is_better || !is_near) {
+                    return Ok(progress);
+                }
+                if is_better {
+                    let last = Relay::new(Box::new(QuasiNewton::default()), (self.at_kinks)());
+                    return self.go_on_with(Box::new(last), oracle);
+                }
+                self.slopes.refine();
+                self.stage = Stage::Fine;
+                Ok(Progress::Continue)
+            }
+            Stage::Fine => match self.slopes.step(oracle)? {
+                Progress::Stalled => self.go_on_with((self.at_kinks)(), oracle),
+                progress => Ok(progress),
+            },
+            Stage::Last(last) => last.step(oracle),
+        }
+    }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
