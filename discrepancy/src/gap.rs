@@ -1,10 +1,18 @@
-//! A gap in measured values: one value alone, and none on either side of it, as where a potentiometer is open.
+//! A gap in measured values: many samples at one value, and next to none on either side of it, as where a potentiometer is
+//! open.
 
-/// How many standard deviations of the noise apart values are that do not belong together.
-const APART: f64 = 6.0;
+/// Within so many standard deviations of the noise samples show one value.
+const ONE: f64 = 2.5;
 
-/// Fewest samples within a gap: fewer may be a motion in passing.
+/// Around many of these, so many: beyond them, and up to so many deviations, there are next to none about a gap, at most this
+/// share. About a motion in passing there are four fifths.
+const MANY: usize = 20;
+const NEAR: f64 = 4.5;
+const FEW: f64 = 0.15;
+
+/// Around fewer, at least so many, there are none up to so many deviations.
 const FEWEST: usize = 5;
+const FAR: f64 = 8.5;
 
 /// A gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,13 +28,18 @@ pub struct Gap {
 pub fn gap(values: &[f64], noise: f64) -> Option<Gap> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    let together: Vec<&[f64]> = sorted.chunk_by(|a, b| b - a <= APART * noise).collect();
-    let alone = together.windows(3).filter_map(|three| {
-        let [below, group, above] = three else { return None };
-        let middle = group.iter().sum::<f64>() / group.len() as f64;
-        let one_value = group.len() >= FEWEST && group[group.len() - 1] - group[0] <= 2.0 * APART * noise;
-        let half_width = (middle - below[below.len() - 1]).min(above[0] - middle);
-        one_value.then_some((group.len(), Gap { middle, half_width }))
+    // Samples below a value, by their number.
+    let below = |value: f64| sorted.partition_point(|v| *v < value);
+    let alone = sorted.iter().filter_map(|value| {
+        let core = &sorted[below(value - ONE * noise)..below(value + ONE * noise)];
+        let middle = core.iter().sum::<f64>() / core.len() as f64;
+        let around = |apart: f64| [below(middle - apart * noise), below(middle + apart * noise)];
+        let [[low, high], [lowest, highest]] = [around(NEAR), around(FAR)];
+        let is_alone = core.len() >= MANY && (high - low).saturating_sub(core.len()) as f64 <= FEW * core.len() as f64
+            || core.len() >= FEWEST && highest - lowest == core.len();
+        let (next_below, next_above) = (sorted.get(low.checked_sub(1)?)?, sorted.get(high)?);
+        let half_width = (middle - next_below).min(next_above - middle);
+        is_alone.then_some((core.len(), Gap { middle, half_width }))
     });
     alone.max_by_key(|(count, _)| *count).map(|(_, gap)| gap)
 }
@@ -50,6 +63,14 @@ mod tests {
         let gap = gap(&wave(0.05), NOISE).expect("there is one");
         assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
         assert!(gap.half_width > 0.05 - 3.0 * NOISE && gap.half_width < 0.075, "{gap:?}");
+    }
+
+    /// Noise reaches from either side into it, and nothing is empty for long.
+    #[test]
+    fn a_narrow_gap_is_told_by_how_many_samples_show_its_value() {
+        let gap = gap(&wave(8.0 * NOISE), NOISE).expect("there is one");
+        assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
+        assert!((4.5 * NOISE..11.0 * NOISE).contains(&gap.half_width), "{gap:?}");
     }
 
     #[test]
