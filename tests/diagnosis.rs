@@ -81,6 +81,18 @@ fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
 }
 
 #[test]
+fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
+    // `k (around - T)` explains the data as well, with the declared loss at zero.
+    let missing = Missing::Effects(&["constant-heat-gain"]);
+    let case = generate("jacket", missing, 20.0, 2_151_778_617_756).expect("it can be made");
+    let mut few = catalogue();
+    few.effects.retain(|effect| ["constant-force", "linear-loss"].contains(&effect.name()));
+    let diagnosis = diagnosis_among(&case, few, 1);
+    assert_eq!(found(&diagnosis), [("constant-force", "process:Tj")]);
+    assert!(diagnosis.removed.is_empty(), "{:?}", diagnosis.removed);
+}
+
+#[test]
 fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
     // In windows the base leaves 10 times the noise; from nothing the fit ended at a quarter of the friction, with 9 left.
     let missing = Missing::Effects(&["coulomb-friction"]);

@@ -66,7 +66,7 @@ pub fn diagnose(
 
     let growth = search.grow(&base, options, watch)?;
     let growth = search.settle(growth, watch);
-    let (last, held) = search.without_declared(growth.last);
+    let (growth, last, held) = search.reduce(growth);
     watch.stage("the repaired model", 0.9);
     let (rounds, steps, allowed) = (growth.rounds, growth.steps, growth.allowed);
     let (last, held, after, rounds) = match search.calibrate(&last, &held) {

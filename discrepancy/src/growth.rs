@@ -5,11 +5,13 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use mops_core::{Mistake, Watch};
+use rayon::prelude::*;
 
 use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
 use crate::round::{Round, best_first};
+use crate::screen::Screened;
 use crate::search::{Search, Trial};
 use crate::variant::Added;
 use crate::weigh::{CLEARLY, Dispersion, by_chance, criterion};
@@ -226,6 +228,53 @@ impl<'a> Search<'a> {
             }
         }
         None
+    }
+
+    /// The growth with what declared terms its effects make superfluous, at zero; beside it the model without them.
+    pub fn reduce(&self, mut growth: Growth<'a>) -> (Growth<'a>, Trial<'a>, Vec<usize>) {
+        let (reduced, held) = self.without_declared(growth.last.clone());
+        let Some((simpler, index)) = self.restated(&growth, &reduced, &held) else { return (growth, reduced, held) };
+        growth.rounds[index] = Arc::clone(&growth.rounds[index]).joined(&simpler);
+        growth.step("exchanged", simpler);
+        // Other shapes were allowed of what is no longer in.
+        growth.allowed.clear();
+        let (reduced, held) = self.without_declared(growth.last.clone());
+        (growth, reduced, held)
+    }
+
+    /// The model with declared terms back in that an effect made superfluous, and with a simpler one in the place of that, where
+    /// it is not clearly worse; and its round. Else a constant beside a declared loss is told as a loss towards elsewhere.
+    fn restated(&self, growth: &Growth<'a>, reduced: &Trial<'a>, held: &[usize]) -> Option<(Trial<'a>, usize)> {
+        let of = Dispersion::of(reduced);
+        // What they were held at is one more unknown each.
+        #[allow(clippy::cast_precision_loss)]
+        let terms = held.len() as f64 * of.worth(reduced.fitted.count);
+        let mut tuners = reduced.fitted.point.globals[..self.subject.globals.len()].to_vec();
+        held.iter().for_each(|&k| tuners[k] = self.subject.start()[k]);
+        let mut trials: Vec<(Trial<'a>, usize)> = Vec::new();
+        for (index, own) in reduced.added.iter().enumerate().filter(|_| !held.is_empty()) {
+            let found = |round: &Arc<Round<'a>>| {
+                round.trials.first().and_then(Trial::newest).is_some_and(|newest| newest.is(&own.candidate))
+            };
+            let Some(round) = growth.rounds.iter().position(found) else { continue };
+            let others = [&reduced.added[..index], &reduced.added[index + 1..]].concat();
+            let beside = self.candidates(&others);
+            let simpler = |s: &&Screened| {
+                let (effect, candidate) = (s.added.candidate.effect.as_ref(), &s.added.candidate);
+                candidate.port == own.candidate.port
+                    && beside.iter().any(|free| free.is(candidate))
+                    && effect.strengths().len() < own.candidate.effect.strengths().len()
+            };
+            let fit = |s: &Screened| {
+                let added = [others.as_slice(), &[self.neutral_start(&s.added)]].concat();
+                self.trial(&added, &tuners, self.own_locals(reduced), reduced.windows, 40)
+            };
+            let screened: Vec<&Screened> = growth.rounds[round].screened.iter().filter(simpler).collect();
+            let fitted: Vec<Trial<'a>> = screened.into_par_iter().filter_map(fit).collect();
+            trials.extend(fitted.into_iter().map(|trial| (trial, round)));
+        }
+        trials.retain(|(trial, _)| criterion(trial, &of) + terms < criterion(reduced, &of) + CLEARLY);
+        trials.into_iter().min_by(|a, b| criterion(&a.0, &of).total_cmp(&criterion(&b.0, &of)))
     }
 
     /// The model with one of its effects exchanged, as long as something is left and not too many were.

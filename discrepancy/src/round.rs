@@ -65,6 +65,15 @@ impl<'a> Round<'a> {
         best_first(&mut round.trials);
         Arc::new(round)
     }
+
+    /// The round with one more model.
+    pub fn joined(self: Arc<Self>, trial: &Trial<'a>) -> Arc<Self> {
+        let mut round = Self::clone(&self);
+        round.trials.retain(|known| !known.has_effects_of(trial));
+        round.trials.push(trial.clone());
+        best_first(&mut round.trials);
+        Arc::new(round)
+    }
 }
 
 fn white(count: usize) -> Vec<Vec<f64>> {
@@ -288,7 +297,7 @@ impl<'a> Search<'a> {
     }
 
     /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
-    fn neutral_start(&self, added: &Added) -> Added {
+    pub(crate) fn neutral_start(&self, added: &Added) -> Added {
         let mut added = added.clone();
         let first = &added.candidate.effect.strengths()[0];
         if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
