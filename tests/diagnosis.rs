@@ -85,9 +85,7 @@ fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
     // `k (around - T)` explains the data as well, with the declared loss at zero.
     let missing = Missing::Effects(&["constant-heat-gain"]);
     let case = generate("jacket", missing, 20.0, 2_151_778_617_756).expect("it can be made");
-    let mut few = catalogue();
-    few.effects.retain(|effect| ["constant-force", "linear-loss"].contains(&effect.name()));
-    let diagnosis = diagnosis_among(&case, few, 1);
+    let diagnosis = diagnosis(&case, false);
     assert_eq!(found(&diagnosis), [("constant-force", "process:Tj")]);
     assert!(diagnosis.removed.is_empty(), "{:?}", diagnosis.removed);
 }
