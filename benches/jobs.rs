@@ -12,8 +12,10 @@ use mops::solvers::sqp::SqpOptions;
 use mops::{Budget, Evaluation, Evaluator, Run, Shape, Solver, SolverOptions, Usage};
 
 const TAKES: Duration = Duration::from_millis(200);
-const TUNERS: usize = 6;
-const EVALUATIONS: usize = 80;
+
+/// Numbers of tuners, and of evaluations. Between polls and slopes single points are tried: the fewer tuners, the larger their
+/// share.
+const SIZES: [(usize, usize); 2] = [(6, 80), (20, 160)];
 
 /// A solver's name, and how it is built.
 type Named = (&'static str, fn() -> Box<dyn Solver>);
@@ -51,28 +53,32 @@ impl Evaluator for Slow {
 }
 
 /// Seconds for the budget on so many threads, and the best objective.
-fn take(problem: &Slow, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
+fn take(problem: &Slow, evaluations: usize, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     pool.install(|| {
         let begun = Instant::now();
-        let mut run = Run::new(problem, Budget { evaluations: EVALUATIONS }, &());
-        run.solve(solver, &[0.9; TUNERS]);
+        let mut run = Run::new(problem, Budget { evaluations }, &());
+        run.solve(solver, &vec![0.9; problem.0.spacing.len()]);
         let best = run.archive().iter().map(|record| record.merit.objective).fold(f64::INFINITY, f64::min);
         (begun.elapsed().as_secs_f64(), best)
     })
 }
 
 fn main() {
-    let shape = Shape { spacing: vec![0.0; TUNERS], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
-    let problem = Slow(shape);
     let solvers: [Named; 3] = [
         ("genetic", || GeneticOptions::default().build()),
         ("pattern-search", || PatternSearchOptions::default().build()),
         ("sqp, slopes by differences", || SqpOptions::default().build()),
     ];
-    for (name, build) in solvers {
-        let [(one, best), (two, same)] = [1, 2].map(|threads| take(&problem, build().as_mut(), threads));
-        assert_eq!(best.to_bits(), same.to_bits(), "{name}: threads change no bit");
-        println!("{name:28} 1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {:.2}", one / two);
+    for (tuners, evaluations) in SIZES {
+        let shape = Shape { spacing: vec![0.0; tuners], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
+        let problem = Slow(shape);
+        for (name, build) in solvers {
+            let [(one, best), (two, same)] =
+                [1, 2].map(|threads| take(&problem, evaluations, build().as_mut(), threads));
+            assert_eq!(best.to_bits(), same.to_bits(), "{name}: threads change no bit");
+            let ratio = one / two;
+            println!("{name:28} {tuners:2} tuners  1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {ratio:.2}");
+        }
     }
 }
