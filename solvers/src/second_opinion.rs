@@ -20,12 +20,21 @@ pub struct SecondOpinion {
 enum Stage {
     /// Slopes, to rough accuracy.
     Rough,
-    /// The other from the start: where slopes ended, and the best that it has seen itself.
-    Other { pattern: Box<dyn Solver>, end: Evaluation, own: Option<Evaluation> },
+    /// The other from the start.
+    Other(Box<Other>),
     /// Slopes on from where they ended.
     Fine,
     /// Another solver from the best point on.
     Last(Box<dyn Solver>),
+}
+
+/// A pattern search beside an end that is known.
+struct Other {
+    pattern: Box<dyn Solver>,
+    /// Where slopes ended.
+    end: Evaluation,
+    /// The best that it has seen itself.
+    own: Option<Evaluation>,
 }
 
 /// Share of the way from the start to an end within which another end is the same.
@@ -64,13 +73,14 @@ impl Solver for SecondOpinion {
                     let mut pattern = PatternSearchOptions::default().build();
                     let mut own = None;
                     pattern.begin(&mut Own { oracle, best: &mut own }, &self.start)?;
-                    self.stage = Stage::Other { pattern, end, own };
+                    self.stage = Stage::Other(Box::new(Other { pattern, end, own }));
                     Ok(Progress::Continue)
                 }
                 (Progress::Stalled, _) => self.go_on_with((self.at_kinks)(), oracle),
                 (progress, _) => Ok(progress),
             },
-            Stage::Other { pattern, end, own } => {
+            Stage::Other(other) => {
+                let Other { pattern, end, own } = other.as_mut();
                 let progress = pattern.step(&mut Own { oracle: &mut *oracle, best: own })?;
                 let is_better = own.as_ref().is_some_and(|own| own.merit.is_better_than(&end.merit));
                 let way = distance(&self.start, &end.point);
