@@ -42,9 +42,12 @@ impl Candidate {
 
     /// Whether it is of the same class at the same place, and has fewer strengths.
     pub fn is_simpler_than(&self, other: &Self) -> bool {
-        self.port == other.port
-            && self.effect.class() == other.effect.class()
-            && self.effect.strengths().len() < other.effect.strengths().len()
+        self.effect.class() == other.effect.class() && self.has_fewer_strengths_than(other)
+    }
+
+    /// Whether it is at the same place, and has fewer strengths.
+    pub fn has_fewer_strengths_than(&self, other: &Self) -> bool {
+        self.port == other.port && self.effect.strengths().len() < other.effect.strengths().len()
     }
 
     /// The unit of a strength as results spell it: empty where the model does not tell that of its forces.

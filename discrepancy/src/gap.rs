@@ -5,7 +5,8 @@
 const ONE: f64 = 2.5;
 
 /// Around many of these, so many: beyond them, and up to so many deviations, there are next to none about a gap, at most this
-/// share. About a motion in passing there are four fifths.
+/// share; about a motion in passing there are four fifths. So a gap of seven standard deviations to either side is told, into
+/// which the noise of the samples beside it reaches.
 const MANY: usize = 20;
 const NEAR: f64 = 4.5;
 const FEW: f64 = 0.15;
@@ -23,25 +24,33 @@ pub struct Gap {
     pub half_width: f64,
 }
 
-/// The gap in which most samples are; `None` where there is none.
+/// The widest gap; `None` where there is none. A rest that is passed quickly at other times looks like a narrow one.
 #[allow(clippy::cast_precision_loss)]
 pub fn gap(values: &[f64], noise: f64) -> Option<Gap> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    // Samples below a value, by their number.
-    let below = |value: f64| sorted.partition_point(|v| *v < value);
+    let mut sums = vec![0.0];
+    sums.extend(sorted.iter().scan(0.0, |sum, value| {
+        *sum += value;
+        Some(*sum)
+    }));
+    let around =
+        |value: f64, apart: f64| [-apart, apart].map(|apart| sorted.partition_point(|v| *v < value + apart * noise));
     let alone = sorted.iter().filter_map(|value| {
-        let core = &sorted[below(value - ONE * noise)..below(value + ONE * noise)];
-        let middle = core.iter().sum::<f64>() / core.len() as f64;
-        let around = |apart: f64| [below(middle - apart * noise), below(middle + apart * noise)];
-        let [[low, high], [lowest, highest]] = [around(NEAR), around(FAR)];
-        let is_alone = core.len() >= MANY && (high - low).saturating_sub(core.len()) as f64 <= FEW * core.len() as f64
-            || core.len() >= FEWEST && highest - lowest == core.len();
+        let [first, end] = around(*value, ONE);
+        let core = end - first;
+        if core < FEWEST {
+            return None;
+        }
+        let middle = (sums[end] - sums[first]) / core as f64;
+        let [[low, high], [lowest, highest]] = [NEAR, FAR].map(|apart| around(middle, apart));
+        let is_alone =
+            core >= MANY && (high - low).saturating_sub(core) as f64 <= FEW * core as f64 || highest - lowest == core;
         let (next_below, next_above) = (sorted.get(low.checked_sub(1)?)?, sorted.get(high)?);
         let half_width = (middle - next_below).min(next_above - middle);
-        is_alone.then_some((core.len(), Gap { middle, half_width }))
+        is_alone.then_some(Gap { middle, half_width })
     });
-    alone.max_by_key(|(count, _)| *count).map(|(_, gap)| gap)
+    alone.max_by(|a, b| a.half_width.total_cmp(&b.half_width))
 }
 
 #[cfg(test)]
@@ -71,6 +80,13 @@ mod tests {
         let gap = gap(&wave(8.0 * NOISE), NOISE).expect("there is one");
         assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
         assert!((4.5 * NOISE..11.0 * NOISE).contains(&gap.half_width), "{gap:?}");
+    }
+
+    #[test]
+    fn a_rest_is_not_taken_for_a_gap_that_is_there() {
+        let rest = white("rest", NOISE, 3000);
+        let gap = gap(&[rest, wave(0.05)].concat(), NOISE).expect("there is one");
+        assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
     }
 
     #[test]

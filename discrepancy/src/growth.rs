@@ -200,6 +200,11 @@ impl<'a> Search<'a> {
             growth.step("exchanged", better);
         }
         watch.stage("other shapes of what was found", 0.88);
+        self.reshape(growth)
+    }
+
+    /// The growth with the best shapes of its effects, and what else the data allow of them.
+    fn reshape(&self, mut growth: Growth<'a>) -> Growth<'a> {
         let reshaped;
         (reshaped, growth.allowed) = self.shapes(growth.last.clone());
         if reshaped.fitted.chi2 < growth.last.fitted.chi2 {
@@ -234,17 +239,19 @@ impl<'a> Search<'a> {
     pub fn reduce(&self, mut growth: Growth<'a>) -> (Growth<'a>, Trial<'a>, Vec<usize>) {
         let (reduced, held) = self.without_declared(growth.last.clone());
         let Some((simpler, index)) = self.restated(&growth, &reduced, &held) else { return (growth, reduced, held) };
-        growth.rounds[index] = Arc::clone(&growth.rounds[index]).joined(&simpler);
+        growth.rounds[index] = Arc::clone(&growth.rounds[index]).led(&simpler);
         growth.step("exchanged", simpler);
-        // Other shapes were allowed of what is no longer in.
-        growth.allowed.clear();
+        growth = self.reshape(growth);
         let (reduced, held) = self.without_declared(growth.last.clone());
         (growth, reduced, held)
     }
 
     /// The model with declared terms back in that an effect made superfluous, and with a simpler one in the place of that, where
-    /// it is not clearly worse; and its round. Else a constant beside a declared loss is told as a loss towards elsewhere.
+    /// it is not clearly worse; and the index of its round. Else a constant beside a declared loss is told as a loss towards elsewhere.
     fn restated(&self, growth: &Growth<'a>, reduced: &Trial<'a>, held: &[usize]) -> Option<(Trial<'a>, usize)> {
+        if held.is_empty() {
+            return None;
+        }
         let of = Dispersion::of(reduced);
         // What they were held at is one more unknown each.
         #[allow(clippy::cast_precision_loss)]
@@ -252,7 +259,7 @@ impl<'a> Search<'a> {
         let mut tuners = reduced.fitted.point.globals[..self.subject.globals.len()].to_vec();
         held.iter().for_each(|&k| tuners[k] = self.subject.start()[k]);
         let mut trials: Vec<(Trial<'a>, usize)> = Vec::new();
-        for (index, own) in reduced.added.iter().enumerate().filter(|_| !held.is_empty()) {
+        for (index, own) in reduced.added.iter().enumerate() {
             let found = |round: &Arc<Round<'a>>| {
                 round.trials.first().and_then(Trial::newest).is_some_and(|newest| newest.is(&own.candidate))
             };
@@ -260,14 +267,16 @@ impl<'a> Search<'a> {
             let others = [&reduced.added[..index], &reduced.added[index + 1..]].concat();
             let beside = self.candidates(&others);
             let simpler = |s: &&Screened| {
-                let (effect, candidate) = (s.added.candidate.effect.as_ref(), &s.added.candidate);
-                candidate.port == own.candidate.port
-                    && beside.iter().any(|free| free.is(candidate))
-                    && effect.strengths().len() < own.candidate.effect.strengths().len()
+                let candidate = &s.added.candidate;
+                candidate.has_fewer_strengths_than(&own.candidate) && beside.iter().any(|free| free.is(candidate))
             };
             let fit = |s: &Screened| {
                 let added = [others.as_slice(), &[self.neutral_start(&s.added)]].concat();
-                self.trial(&added, &tuners, self.own_locals(reduced), reduced.windows, 40)
+                let anew = self.trial(&added, &tuners, self.own_locals(reduced), reduced.windows, 40)?;
+                // As its round knows it, where that leaves less.
+                let known = growth.rounds[round].trials.iter().find(|known| known.has_effects_of(&anew));
+                let known = known.filter(|known| known.windows == anew.windows && known.fitted.chi2 < anew.fitted.chi2);
+                Some(known.cloned().unwrap_or(anew))
             };
             let screened: Vec<&Screened> = growth.rounds[round].screened.iter().filter(simpler).collect();
             let fitted: Vec<Trial<'a>> = screened.into_par_iter().filter_map(fit).collect();

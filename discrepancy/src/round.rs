@@ -66,12 +66,11 @@ impl<'a> Round<'a> {
         Arc::new(round)
     }
 
-    /// The round with one more model.
-    pub fn joined(self: Arc<Self>, trial: &Trial<'a>) -> Arc<Self> {
+    /// The round with a model that was chosen, as the first.
+    pub fn led(self: Arc<Self>, chosen: &Trial<'a>) -> Arc<Self> {
         let mut round = Self::clone(&self);
-        round.trials.retain(|known| !known.has_effects_of(trial));
-        round.trials.push(trial.clone());
-        best_first(&mut round.trials);
+        round.trials.retain(|known| !known.has_effects_of(chosen));
+        round.trials.insert(0, chosen.clone());
         Arc::new(round)
     }
 }

@@ -17,12 +17,12 @@ use crate::texture::{Texture, texture};
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
 /// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp`. One criterion without constraints is looked at along two or three lines near the start: where
+/// numbers or lists, else `sqp`. One criterion without constraints is looked at along one to three lines near the start: where
 /// it is noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`, with a
 /// pattern search from the study's own start as a second opinion on where that leads. Each begins at several starts: the
-/// study's own, and the best points of a sample of the box. Where the objective is neither a sum of squares nor found smooth a
-/// pattern search goes on from the end of the first run, and, after all starts, from the best point found, because an optimum
-/// may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
+/// study's own, and the best points of a sample of the box. Where the objective is no sum of squares a pattern
+/// search goes on from the best point after all starts, and, but where it was found smooth, from the end of the first run,
+/// because an optimum may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
 /// best point until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is
 /// `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria
 /// and `nsga3` for more.

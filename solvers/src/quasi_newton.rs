@@ -12,6 +12,9 @@ use crate::start::usable_start;
 ///
 /// Source: A. S. Lewis, M. L. Overton, Nonsmooth optimization via quasi-Newton methods, Mathematical Programming 141 (2013)
 /// 135-163, algorithms 2.1 and 2.6.
+///
+/// N.B.: a first step, of which no length is known, must keep more of the decrease that its slope promises, and a step of
+/// which next to nothing is promised need not meet the condition on slopes.
 #[derive(Default)]
 pub struct QuasiNewton {
     state: Option<State>,
@@ -55,7 +58,8 @@ struct State {
 /// Share of the promised decrease that a step must keep.
 const ENOUGH: f64 = 1e-4;
 
-/// The same of a step whose length nothing is known of: a longer one may lead over a valley to where all is flat.
+/// The same of a step whose length nothing is known of: a longer one may lead over a valley to where all is flat, as on the
+/// problem Osborne 1. The step to the minimum of a parabola keeps one half.
 const AT_FIRST: f64 = 0.3;
 
 /// Share of the slope that may be left after a step.
@@ -74,7 +78,7 @@ const REACH: [f64; 2] = [1.0, 1e-6];
 const IDLE: f64 = 1e-11;
 const MOST_IDLE: usize = 4;
 
-/// The same of a rough end.
+/// The same of a rough end: most studies ask for three or four figures.
 const IDLE_ROUGHLY: f64 = 1e-6;
 const MOST_IDLE_ROUGHLY: usize = 2;
 

@@ -2,10 +2,12 @@
 
 use mops_core::{Halt, Oracle, Progress, Shape, Solver};
 
-/// A solver that goes on from the best point where another one stalls.
+/// A solver that goes on from the best point where another one stalls, or ends.
 pub struct Relay {
     first: Box<dyn Solver>,
     then: Box<dyn Solver>,
+    /// Whether the second one goes on where the first has converged too.
+    always: bool,
     /// Whether the second one goes on.
     handed_over: bool,
 }
@@ -13,7 +15,12 @@ pub struct Relay {
 impl Relay {
     /// The first, then the other.
     pub fn new(first: Box<dyn Solver>, then: Box<dyn Solver>) -> Self {
-        Self { first, then, handed_over: false }
+        Self { first, then, always: false, handed_over: false }
+    }
+
+    /// The first to its end, however that is, then the other.
+    pub fn to_the_end(first: Box<dyn Solver>, then: Box<dyn Solver>) -> Self {
+        Self { always: true, ..Self::new(first, then) }
     }
 }
 
@@ -33,6 +40,7 @@ impl Solver for Relay {
         }
         match self.first.step(oracle)? {
             Progress::Stalled => {}
+            Progress::Converged if self.always => {}
             progress => return Ok(progress),
         }
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };

@@ -37,7 +37,8 @@ struct Other {
     own: Option<Evaluation>,
 }
 
-/// Share of the way from the start to an end within which another end is the same.
+/// Share of the way from the start to an end within which another point is on the way to the same. Of the 53 problems of
+/// `mops bench more-wild` as many are solved with 0.05.
 const NEAR: f64 = 0.3;
 
 impl SecondOpinion {
@@ -76,7 +77,10 @@ impl Solver for SecondOpinion {
                     self.stage = Stage::Other(Box::new(Other { pattern, end, own }));
                     Ok(Progress::Continue)
                 }
-                (Progress::Stalled, _) => self.go_on_with((self.at_kinks)(), oracle),
+                (Progress::Stalled, _) => {
+                    let pattern = PatternSearchOptions::default().build();
+                    self.go_on_with(Box::new(Relay::to_the_end((self.at_kinks)(), pattern)), oracle)
+                }
                 (progress, _) => Ok(progress),
             },
             Stage::Other(other) => {
@@ -85,7 +89,7 @@ impl Solver for SecondOpinion {
                 let is_better = own.as_ref().is_some_and(|own| own.merit.is_better_than(&end.merit));
                 let way = distance(&self.start, &end.point);
                 let is_near = own.as_ref().is_some_and(|own| distance(&own.point, &end.point) <= NEAR * way);
-                if progress == Progress::Continue && (is_better || !is_near) {
+                if progress == Progress::Continue && !is_near {
                     return Ok(progress);
                 }
                 if is_better {

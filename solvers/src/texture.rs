@@ -33,8 +33,9 @@ const NONE: f64 = 1e-6;
 /// root of 2.
 const ROUGH: f64 = 2.2;
 
-/// What the rows are like near a point: the roughest of them. Noise is what does not fade from difference to difference; it is one only where
-/// two lines agree, and where slopes differ more than the chords between the values do.
+/// What the rows are like near a point: the roughest of them. Noise is what does not fade from difference to difference; it is
+/// one only where two lines agree, and where slopes differ more than the chords between the values do. Where they do not, a
+/// third line with smaller distances tells rows that bend from rows with kinks. Points that fail count as a kink.
 ///
 /// With the `k`-th differences `T` of values at equal distances, the noise is the root of `(k!)^2 / (2 k)!` times the mean of
 /// `T^2`, for the first `k` that agrees with the next two within a factor of 4 and whose differences have both signs.
@@ -57,7 +58,7 @@ pub fn texture(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Texture, Halt> 
     let mut ratios: Vec<f64> = Vec::new();
     for _ in 0..2 {
         let line = line(APART);
-        let Some(rows) = along(oracle, &line, 0.0)? else { return Ok(Texture::Smooth) };
+        let Some(rows) = along(oracle, &line, 0.0)? else { return Ok(Texture::Kinked) };
         ratios.resize(rows.len(), 1.0);
         for (values, ratio) in rows.iter().zip(&mut ratios) {
             if fade(values) {
@@ -67,7 +68,7 @@ pub fn texture(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Texture, Halt> 
         if ratios.iter().all(|ratio| *ratio == 0.0) {
             return Ok(Texture::Smooth);
         }
-        let Some(beside) = along(oracle, &line, NEAR / APART)? else { return Ok(Texture::Smooth) };
+        let Some(beside) = along(oracle, &line, NEAR / APART)? else { return Ok(Texture::Kinked) };
         for ((values, beside), ratio) in rows.iter().zip(&beside).zip(&mut ratios) {
             let slopes: Vec<f64> = beside.iter().zip(values).map(|(b, v)| (b - v) * APART / NEAR).collect();
             let chords: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
