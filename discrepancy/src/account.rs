@@ -7,7 +7,7 @@ use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Riv
 use crate::fit::dot;
 use crate::plan::separating;
 use crate::repaired::Calibrated;
-use crate::round::Round;
+use crate::round::{Round, best_in};
 use crate::screen::Screened;
 use crate::search::Trial;
 use crate::stability::stability;
@@ -155,8 +155,7 @@ pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>) {
 
 /// The round in which such an effect did best.
 fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], is: impl Fn(&Candidate) -> bool) -> Option<&'r Round<'a>> {
-    let best_is = |round: &&Arc<Round<'a>>| round.trials.first().and_then(Trial::newest).is_some_and(&is);
-    rounds.iter().find(best_is).map(Arc::as_ref)
+    best_in(rounds, is).map(|index| rounds[index].as_ref())
 }
 
 /// The experiment that would best tell an effect found from the first rival that the data cannot tell from it.

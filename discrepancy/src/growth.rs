@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
-use crate::round::{Round, best_first};
+use crate::round::{Round, best_first, best_in};
 use crate::screen::Screened;
 use crate::search::{Search, Trial};
 use crate::variant::Added;
@@ -247,7 +247,8 @@ impl<'a> Search<'a> {
     }
 
     /// The model with declared terms back in that an effect made superfluous, and with a simpler one in the place of that, where
-    /// it is not clearly worse; and the index of its round. Else a constant beside a declared loss is told as a loss towards elsewhere.
+    /// it is not clearly worse; and the index of its round. Else a constant beside a declared loss is told as a loss towards
+    /// elsewhere.
     fn restated(&self, growth: &Growth<'a>, reduced: &Trial<'a>, held: &[usize]) -> Option<(Trial<'a>, usize)> {
         if held.is_empty() {
             return None;
@@ -260,10 +261,7 @@ impl<'a> Search<'a> {
         held.iter().for_each(|&k| tuners[k] = self.subject.start()[k]);
         let mut trials: Vec<(Trial<'a>, usize)> = Vec::new();
         for (index, own) in reduced.added.iter().enumerate() {
-            let found = |round: &Arc<Round<'a>>| {
-                round.trials.first().and_then(Trial::newest).is_some_and(|newest| newest.is(&own.candidate))
-            };
-            let Some(round) = growth.rounds.iter().position(found) else { continue };
+            let Some(round) = best_in(&growth.rounds, |newest| newest.is(&own.candidate)) else { continue };
             let others = [&reduced.added[..index], &reduced.added[index + 1..]].concat();
             let beside = self.candidates(&others);
             let simpler = |s: &&Screened| {

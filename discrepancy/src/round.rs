@@ -75,6 +75,11 @@ impl<'a> Round<'a> {
     }
 }
 
+/// The index of the round in which such an effect did best.
+pub(crate) fn best_in(rounds: &[Arc<Round<'_>>], is: impl Fn(&Candidate) -> bool) -> Option<usize> {
+    rounds.iter().position(|round| round.trials.first().and_then(Trial::newest).is_some_and(&is))
+}
+
 fn white(count: usize) -> Vec<Vec<f64>> {
     let mut random = stream(0, "white");
     (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()

@@ -228,9 +228,8 @@ fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     Ok(match texture(oracle, start)? {
         Texture::Noisy => PatternSearchOptions::default().build().into(),
         Texture::Kinked => sqp.into(),
-        Texture::Smooth => Choice {
-            first: Some(Box::new(SecondOpinion::new(|| SqpOptions::default().build()))),
-            local: Box::new(Relay::new(one, sqp)),
-        },
+        Texture::Smooth => {
+            Choice { first: Some(Box::new(SecondOpinion::default())), local: Box::new(Relay::new(one, sqp)) }
+        }
     })
 }

@@ -6,13 +6,12 @@ use crate::own::Own;
 use crate::pattern_search::PatternSearchOptions;
 use crate::quasi_newton::QuasiNewton;
 use crate::relay::Relay;
+use crate::sqp::SqpOptions;
 
 /// For one smooth row: BFGS to rough accuracy; then a pattern search from the same start, whose models of a wider neighbourhood
 /// may lead to another basin, until it comes near to where slopes have led; then BFGS again, from the better end.
 pub struct SecondOpinion {
     slopes: QuasiNewton,
-    /// What goes on where slopes meet kinks.
-    at_kinks: fn() -> Box<dyn Solver>,
     start: Vec<f64>,
     stage: Stage,
 }
@@ -41,12 +40,18 @@ struct Other {
 /// `mops bench more-wild` as many are solved with 0.05.
 const NEAR: f64 = 0.3;
 
-impl SecondOpinion {
-    /// With what goes on from the best point where slopes meet kinks.
-    pub fn new(at_kinks: fn() -> Box<dyn Solver>) -> Self {
-        Self { slopes: QuasiNewton::rough(), at_kinks, start: Vec::new(), stage: Stage::Rough }
+impl Default for SecondOpinion {
+    fn default() -> Self {
+        Self { slopes: QuasiNewton::rough(), start: Vec::new(), stage: Stage::Rough }
     }
+}
 
+/// What goes on where slopes meet kinks.
+fn at_kinks() -> Box<dyn Solver> {
+    SqpOptions::default().build()
+}
+
+impl SecondOpinion {
     fn go_on_with(&mut self, mut last: Box<dyn Solver>, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
         last.begin(oracle, &best)?;
@@ -61,9 +66,7 @@ impl Solver for SecondOpinion {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.start = start.to_vec();
-        self.slopes = QuasiNewton::rough();
-        self.stage = Stage::Rough;
+        *self = Self { start: start.to_vec(), ..Self::default() };
         self.slopes.begin(oracle, start)
     }
 
@@ -79,7 +82,7 @@ impl Solver for SecondOpinion {
                 }
                 (Progress::Stalled, _) => {
                     let pattern = PatternSearchOptions::default().build();
-                    self.go_on_with(Box::new(Relay::to_the_end((self.at_kinks)(), pattern)), oracle)
+                    self.go_on_with(Box::new(Relay::to_the_end(at_kinks(), pattern)), oracle)
                 }
                 (progress, _) => Ok(progress),
             },
@@ -93,7 +96,7 @@ impl Solver for SecondOpinion {
                     return Ok(progress);
                 }
                 if is_better {
-                    let last = Relay::new(Box::new(QuasiNewton::default()), (self.at_kinks)());
+                    let last = Relay::new(Box::new(QuasiNewton::default()), at_kinks());
                     return self.go_on_with(Box::new(last), oracle);
                 }
                 self.slopes.refine();
@@ -101,7 +104,7 @@ impl Solver for SecondOpinion {
                 Ok(Progress::Continue)
             }
             Stage::Fine => match self.slopes.step(oracle)? {
-                Progress::Stalled => self.go_on_with((self.at_kinks)(), oracle),
+                Progress::Stalled => self.go_on_with(at_kinks(), oracle),
                 progress => Ok(progress),
             },
             Stage::Last(last) => last.step(oracle),

@@ -29,7 +29,7 @@ impl Definition for PositionDependentFriction {
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("c", "mean friction force", Dimension::OUTPUT),
         Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
-        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
+        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
         phase(),
     ];
 

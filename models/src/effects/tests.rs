@@ -129,8 +129,7 @@ fn first_trials_are_few_and_allowed() {
                 Trials::Frequencies | Trials::Steps | Trials::Moments(_) => {}
             }
         }
-        // Four phases of each wave number of a turn.
-        assert!(count <= 56, "{}: {count}", effect.name());
+        assert!(count <= 44, "{}: {count}", effect.name());
     }
 }
 

@@ -27,7 +27,7 @@ impl Definition for TorqueRipple {
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
-        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0], &[4.0, 7.0, 11.0, 17.0])),
+        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 13.0])),
         phase(),
     ];
 
