@@ -124,10 +124,27 @@ fn kink(x: &[f64]) -> Option<Vec<f64>> {
     Some(vec![x[0].powi(2) + rest + 1.0, (x[0] - 1.0).powi(2) + rest + 1.0])
 }
 
+/// A smooth criterion that is least where [`kink`] is, and has the same value there.
+fn bowl(x: &[f64]) -> Option<Vec<f64>> {
+    let rest: f64 = x[1..].iter().map(|x| x * x).sum();
+    Some(vec![(x[0] - 0.5).powi(2) + rest + 1.25])
+}
+
+/// One criterion alone, with every kind of solver that accepts it.
+fn alone(n: usize, f: fn(&[f64]) -> Option<Vec<f64>>) -> Vec<(Arc<Problem>, SolverKind)> {
+    let problem = Arc::new(Problem::new(Arc::new(study(n, &[Usage::Minimise], f))));
+    solvers(&problem).into_iter().map(|kind| (Arc::clone(&problem), kind)).collect()
+}
+
+/// Two criteria that meet at a kink, and one that is smooth; both are least at (0.5, 0), where they are 1.25.
+fn ordinary(n: usize) -> Vec<(Arc<Problem>, SolverKind)> {
+    [both(problems(n, MINIMISE, kink)), alone(n, bowl)].concat()
+}
+
 #[test]
 fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
     for budget in [1, 2, 7, 50] {
-        for (problem, kind) in both(problems(3, MINIMISE, kink)) {
+        for (problem, kind) in ordinary(3) {
             let solved = solve(&problem, &kind, budget, &());
             assert!(solved.points.len() <= budget, "{}: {}", kind.name, solved.points.len());
             assert!(solved.stop != Stop::Budget || solved.points.len() == budget, "{}", kind.name);
@@ -137,8 +154,8 @@ fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
 }
 
 #[test]
-fn every_solver_comes_near_the_kink_of_two_criteria() {
-    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
+fn every_solver_comes_near_the_least_value_of_two_criteria_and_of_one() {
+    for (problem, kind) in ordinary(2) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((1.25 - 1e-9..1.26).contains(&found), "{}: {found}", kind.name);
     }
@@ -146,7 +163,7 @@ fn every_solver_comes_near_the_kink_of_two_criteria() {
 
 #[test]
 fn same_seed_same_bits_for_any_number_of_threads() {
-    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
+    for (problem, kind) in ordinary(2) {
         let points = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| solve(&problem, &kind, 300, &()).points)
@@ -158,7 +175,9 @@ fn same_seed_same_bits_for_any_number_of_threads() {
 #[test]
 fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
     // The start (1.5, ...) lies in the half that fails.
-    for (problem, kind) in both(problems(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) })) {
+    let two = both(problems(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) }));
+    let one = alone(2, |x| if x[0] + x[1] > 0.9 { None } else { bowl(x) });
+    for (problem, kind) in [two, one].concat() {
         let solved = solve(&problem, &kind, 5000, &());
         let found = solved.best.merit.objective;
         assert!(found < 1.3, "{}: {found}", kind.name);
@@ -167,7 +186,7 @@ fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
 
 #[test]
 fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
-    for (problem, kind) in both(problems(2, MINIMISE, |_| None)) {
+    for (problem, kind) in [both(problems(2, MINIMISE, |_| None)), alone(2, |_| None)].concat() {
         let solved = solve(&problem, &kind, 300, &());
         assert!(solved.best.scaled.is_none(), "{}", kind.name);
     }
@@ -175,14 +194,15 @@ fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
 
 #[test]
 fn a_constant_objective_ends() {
-    for (problem, kind) in both(problems(2, MINIMISE, |_| Some(vec![1.0, 1.0]))) {
+    let two = both(problems(2, MINIMISE, |_| Some(vec![1.0, 1.0])));
+    for (problem, kind) in [two, alone(2, |_| Some(vec![1.0]))].concat() {
         assert_eq!(solve(&problem, &kind, 50_000, &()).best.merit.objective, 1.0, "{}", kind.name);
     }
 }
 
 #[test]
 fn one_tuner_is_enough() {
-    for (problem, kind) in both(problems(1, MINIMISE, kink)) {
+    for (problem, kind) in ordinary(1) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((found - 1.25).abs() < 1e-3, "{}: {found}", kind.name);
     }
@@ -230,7 +250,9 @@ fn a_criterion_that_jumps_ends_near_its_least_value() {
         let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
         Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
     };
-    for (problem, kind) in both(problems(2, MINIMISE, f)) {
+    // Alone it leads back to the jump from beyond.
+    let leads_back = |x: &[f64]| Some(vec![x[1] * x[1] + if x[0] < 0.3 { 2.3 - x[0] } else { x[0] * x[0] }]);
+    for (problem, kind) in [both(problems(2, MINIMISE, f)), alone(2, leads_back)].concat() {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!(found < 0.2, "{}: {found}", kind.name);
     }
@@ -238,10 +260,14 @@ fn a_criterion_that_jumps_ends_near_its_least_value() {
 
 #[test]
 fn scales_of_1e_minus_12_and_1e12_are_no_obstacle() {
-    let small = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e-12 * f).collect());
-    let large = |x: &[f64]| kink(x).map(|f| f.iter().map(|f| 1e12 * f).collect());
-    for (f, scale) in [(small as fn(&[f64]) -> Option<Vec<f64>>, 1e-12), (large, 1e12)] {
-        for (problem, kind) in both(problems(2, MINIMISE, f)) {
+    type Values = fn(&[f64]) -> Option<Vec<f64>>;
+    fn scaled(by: f64, f: Values, x: &[f64]) -> Option<Vec<f64>> {
+        f(x).map(|f| f.iter().map(|f| by * f).collect())
+    }
+    let small: [Values; 2] = [|x| scaled(1e-12, kink, x), |x| scaled(1e-12, bowl, x)];
+    let large: [Values; 2] = [|x| scaled(1e12, kink, x), |x| scaled(1e12, bowl, x)];
+    for ([two, one], scale) in [(small, 1e-12), (large, 1e12)] {
+        for (problem, kind) in [both(problems(2, MINIMISE, two)), alone(2, one)].concat() {
             let found = solve(&problem, &kind, 5000, &()).best.merit.objective / scale;
             assert!(found < 1.6, "{} at {scale}: {found}", kind.name);
         }
@@ -256,7 +282,7 @@ fn an_interrupt_ends_every_solver_with_the_best_so_far() {
             true
         }
     }
-    for (problem, kind) in both(problems(2, MINIMISE, kink)) {
+    for (problem, kind) in ordinary(2) {
         let solved = solve(&problem, &kind, 5000, &Impatient);
         assert_eq!(solved.stop, Stop::Interrupted, "{}", kind.name);
         assert!(solved.best.scaled.is_some(), "{}", kind.name);

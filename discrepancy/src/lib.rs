@@ -27,6 +27,7 @@ mod reduced;
 mod removed;
 mod repaired;
 mod round;
+mod rousing;
 mod screen;
 mod search;
 mod shapes;

@@ -10,6 +10,7 @@ mod holds;
 mod intervals;
 mod namesakes;
 mod pairs;
+mod rests;
 mod selection;
 mod sessions;
 mod shapes;

@@ -11,9 +11,9 @@ pub struct Multistart {
     local: Box<dyn Solver>,
     /// What runs from the study's own start in its place.
     first: Option<Box<dyn Solver>>,
-    /// What goes on from where the first run ends, and whether it does now.
+    /// What goes on from where the first run ends.
     second: Option<Box<dyn Solver>>,
-    in_second: bool,
+    leg: Leg,
     /// Starts after the first.
     extra: usize,
     /// Starts that are left, the next one last; `None` before the first run has ended.
@@ -32,6 +32,14 @@ pub struct Multistart {
     own: Option<Evaluation>,
     /// The same of the runs that have ended.
     ends: Vec<Merit>,
+}
+
+/// Whose turn it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Leg {
+    First,
+    Second,
+    Others,
 }
 
 /// A round of restarts around the best point.
@@ -55,7 +63,7 @@ impl Multistart {
             local,
             first: None,
             second: None,
-            in_second: false,
+            leg: Leg::First,
             extra: starts.saturating_sub(1),
             left: None,
             best: None,
@@ -100,6 +108,7 @@ impl Multistart {
     pub fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.left = None;
         self.best = None;
+        self.leg = Leg::First;
         self.round = Round::NONE;
         self.ends.clear();
         self.begin_run(oracle, start)
@@ -126,7 +135,8 @@ impl Multistart {
 
     fn begin_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.own = None;
-        self.first.as_mut().unwrap_or(&mut self.local).begin(&mut Own { oracle, best: &mut self.own }, start)
+        let first = self.first.as_mut().filter(|_| self.leg == Leg::First);
+        first.unwrap_or(&mut self.local).begin(&mut Own { oracle, best: &mut self.own }, start)
     }
 
     /// An iteration of the present run, or the beginning of the next.
@@ -135,21 +145,24 @@ impl Multistart {
     /// The run is over.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let mut own = Own { oracle: &mut *oracle, best: &mut self.own };
-        let solver = if self.in_second { &mut self.second } else { &mut self.first };
-        let solver = solver.as_mut().unwrap_or(&mut self.local);
-        let progress = solver.step(&mut own)?;
+        let solver = match self.leg {
+            Leg::First => self.first.as_mut(),
+            Leg::Second => self.second.as_mut(),
+            Leg::Others => None,
+        };
+        let progress = solver.unwrap_or(&mut self.local).step(&mut own)?;
         if progress == Progress::Continue {
             return Ok(progress);
         }
-        if !self.in_second
+        if self.leg == Leg::First
             && let Some(second) = &mut self.second
             && let Some(start) = own.best().map(|best| best.point.clone())
         {
             second.begin(&mut own, &start)?;
-            self.in_second = true;
+            self.leg = Leg::Second;
             return Ok(Progress::Continue);
         }
-        (self.first, self.second, self.in_second) = (None, None, false);
+        self.leg = Leg::Others;
         self.ends.push(self.own.as_ref().map_or(Merit::FAILED, |best| best.merit));
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
