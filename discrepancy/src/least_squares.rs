@@ -45,7 +45,7 @@ impl Fit<'_> {
     }
 
     /// Normal equations in the coordinates of the search.
-    fn normal(&self, point: &Point) -> Option<Normal> {
+    pub(crate) fn normal(&self, point: &Point) -> Option<Normal> {
         Some(self.equations(point, self.looks(point, Slopes::Free)?))
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::fit::{Fit, Fitted, Global, Point, Residuals, Slopes};
+use crate::fit::{Fit, Fitted, Global, Residuals, Slopes};
 use crate::least_squares::{damped_step, sum_of_squares};
 
 /// How thoroughly sizes are looked for.
@@ -75,11 +75,6 @@ impl Fit<'_> {
         let [low, high] = self.globals[k].bounds;
         let mut point = fitted.point.clone();
         point.globals[k] = (point.globals[k] + by).clamp(low, high);
-        self.followed(point, slopes)
-    }
-
-    /// The fit at a point that was moved, all that slopes tell something of following to first order.
-    pub(crate) fn followed(&self, point: Point, slopes: &[Residuals]) -> Option<Fitted> {
         let residuals = self.all(&point)?.into_iter().zip(slopes);
         let all = residuals.map(|(r, slopes)| Residuals { r, j: slopes.j.clone() }).collect();
         let normal = self.equations(&point, all);
@@ -87,8 +82,7 @@ impl Fit<'_> {
         let point = self.moved(&point, &step);
         let residuals = self.all(&point)?;
         let chi2 = sum_of_squares(&residuals);
-        let count = residuals.iter().map(Vec::len).sum();
-        Some(Fitted { point, chi2, residuals, normal: OnceLock::new(), count })
+        Some(Fitted { point, chi2, residuals, normal: OnceLock::new(), count: fitted.count })
     }
 
     /// The interval around the global `k`, which no slope tells, beyond which the sum of squares is larger by `rise`, the others
