@@ -250,7 +250,7 @@ fn a_criterion_that_jumps_ends_near_its_least_value() {
         let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
         Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
     };
-    // Alone it leads back to the jump from beyond.
+    // Alone, the same has a minimum of its own beyond the jump, in which a local solver may well end: here none is there.
     let leads_back = |x: &[f64]| Some(vec![x[1] * x[1] + if x[0] < 0.3 { 2.3 - x[0] } else { x[0] * x[0] }]);
     for (problem, kind) in [both(problems(2, MINIMISE, f)), alone(2, leads_back)].concat() {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;

@@ -26,6 +26,14 @@ pub struct Normal {
     pub(crate) gradient: DVector<f64>,
 }
 
+impl Normal {
+    /// Whether no slope tells anything of an unknown of a piece, by its index among all unknowns: only what is expected of it
+    /// stands on the diagonal.
+    pub(crate) fn tells_nothing_of(&self, local: usize) -> bool {
+        self.matrix[(local, local)] == WIDE.powi(-2)
+    }
+}
+
 impl Fit<'_> {
     /// Sum of the squares of what something is expected of, in units of that.
     fn unexpected(&self, point: &Point) -> f64 {
@@ -195,7 +203,7 @@ impl Fit<'_> {
     /// Where the fit is a short one, sizes of steps before the global `first` stay as they are.
     fn descend(&self, start: Point, normal: Arc<Normal>, iterations: usize, first: usize) -> Fitted {
         let fitted = self.levenberg_marquardt(start, normal, iterations);
-        let fitted = self.roused(fitted, iterations);
+        let fitted = self.with_starts(fitted, iterations);
         self.with_steps(fitted, iterations, first)
     }
 
@@ -246,14 +254,14 @@ impl Fit<'_> {
 
     /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly
     /// narrow them: the logarithm of how many times smaller they make the variance. Beforehand a global lies anywhere between
-    /// its bounds, a shape without an upper one within a decade either way, or where it may be 0 within what is typical of it; a
-    /// start value within ten of its scales. What has no bounds at all costs the whole.
+    /// its bounds, what has no upper one within a decade either way, or where no slope tells it and it is not looked for in its
+    /// logarithm, within 20 of its scales; a start value within ten of its scales. What has no bounds at all costs the whole.
     ///
     /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 2.3: the Occam factor.
     pub fn spared(&self, fitted: &Fitted, first: usize, dispersion: &Dispersion) -> f64 {
         const START: f64 = 10.0;
-        /// What is typical of a shape that no slope tells, in its scales.
-        const TYPICAL: f64 = 20.0;
+        /// The typical size of a break-away that begins at 0, in its scales.
+        const STEPPED: f64 = 20.0;
         let Some(normal) = self.normal_at(fitted) else { return 0.0 };
         let uniform = |width: f64| if width.is_finite() { 12.0 / (width * width) } else { 0.0 };
         let global = |(k, global): (usize, &Global)| match global.sets {
@@ -261,7 +269,7 @@ impl Fit<'_> {
                 let width = (global.bounds[1] - global.bounds[0]) / self.stretch(k, fitted.point.globals[k]);
                 uniform(match (width.is_finite(), global.log, global.is_stepped()) {
                     (false, true, _) => 2.0 * 10.0_f64.ln(),
-                    (false, false, true) => TYPICAL,
+                    (false, false, true) => STEPPED,
                     _ => width,
                 })
             }

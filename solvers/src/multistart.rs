@@ -13,6 +13,7 @@ pub struct Multistart {
     first: Option<Box<dyn Solver>>,
     /// What goes on from where the first run ends.
     second: Option<Box<dyn Solver>>,
+    /// Whose turn it is.
     leg: Leg,
     /// Starts after the first.
     extra: usize,
@@ -34,7 +35,7 @@ pub struct Multistart {
     ends: Vec<Merit>,
 }
 
-/// Whose turn it is.
+/// Which solver runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Leg {
     First,

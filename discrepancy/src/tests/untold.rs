@@ -23,7 +23,7 @@ fn let_go(samples: usize) -> Diagnosis {
 }
 
 /// What is found, and what the data are said not to tell from it.
-fn found(told: &Diagnosis) -> (&Found, Vec<&str>) {
+fn first_of(told: &Diagnosis) -> (&Found, Vec<&str>) {
     let found = &told.found[0];
     (found, found.indistinguishable.iter().map(|r| r.effect.as_str()).collect())
 }
@@ -32,16 +32,16 @@ fn found(told: &Diagnosis) -> (&Found, Vec<&str>) {
 fn a_break_away_that_the_data_tell_nothing_of_is_as_likely_as_before_and_a_fall_that_they_rule_out_is_not() {
     // Until it rests, and a while longer.
     let told = let_go(742);
-    let (found, rivals) = found(&told);
+    let (found, rivals) = first_of(&told);
     assert_eq!(found.effect, "coulomb-friction");
     assert_eq!(rivals, ["stiction"], "{:?}", told.ranked);
     assert!(found.probability < 0.9 && found.indistinguishable[0].bic_behind < 3.0, "{found:?}");
 }
 
 #[test]
-fn so_is_one_where_the_motion_never_ends() {
+fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
     let told = let_go(250);
-    let (found, rivals) = found(&told);
+    let (found, rivals) = first_of(&told);
     assert_eq!(found.effect, "coulomb-friction");
     assert!(rivals.contains(&"stiction") && found.probability < 0.9, "{:?}", told.ranked);
 }

@@ -1,4 +1,4 @@
-//! Where effects begin: an actuator that was just switched on is not yet where its command is.
+//! An actuator that was just switched on is not yet where its command is.
 
 use mops_core::{Hold, Input};
 
@@ -12,6 +12,7 @@ inputs     = { u = "V" }
 parameters = { k = "m/(V s)", d = "1/s" }
 der        = { x = "x' = k*u - d*x" }
 "#;
+/// V/s.
 const RATE: f64 = 2.0;
 
 /// A record in which the command is `first` for 4 s, then `next`, and the pump, which follows no faster than [`RATE`], begins at
