@@ -231,10 +231,17 @@ pub fn predictions(subject: &Subject, before: &Calibrated<'_>, after: &Calibrate
     all
 }
 
-/// Start values of every experiment in the repaired model.
-pub fn starts(subject: &Subject, after: &Calibrated<'_>) -> Vec<(String, String, f64)> {
+/// Start values of every experiment in the repaired model, those of effects under the names by which these are told.
+pub fn starts(subject: &Subject, after: &Calibrated<'_>, found: &[Found]) -> Vec<(String, String, f64)> {
+    // The variant numbers its effects from 1: `+1.start1`.
+    let told = |name: &String| {
+        let (number, own) = name.strip_prefix('+')?.split_once('.')?;
+        let found = found.get(number.parse::<usize>().ok()?.checked_sub(1)?)?;
+        Some(format!("{}.{own}", found.name))
+    };
     let of = |(m, said): (&crate::subject::Measurement, &crate::repaired::Prognosis)| {
-        said.starts.iter().map(|(name, value)| (m.name.clone(), name.clone(), *value)).collect::<Vec<_>>()
+        let one = |(name, value): &(String, f64)| (m.name.clone(), told(name).unwrap_or_else(|| name.clone()), *value);
+        said.starts.iter().map(one).collect::<Vec<_>>()
     };
     subject.measurements.iter().zip(&after.experiments).flat_map(of).collect()
 }

@@ -105,6 +105,7 @@ pub fn diagnose(
         Verdict::Effect => found.iter().map(|f| f.probability).product(),
         Verdict::Unexplained => TRULY_UNEXPLAINED,
     };
+    let starts = starts(&subject, &after, &found);
     Ok(Diagnosis {
         verdict,
         probability,
@@ -122,7 +123,7 @@ pub fn diagnose(
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
         notes: subject.notes.iter().cloned().chain(note).collect(),
-        starts: starts(&subject, &after),
+        starts,
         simulations: simulations.load(Ordering::Relaxed),
     })
 }

@@ -41,5 +41,10 @@ fn an_actuator_of_limited_speed_may_begin_elsewhere_than_its_command() {
     assert_eq!(effects, ["input-rate-limit"]);
     let rate = diagnosis.found[0].strengths[0].value;
     assert!((rate / RATE - 1.0).abs() < 0.01, "{rate}");
+    // Behind its command by as much as that was when it was switched on; the repaired study begins there.
+    let begins = diagnosis.starts.iter().filter(|(_, name, _)| name == "u-input-rate-limit.start1");
+    let begins: Vec<f64> = begins.map(|(_, _, value)| *value).collect();
+    let all_right = begins.iter().zip([-5.0, -4.0]).all(|(begins, truth)| (begins - truth).abs() < 0.1);
+    assert!(begins.len() == 2 && all_right, "{begins:?}");
     assert!(diagnosis.after.iter().all(|error| error.normalised < 1.1), "{:?}", diagnosis.after);
 }
