@@ -171,7 +171,9 @@ impl<'a> Search<'a> {
     /// The same over whole records, without what is superfluous, each effect held against its rivals.
     pub fn settle(&self, growth: Growth<'a>, watch: &dyn Watch) -> Growth<'a> {
         let mut growth = growth;
-        growth.last = self.over_whole(&growth.last).map_or(growth.last, |whole| self.unstuck(whole));
+        let was_whole = growth.last.windows == 1;
+        let whole = self.over_whole(&growth.last);
+        growth.last = whole.map_or(growth.last, |whole| if was_whole { whole } else { self.unstuck(whole) });
         for settling in 0..=SETTLINGS {
             watch.stage("what can be left out", 0.8 + 0.03 * f64::from(settling));
             if let Some(pruned) = self.pruned(&growth.last, self.limits.level) {

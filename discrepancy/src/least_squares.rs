@@ -255,7 +255,8 @@ impl Fit<'_> {
     /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly
     /// narrow them: the logarithm of how many times smaller they make the variance. Beforehand a global lies anywhere between
     /// its bounds, what has no upper one within a decade either way, or where no slope tells it and it is not looked for in its
-    /// logarithm, within 20 of its scales; a start value within ten of its scales. What has no bounds at all costs the whole.
+    /// logarithm, within 20 of its scales; a start value within ten of its scales. What has no bounds at all costs the whole, as
+    /// does the strength itself, at `first`, where no slope tells it.
     ///
     /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 2.3: the Occam factor.
     pub fn spared(&self, fitted: &Fitted, first: usize, dispersion: &Dispersion) -> f64 {
@@ -265,7 +266,7 @@ impl Fit<'_> {
         let Some(normal) = self.normal_at(fitted) else { return 0.0 };
         let uniform = |width: f64| if width.is_finite() { 12.0 / (width * width) } else { 0.0 };
         let global = |(k, global): (usize, &Global)| match global.sets {
-            Sets::Parameter(parameter) if parameter >= first => {
+            Sets::Parameter(parameter) if parameter > first || parameter == first && !global.is_stepped() => {
                 let width = (global.bounds[1] - global.bounds[0]) / self.stretch(k, fitted.point.globals[k]);
                 uniform(match (width.is_finite(), global.log, global.is_stepped()) {
                     (false, true, _) => 2.0 * 10.0_f64.ln(),
@@ -290,10 +291,20 @@ impl Fit<'_> {
         let after = pseudo_inverse(&matrix);
         let spared = |(i, &k): (usize, &usize)| {
             let (before, whole) = unknowns[k];
-            let narrowed = -(before * after[(i, i)]).ln();
+            let stepped = before > 0.0 && self.globals.get(k).is_some_and(Global::is_stepped);
+            let variance = if stepped { self.stepped_variance(fitted, k, dispersion) } else { after[(i, i)] };
+            let narrowed = -(before * variance).ln();
             if before > 0.0 { whole - narrowed.clamp(0.0, whole) } else { 0.0 }
         };
         free.iter().enumerate().map(spared).sum()
+    }
+
+    /// Variance of the global `k`, which no slope tells, in the coordinate of the search: of the interval beyond which the sum of
+    /// squares is larger by one unit, as one standard error to both sides.
+    fn stepped_variance(&self, fitted: &Fitted, k: usize, dispersion: &Dispersion) -> f64 {
+        let Some([low, high]) = self.stepped_interval(fitted, k, dispersion.weight()) else { return 0.0 };
+        let width = if self.globals[k].log { (high / low).ln() } else { (high - low) / self.globals[k].scale };
+        (0.5 * width).powi(2)
     }
 
     /// Covariance of the globals, the locals eliminated, where `weight` units of the sum of squares count as one: the inverse of

@@ -1,5 +1,7 @@
 //! Strengths that the data tell nothing of.
 
+use mops_core::{Hold, Input};
+
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Diagnosis, Found, Options, diagnose};
 
@@ -18,6 +20,28 @@ fn let_go(samples: usize) -> Diagnosis {
     let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, samples), 0.01, NOISE, "let go");
     let subject = subject(PENDULUM, &[23.3, 0.24, -1.0, 0.0], 2, vec![record]);
     let some = catalogue(&["coulomb-friction", "stiction", "stribeck-friction"]);
+    let options = Options { max_effects: 2, level: 0.01, seed: 1 };
+    diagnose(&study(&subject), &some, &options, &()).expect("it simulates")
+}
+
+/// A cart: `v' = k u - b v`.
+const CART: &str = r#"
+states     = { x = "m", v = "m/s" }
+inputs     = { u = "V" }
+parameters = { k = "m/(V s^2)", b = "1/s" }
+der        = { x = "v", v = "v' = k*u - b*v" }
+"#;
+
+/// The cart with dry friction of the same size at rest as in motion, pushed to and fro from rest.
+fn pushed() -> Diagnosis {
+    let push = |t: f64| 2.0 * (0.9 * t).sin();
+    let rates = |t: f64, x: &[f64; 2]| [x[1], push(t) - 0.5 * x[1] - FRICTION * (x[1] / 1e-3).tanh()];
+    let mut record = Record::of_first("x", &integrated(rates, [0.0, 0.0], 0.02, 900), 0.02, NOISE, "pushed");
+    let times: Vec<f64> = (0..9000_i32).map(|i| 0.002 * f64::from(i)).collect();
+    let values = times.iter().map(|&t| push(t)).collect();
+    record.inputs = vec![("u", Input::Sampled { times, values, hold: Hold::First })];
+    let subject = subject(CART, &[0.8, 0.9, 0.0, 0.0], 2, vec![record]);
+    let some = catalogue(&["coulomb-friction", "stiction"]);
     let options = Options { max_effects: 2, level: 0.01, seed: 1 };
     diagnose(&study(&subject), &some, &options, &()).expect("it simulates")
 }
@@ -44,4 +68,13 @@ fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
     let (found, rivals) = first_of(&told);
     assert_eq!(found.effect, "coulomb-friction");
     assert!(rivals.contains(&"stiction") && found.probability < 0.9, "{:?}", told.ranked);
+}
+
+#[test]
+fn a_break_away_that_the_data_tell_costs_the_whole() {
+    // It breaks away at every reversal of the push.
+    let told = pushed();
+    let (found, rivals) = first_of(&told);
+    assert_eq!(found.effect, "coulomb-friction");
+    assert!(rivals.is_empty() && found.probability > 0.9, "{:?}", told.ranked);
 }
