@@ -355,6 +355,18 @@ fn tuners_that_cannot_be_tuned() {
                 "min = 0.2,  max = 20.0",
                 "min = 1.0, max = 20.5, integer = true",
             ),
+            design("starts of cases of one value for all", "max = 20.0, ", "max = 20.0, starts = { nominal = 3.0 }, "),
+            design("a start in no case", "max = 20.0, ", "max = 20.0, per-case = true, starts = { nominl = 3.0 }, "),
+            design(
+                "a start in a case outside the bounds",
+                "max = 20.0, ",
+                "max = 20.0, per-case = true, starts = { nominal = \"30 s\" }, ",
+            ),
+            design(
+                "a start in a case that is not in the list",
+                "min = 0.2,  max = 20.0, ",
+                "values = [1.0, 2.0], per-case = true, starts = { nominal = 1.5 }, ",
+            ),
             design("a tie beside a start value", "min = 0.01, max = 10.0, unit", "tie = \"Ti/4\", unit"),
             design("a tie to no tuner", "Td = { start = 1.0, min = 0.01, max = 10.0,", "Td = { tie = \"Tj/4\","),
             design("a tie to a later tuner", "Ti = { start = 2.0, min = 0.2,  max = 20.0,", "Ti = { tie = \"4*Td\","),

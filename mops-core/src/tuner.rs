@@ -28,6 +28,17 @@ pub enum Grid {
     List(Vec<f64>),
 }
 
+impl Grid {
+    /// Whether a value is one of its.
+    pub fn has(&self, value: f64) -> bool {
+        match self {
+            Self::Continuous => true,
+            Self::Integer => value.fract() == 0.0,
+            Self::List(values) => values.contains(&value),
+        }
+    }
+}
+
 /// A quantity that the study may change.
 #[derive(Debug, Clone)]
 pub struct Tuner {

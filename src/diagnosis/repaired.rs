@@ -1,5 +1,6 @@
 //! The repaired model as a study file that runs by itself: the user's file, with the effects found.
 
+use std::fmt::Write;
 use std::sync::Arc;
 
 use mops_core::{AnalysisKind, Effect, Scope, Strength, Study};
@@ -33,7 +34,7 @@ pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &
     parameters(&mut text, original.study, diagnosis);
     start_values(&mut text, original, diagnosis);
     for found in &diagnosis.found {
-        effect(&mut text, original, found);
+        effect(&mut text, original, diagnosis, found);
     }
     text.head(&words::verdict(diagnosis).replace('`', ""));
     text.into_text()
@@ -130,7 +131,7 @@ fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, v
 }
 
 /// Adds an effect to its model, and its strengths to the tuners.
-fn effect(text: &mut TomlText, original: &Original<'_>, found: &Found) {
+fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, found: &Found) {
     let model = model_of(original.study, &found.place);
     let name = found.name.as_str();
     let companion =
@@ -141,7 +142,10 @@ fn effect(text: &mut TomlText, original: &Original<'_>, found: &Found) {
     for strength in &found.strengths {
         let is = |known: &&Strength| known.name == strength.name;
         let known = known.and_then(|effect| effect.strengths().iter().find(is));
-        text.set(&["tuners", &format!("{name}.{}", strength.name)], &tuner(strength, known));
+        let tuner_name = format!("{name}.{}", strength.name);
+        let own = diagnosis.starts.iter().filter(|(_, parameter, value)| *parameter == tuner_name && value.is_finite());
+        let own: Vec<(String, f64)> = own.map(|(experiment, _, value)| (experiment.clone(), *value)).collect();
+        text.set(&["tuners", &tuner_name], &tuner(strength, known, &own));
     }
     // What happened once is neutral in all other experiments.
     if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.strengths().first())) {
@@ -164,16 +168,23 @@ fn ports(model: &Arc<dyn mops_core::Model>) -> impl Iterator<Item = String> {
     model.interface().ports.iter().map(ToString::to_string)
 }
 
-/// The tuner of a strength: from its value, within what physics allows.
-fn tuner(strength: &StrengthValue, known: Option<&Strength>) -> String {
-    let [low, high] = range(strength.value, known.map_or([f64::NEG_INFINITY, f64::INFINITY], |known| known.bounds));
-    let [start, low, high] = [strength.value.clamp(low, high), low, high].map(number);
-    let mut tuner = format!("{{ start = {start}, min = {low}, max = {high}");
+/// The tuner of a strength: from its value, or where every experiment has its own from these, within what physics allows.
+fn tuner(strength: &StrengthValue, known: Option<&Strength>, own: &[(String, f64)]) -> String {
+    let bounds = known.map_or([f64::NEG_INFINITY, f64::INFINITY], |known| known.bounds);
+    let largest =
+        own.iter().map(|(_, value)| *value).chain([strength.value]).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let [low, high] = range(largest.unwrap_or(strength.value), bounds);
+    let at = |value: f64| number(value.clamp(low, high));
+    let mut tuner = format!("{{ start = {}, min = {}, max = {}", at(strength.value), number(low), number(high));
     if known.is_some_and(|known| known.fixed) {
         tuner += ", active = false";
     }
     if known.is_some_and(|known| known.scope == Scope::Experiment) {
         tuner += ", per-case = true";
+        let own: Vec<String> = own.iter().map(|(case, value)| format!("{} = {}", key(case), at(*value))).collect();
+        if !own.is_empty() {
+            write!(tuner, ", starts = {{ {} }}", own.join(", ")).expect("text takes everything");
+        }
     }
     tuner + " }"
 }
@@ -287,6 +298,30 @@ free     = [\"phi\", \"theta\"]
         let text = made(&diagnosis, &[]);
         let free = "theta = { start = 0.51 }, \"phi-coulomb-friction.1\" = { start = 0.03, min = -0.3, max = 0.3 } }";
         assert!(text.contains(free), "{text}");
+    }
+
+    #[test]
+    fn a_tuner_of_every_case_starts_where_its_case_says() {
+        let one = "c  = { start = 4e-4, min = 1e-4, max = 1e-3 }";
+        let own = "c  = { start = 4e-4, min = 1e-4, max = 1e-3, per-case = true, starts = { swing = 6e-4 } }";
+        let study = read(&STUDY.replace("swing.csv", "../data/swing.csv").replace(one, own)).study;
+        let start = |name: &str| study.tuners.iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
+        assert_eq!((start("swing/c"), start("c")), (Some(6e-4), None));
+    }
+
+    #[test]
+    fn a_phase_starts_in_each_experiment_where_it_was_found() {
+        let phase =
+            StrengthValue { name: "phase".into(), value: 0.4, unit: "rad".into(), std_error: None, interval95: None };
+        let catalogue = crate::catalogue();
+        let known = catalogue.effects.iter().flat_map(|effect| effect.strengths());
+        let known = known.filter(|known| known.scope == Scope::Experiment).find(|known| known.name == "phase").unwrap();
+        let own = [("swing".to_owned(), 0.4), ("push".to_owned(), -2.5)];
+        let text = tuner(&phase, Some(known), &own);
+        let text = text.parse::<toml::Value>().expect("TOML");
+        assert_eq!((text["start"].as_float(), text["per-case"].as_bool()), (Some(0.4), Some(true)));
+        assert_eq!((text["starts"]["swing"].as_float(), text["starts"]["push"].as_float()), (Some(0.4), Some(-2.5)));
+        assert!(text["min"].as_float() <= Some(-2.5) && text["max"].as_float() >= Some(0.4), "{text}");
     }
 
     #[test]

@@ -173,6 +173,12 @@ fn tuner(tuner: &Value) -> String {
             }
             "active" => format!("inactive: {}", !value.as_bool().unwrap_or(true)),
             "tie" => format!("tie: Some({text:?}.into())"),
+            "starts" => {
+                let starts = value.as_table().into_iter().flatten();
+                let starts: Vec<String> =
+                    starts.map(|(case, value)| format!("({case:?}.into(), {})", quantity(value))).collect();
+                format!("starts: vec![{}]", starts.join(", "))
+            }
             _ => format!("per_case: {value}"),
         });
     }
@@ -228,6 +234,11 @@ mod tests {
             of("start = \"3 cm\"\nmin = 0\nmax = 1.0\nunit = \"m\"\nactive = false\nper-case = true"),
             "TunerDraft { start: Some(Quantity::parse(\"3 cm\")?), min: Some(0.0.into()), max: Some(1.0.into()), \
              unit: Some(Unit::parse(\"m\")?), inactive: true, per_case: true, ..TunerDraft::default() }"
+        );
+        assert_eq!(
+            of("start = 1\nper-case = true\nstarts = { push = 2.0 }"),
+            "TunerDraft { start: Some(1.0.into()), per_case: true, starts: vec![(\"push\".into(), 2.0.into())], \
+             ..TunerDraft::default() }"
         );
         assert_eq!(of("tie = \"2*k\""), "TunerDraft { tie: Some(\"2*k\".into()), ..TunerDraft::default() }");
         assert_eq!(

@@ -204,6 +204,7 @@ fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
         inactive: section.active == Some(false),
         tie: section.tie,
         per_case: section.per_case,
+        starts: section.starts.0,
     })
 }
 

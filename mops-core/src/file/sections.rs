@@ -114,6 +114,9 @@ pub(super) struct TunerSection {
     /// One value for every case or experiment instead of one for the study.
     #[serde(default)]
     pub per_case: bool,
+    /// Values at the start in cases or experiments that begin elsewhere, by their names; with `per-case`.
+    #[serde(default)]
+    pub starts: Entries<Quantity>,
 }
 
 /// What a case may have beside values of parameters.

@@ -146,6 +146,8 @@ pub struct TunerDraft {
     pub tie: Option<String>,
     /// One of its own for every case.
     pub per_case: bool,
+    /// Values at the start in cases that begin elsewhere, by name.
+    pub starts: Vec<(String, Quantity)>,
 }
 
 impl TunerDraft {

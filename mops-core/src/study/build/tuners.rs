@@ -87,11 +87,15 @@ pub(super) fn build_tuner(
             if max < min { "swap the bounds" } else { "widen the range, or say `active = false` to keep the value" },
         ));
     }
-    if !fixed && !(min..=max).contains(&start) {
+    let check_start = |key: &str, start: f64| {
+        if fixed || (min..=max).contains(&start) {
+            return Ok(());
+        }
         let (start, max) = (unit.amount(start), unit.amount(max));
-        return Err(Mistake::new("start", format!("the start value {start} is outside the bounds, {min} to {max}"))
-            .with_help("correct it, or widen the bounds"));
-    }
+        Err(Mistake::new(key, format!("the start value {start} is outside the bounds, {min} to {max}"))
+            .with_help("correct it, or widen the bounds"))
+    };
+    check_start("start", start)?;
     let off_grid = match &grid {
         Grid::Continuous => None,
         Grid::Integer => {
@@ -106,6 +110,15 @@ pub(super) fn build_tuner(
     if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
         return Err(Mistake::new(key, format!("the tuner cannot be at {}", unit.amount(value))).with_help(way_out));
     }
+    let elsewhere = own_starts(draft, cases, |case, quantity| {
+        let start = converted(quantity, &unit).map_err(|m| m.within(case))?;
+        check_start(case, start)?;
+        if fixed || grid.has(start) {
+            return Ok(start);
+        }
+        Err(Mistake::new(case, format!("the tuner cannot be at {}", unit.amount(start)))
+            .with_help("start at a whole number, or at one of `values`"))
+    })?;
     if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
         return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
             .with_help("raise `min`, or leave `scale` out"));
@@ -133,12 +146,33 @@ pub(super) fn build_tuner(
     };
     if draft.per_case {
         for (index, case) in cases.iter().enumerate() {
-            tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), ..tuner.clone() });
+            let start = elsewhere.iter().find(|(known, _)| *known == index).map_or(start, |&(_, start)| start);
+            tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), start, ..tuner.clone() });
         }
     } else {
         tuners.push(tuner);
     }
     Ok(())
+}
+
+/// Start values in the cases that begin elsewhere, by index of the case.
+fn own_starts(
+    draft: &TunerDraft,
+    cases: &[Case],
+    value: impl Fn(&str, &Quantity) -> Result<f64, Mistake>,
+) -> Result<Vec<(usize, f64)>, Mistake> {
+    if !draft.starts.is_empty() && !draft.per_case {
+        return Err(Mistake::new("starts", "the tuner has one value for all cases")
+            .with_help("say `per-case = true` too, or leave `starts` out"));
+    }
+    let one = |(name, quantity): &(String, Quantity)| {
+        let index = cases.iter().position(|case| case.name == *name).ok_or_else(|| {
+            Mistake::new(name, format!("there is no case or experiment `{name}`"))
+                .with_help(suggestion(name, cases.iter().map(|case| case.name.as_str())))
+        })?;
+        Ok((index, value(name, quantity)?))
+    };
+    draft.starts.iter().map(|entry| one(entry).map_err(|mistake: Mistake| mistake.within("starts"))).collect()
 }
 
 /// Every tuner must set a parameter, or be followed by one that does.
