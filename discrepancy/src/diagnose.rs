@@ -69,6 +69,7 @@ pub fn diagnose(
     let growth = search.settle(growth, watch);
     let (growth, last, held) = search.reduce(growth);
     watch.stage("the repaired model", 0.9);
+    let is_full = growth.last.added.len() == options.max_effects && growth.last.fitted.normalised() > UNEXPLAINED;
     let (rounds, steps, allowed) = (growth.rounds, growth.steps, growth.allowed);
     let (last, held, after, rounds) = match search.calibrate(&last, &held) {
         Some(after) => (last, held, after, rounds),
@@ -106,6 +107,9 @@ pub fn diagnose(
         Verdict::Unexplained => TRULY_UNEXPLAINED,
     };
     let starts = starts(&subject, &after, &found);
+    let full =
+        format!("the search ended at {} effects, `max-effects`; more may explain what is left", options.max_effects);
+    let full = (is_full && verdict == Verdict::Unexplained).then_some(full);
     Ok(Diagnosis {
         verdict,
         probability,
@@ -122,7 +126,7 @@ pub fn diagnose(
         noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject, options.level) } else { Vec::new() },
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
-        notes: subject.notes.iter().cloned().chain(note).collect(),
+        notes: subject.notes.iter().cloned().chain(note).chain(full).collect(),
         starts,
         simulations: simulations.load(Ordering::Relaxed),
     })

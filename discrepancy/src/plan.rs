@@ -4,12 +4,16 @@
 use mops_core::{Case, Input, Job};
 
 use crate::search::Trial;
+use crate::weigh::CLEARLY;
 
 /// Factors by which inputs or start values are varied.
 const FACTORS: [f64; 4] = [0.3, 0.5, 2.0, 3.0];
 
+/// Largest angle that start values are varied to, rad: a turn further is the same.
+const HALF_A_TURN: f64 = std::f64::consts::PI;
+
 /// What would separate two trials that were fitted to the same data, in words; `None` where no variation does better than
-/// the experiments themselves.
+/// the experiments themselves, or well enough to tell them apart.
 pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<String> {
     if a.windows != 1 || b.windows != 1 {
         return None;
@@ -18,12 +22,15 @@ pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<Stri
     for piece in 0..a.fit.pieces.len() {
         let name = &a.fit.subject.measurements[a.fit.pieces[piece].measurement].name;
         let Some(now) = difference(a, b, piece, 1.0, 1.0) else { continue };
+        let samples = a.fitted.residuals[piece].len();
         let driven = !a.fit.pieces[piece].case.inputs.is_empty();
         for factor in FACTORS {
             let inputs = driven.then_some((factor, 1.0, "its inputs"));
             for (input, start, what) in inputs.into_iter().chain([(1.0, factor, "its start values")]) {
                 let Some(then) = difference(a, b, piece, input, start) else { continue };
-                if then > 1.5 * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
+                #[allow(clippy::cast_precision_loss)]
+                let is_telling = then * then * samples as f64 >= CLEARLY;
+                if is_telling && then > 1.5 * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
                     best = Some((then, now, format!("`{name}` again with {what} {factor} times as large")));
                 }
             }
@@ -49,7 +56,14 @@ fn outputs(trial: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<Ve
     let p = &trial.fit.pieces[piece];
     let mut parameters = trial.fit.parameters(piece, &trial.fitted.point);
     let own = trial.fit.subject.measurements[p.measurement].locals.len();
-    p.locals[..own].iter().for_each(|local| parameters[local.parameter] *= start);
+    for local in &p.locals[..own] {
+        let value = &mut parameters[local.parameter];
+        *value *= start;
+        let unit = &trial.fit.model.interface().parameters[local.parameter].variable.unit;
+        if start > 1.0 && unit.to_string() == "rad" && value.abs() > HALF_A_TURN {
+            return None;
+        }
+    }
     let inputs = p.case.inputs.iter().map(|(name, given)| (name.clone(), scaled(given, input)));
     let case = Case { inputs: inputs.collect(), ..p.case.clone() };
     let signals = p.signals();

@@ -46,8 +46,13 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
         text += "\n";
     }
     let [probability, chance] = [words::probability(diagnosis.probability), significant(diagnosis.p_value, 2)];
+    let of = if diagnosis.found.len() > 1 && diagnosis.verdict == Verdict::Effect {
+        "that all of these are right"
+    } else {
+        "of the verdict"
+    };
     text += &format!(
-        "\nprobability of the verdict {probability}; p-value of nothing missing {chance}; {} simulations, {seconds:.2} s\n",
+        "\nprobability {of} {probability}; p-value of nothing missing {chance}; {} simulations, {seconds:.2} s\n",
         diagnosis.simulations
     );
     text
@@ -116,7 +121,7 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         ]
     });
     let mut text = table(
-        &["tried alone", "place", "probability", "BIC gain", "absorbed", "strengths"],
+        &["candidate", "place", "probability", "BIC gain", "absorbed", "strengths, from all data"],
         &[2, 3, 4],
         rows.collect(),
     );

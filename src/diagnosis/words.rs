@@ -40,7 +40,7 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
             };
             let free = diagnosis.unexplained.as_ref().map_or_else(String::new, free_signal);
             format!(
-                "Something is missing{place} that no effect of the catalogue explains{also}: {}{free}.",
+                "Something is missing{place} that none of the effects tried explains{also}: {}{free}.",
                 changed(diagnosis)
             )
         }

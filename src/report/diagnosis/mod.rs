@@ -53,7 +53,12 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> [(&'static str, String); 2] {
         p if p.is_finite() && p < 1e-6 => "below 1e-6".to_owned(),
         p => significant(p, 2),
     };
-    [("Probability of the verdict", words::probability(diagnosis.probability)), ("p-value: nothing missing", chance)]
+    let probability = if diagnosis.found.len() > 1 && diagnosis.verdict == Verdict::Effect {
+        "Probability that all of these are right"
+    } else {
+        "Probability of the verdict"
+    };
+    [(probability, words::probability(diagnosis.probability)), ("p-value: nothing missing", chance)]
 }
 
 /// The sections of the page, in the order in which they convince.

@@ -17,7 +17,8 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     html! {
         p {
             "The effects that were fitted at places of the model, each beside those that were in by then. Absorbed is the share of "
-            "its trace in the outputs that parameters and start values can take over."
+            "its trace in the outputs that parameters and start values can take over. Strengths here are from all data that choose "
+            "between effects; those of what was found, above, from calibration data alone."
         }
         (scrolling("Ranking", rows(diagnosis, first)))
         @if !others.is_empty() {

@@ -104,9 +104,7 @@ fn what_no_effect_explains_has_a_place_and_a_table() {
     diagnosis.next_experiment = None;
     let (folder, page) = written(diagnosis);
     assert!(
-        page.contains(
-            "Something is missing in the equation of <code>x</code> that no effect of the catalogue explains"
-        )
+        page.contains("Something is missing in the equation of <code>x</code> that none of the effects tried explains")
     );
     assert!(!titles(&page).contains(&"What is missing") && !titles(&page).contains(&"What to measure next"));
     let plot = std::fs::read_to_string(folder.path().join("plots/missing-process-x-position.svg")).unwrap();
