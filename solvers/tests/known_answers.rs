@@ -50,6 +50,17 @@ fn a_second_opinion_leads_past_the_first_minimum() {
     }
 }
 
+/// Rastrigin's function and Bueche's have ten basins and more along each of five axes, and tuners act apart from each other.
+#[test]
+fn basins_along_the_axes_are_searched_one_axis_at_a_time() {
+    for name in ["f3 i1 n5", "f4 i1 n5"] {
+        let all = problems("bbob");
+        let problem = all.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
+        let found = solve("cma-es", problem, Slope::Differences, 1500);
+        assert!(found.best.objective < 1e-8, "{name}: {:?}", found.best);
+    }
+}
+
 /// The sum of absolute residuals has kinks that no row shows. All residuals vanish at the solutions of these problems.
 #[test]
 fn a_pattern_search_follows_kinks_inside_a_row() {

@@ -41,6 +41,11 @@ impl Bipop {
         Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, large: true }
     }
 
+    /// A run with the usual population that begins with a small step, near a point that is good already.
+    pub fn small(&self, sigma: f64) -> Plan {
+        Plan { sigma, ..self.first() }
+    }
+
     /// Notes what a run has cost, and plans the next; `None` after `restarts` doublings.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn next(&mut self, last: &Plan, spent: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {

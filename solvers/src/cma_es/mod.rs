@@ -1,5 +1,6 @@
 //! CMA-ES: samples a normal distribution, and adapts its mean, size and covariance to what was good.
 
+mod axes;
 mod bipop;
 mod distribution;
 mod stop;
@@ -13,6 +14,7 @@ use serde::Deserialize;
 
 use crate::ranking::ranked;
 use crate::start::usable_start;
+use axes::Axes;
 use bipop::{Bipop, Plan};
 use distribution::Distribution;
 use stop::{End, History};
@@ -21,12 +23,14 @@ use strategy::Strategy;
 /// Covariance matrix adaptation evolution strategy with restarts in two regimes (BIPOP): a global search without slopes
 /// that is indifferent to turned, stretched and monotonically distorted problems. A whole generation is evaluated in
 /// parallel. It sees one number per point, the maximum, and the largest violation: feasible points come first, then small
-/// violations, failures last. Points outside the box are reflected at its faces.
+/// violations, failures last. Points outside the box are reflected at its faces. After the first run every tuner is searched by
+/// itself, for basins that lie along the axes.
 ///
 /// For up to about 100 tuners, rough or multimodal criteria, and budgets from some hundred evaluations per tuner.
 ///
 /// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772 (2016), with negative weights; restarts:
-/// N. Hansen, GECCO (2009) 2389-2396.
+/// N. Hansen, GECCO (2009) 2389-2396; searches along axes between them: I. Loshchilov, M. Schoenauer, M. Sebag, GECCO companion (2013)
+/// 1177-1184.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CmaEsOptions {
@@ -64,9 +68,13 @@ struct State {
     random: Stream,
     restarts: Bipop,
     run: Run,
-    /// The best point, and whether the run that found it converged.
+    /// The best point and its merit, and whether the run that found it converged.
+    point: Vec<f64>,
     best: Merit,
     converged: bool,
+    /// The search along axes that follows the first run: under way, and whether it is still to come.
+    axes: Option<Axes>,
+    along_axes: bool,
     /// Order of magnitude of the objective at the start, at most 1.
     unit: f64,
 }
@@ -95,10 +103,20 @@ impl Solver for CmaEs {
         let usual = Strategy::usual_population(start.len());
         let population = if self.options.population > 0 { self.options.population } else { usual };
         let restarts = Bipop::new(population, self.options.size);
-        let run = self.run(restarts.first(), start, &oracle.shape().spacing);
+        let run = self.run(restarts.first(), start.clone(), &oracle.shape().spacing);
         let unit = at.merit.objective.abs().min(1.0);
         let random = oracle.stream("cma-es");
-        self.state = Some(State { random, restarts, run, best: at.merit, converged: false, unit });
+        self.state = Some(State {
+            random,
+            restarts,
+            run,
+            point: start,
+            best: at.merit,
+            converged: false,
+            axes: None,
+            along_axes: self.options.restarts > 0 && oracle.shape().dimension() > 1,
+            unit,
+        });
         Ok(())
     }
 
@@ -107,10 +125,26 @@ impl Solver for CmaEs {
             return Ok(Progress::Converged);
         }
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        if let Some(axes) = &mut state.axes {
+            axes.search(oracle)?;
+            return if axes.is_over() { self.leave_axes(oracle) } else { Ok(Progress::Continue) };
+        }
         let Some(end) = state.generation(oracle)? else { return Ok(Progress::Continue) };
         if state.run.improved {
             state.converged = end == End::Converged;
         }
+        if std::mem::take(&mut state.along_axes) {
+            state.axes = Some(Axes::new(state.point.clone(), state.best));
+            return Ok(Progress::Continue);
+        }
+        self.restart(oracle)
+    }
+}
+
+impl CmaEs {
+    /// Begins the next run, if there is one.
+    fn restart(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
         let (last, spent) = (state.run.plan, state.run.spent);
         let Some(plan) = state.restarts.next(&last, spent, self.options.restarts, &mut state.random) else {
             return Ok(if state.converged { Progress::Converged } else { Progress::Stalled });
@@ -122,9 +156,19 @@ impl Solver for CmaEs {
         self.state = Some(state);
         Ok(Progress::Continue)
     }
-}
 
-impl CmaEs {
+    /// Begins a small run where the search along axes ended; the next run where it found nothing better.
+    fn leave_axes(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        let Some((point, merit)) = state.axes.take().and_then(Axes::found) else { return self.restart(oracle) };
+        (state.point, state.best, state.converged) = (point.clone(), merit, false);
+        let plan = state.restarts.small(axes::SIGMA);
+        let mut state = self.state.take().expect("it was there");
+        state.run = self.run(plan, point, &oracle.shape().spacing);
+        self.state = Some(state);
+        Ok(Progress::Continue)
+    }
+
     fn run(&self, plan: Plan, start: Vec<f64>, spacing: &[f64]) -> Run {
         // A fifth of the spacing still reaches the neighbouring value once in some generations.
         let least = spacing.iter().map(|spacing| 0.2 * spacing).collect();
@@ -143,11 +187,13 @@ impl State {
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<Option<End>, Halt> {
         let run = &mut self.run;
         let steps = run.distribution.sample(&mut self.random);
-        let answers = oracle.evaluate(&points(&run.distribution, &steps))?;
+        let members = points(&run.distribution, &steps);
+        let answers = oracle.evaluate(&members)?;
         run.spent += answers.len();
         let order = ranked(&answers);
         if answers[order[0]].merit.is_better_than(&self.best) {
             self.best = answers[order[0]].merit;
+            self.point.clone_from(&members[order[0]]);
             run.improved = true;
         }
         run.distribution.update(&steps, &order);
