@@ -6,7 +6,7 @@ use rand_distr::{Cauchy, Distribution, Normal};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Generations, Next, Population, Renewal, merits};
+use crate::population::{Generations, Next, Population, Renewal};
 use crate::ranking::compare;
 
 /// Differential evolution with factors that adapt to what has succeeded (SHADE): a global search without slopes, strong
@@ -51,6 +51,8 @@ struct DifferentialEvolution {
 struct State {
     random: Stream,
     population: Population,
+    /// Memory for the mixtures that challenge the members.
+    trials: Vec<Vec<f64>>,
     /// Members that were replaced by better ones.
     replaced: Vec<Vec<f64>>,
     memory: Memory,
@@ -71,7 +73,9 @@ impl Solver for DifferentialEvolution {
         let population = Population::sampled(oracle, self.size(start.len()), Some(start), &mut random)?;
         let DifferentialEvolutionOptions { tolerance, patience, restarts, .. } = self.options;
         let generations = Generations::of(&population, Renewal { tolerance, patience, restarts });
-        self.state = Some(State { random, population, replaced: Vec::new(), memory: Memory::new(), generations });
+        let trials = population.points.clone();
+        self.state =
+            Some(State { random, population, trials, replaced: Vec::new(), memory: Memory::new(), generations });
         Ok(())
     }
 
@@ -104,40 +108,42 @@ impl State {
         let size = self.population.len();
         let order = self.population.order();
         let mut factors = Vec::with_capacity(size);
-        let mut trials = Vec::with_capacity(size);
-        for member in 0..size {
+        let mut trials = std::mem::take(&mut self.trials);
+        for (member, trial) in trials.iter_mut().enumerate() {
             let drawn = self.memory.draw(&mut self.random);
-            trials.push(self.trial(member, &order, drawn));
+            self.mix(trial, member, &order, drawn);
             factors.push(drawn);
         }
-        let worth = merits(&oracle.evaluate(&trials)?);
-        let mut successes = Vec::new();
-        for (member, (trial, merit)) in trials.into_iter().zip(worth).enumerate() {
-            let before = self.population.merits[member];
+        let answers = oracle.evaluate(&trials)?;
+        let mut successes = Vec::with_capacity(size);
+        for (member, (trial, answer)) in trials.iter_mut().zip(&answers).enumerate() {
+            let (before, merit) = (self.population.merits[member], answer.merit);
             let against = compare(&merit, &before);
             if against.is_gt() {
                 continue;
             }
-            let parent = std::mem::replace(&mut self.population.points[member], trial);
+            // From here on the trial is the parent.
+            std::mem::swap(&mut self.population.points[member], trial);
             self.population.merits[member] = merit;
             if against.is_lt() {
                 successes.push((factors[member], gain(&before, &merit)));
                 if self.replaced.len() < size {
-                    self.replaced.push(parent);
+                    self.replaced.push(trial.clone());
                 } else {
                     let slot = self.random.random_range(0..size);
-                    self.replaced[slot] = parent;
+                    std::mem::swap(&mut self.replaced[slot], trial);
                 }
             }
         }
+        self.trials = trials;
         self.memory.learn(&successes);
         Ok(())
     }
 
-    /// `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`: `x_p` is one of the best tenth or two, `x_2` may be a member that
+    /// Writes `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`, to `trial`: `x_p` is one of the best tenth or two, `x_2` may be a member that
     /// was replaced.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn trial(&mut self, member: usize, order: &[usize], [factor, rate]: [f64; 2]) -> Vec<f64> {
+    fn mix(&mut self, trial: &mut [f64], member: usize, order: &[usize], [factor, rate]: [f64; 2]) {
         let size = self.population.len();
         let random = &mut self.random;
         let elite = 2.max((random.random_range(0.0..0.2) * size as f64) as usize);
@@ -172,7 +178,7 @@ impl State {
                 moved
             }
         };
-        (0..x.len()).map(coordinate).collect()
+        trial.iter_mut().zip((0..x.len()).map(coordinate)).for_each(|(place, value)| *place = value);
     }
 }
 

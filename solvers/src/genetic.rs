@@ -5,7 +5,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Generations, Next, Population, Renewal, merits};
+use crate::population::{Generations, Next, Population, Renewal};
 use crate::ranking::compare;
 use crate::variation::Variation;
 
@@ -66,6 +66,8 @@ struct Genetic {
 struct State {
     random: Stream,
     population: Population,
+    /// Memory for children.
+    children: Vec<Vec<f64>>,
     variation: Variation,
     generations: Generations,
 }
@@ -91,7 +93,10 @@ impl Solver for Genetic {
             mutation_index: options.mutation_index,
             ..Variation::usual(start.len())
         };
-        self.state = Some(State { random, population, variation, generations });
+        // Children come in pairs.
+        let pairs = population.len().div_ceil(2);
+        let children = vec![vec![0.0; start.len()]; 2 * pairs];
+        self.state = Some(State { random, population, children, variation, generations });
         Ok(())
     }
 
@@ -116,23 +121,23 @@ impl State {
     /// As many children as members; the better half of all survives, the best first.
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
         let size = self.population.len();
-        let mut children: Vec<Vec<f64>> = Vec::with_capacity(size + 1);
-        while children.len() < size {
-            let [mut a, mut b] = [self.winner(), self.winner()].map(|i| self.population.points[i].clone());
-            self.variation.cross(&mut a, &mut b, &mut self.random);
-            for mut child in [a, b] {
-                self.variation.mutate(&mut child, &mut self.random);
-                children.push(child);
+        let mut children = std::mem::take(&mut self.children);
+        for pair in children.chunks_exact_mut(2) {
+            let [a, b] = pair else { continue };
+            for child in [&mut *a, &mut *b] {
+                let parent = self.winner();
+                child.copy_from_slice(&self.population.points[parent]);
             }
+            self.variation.cross(a, b, &mut self.random);
+            self.variation.mutate(a, &mut self.random);
+            self.variation.mutate(b, &mut self.random);
         }
-        children.truncate(size);
-        let worth = merits(&oracle.evaluate(&children)?);
-        self.population.points.append(&mut children);
-        self.population.merits.extend(worth);
-        let order = self.population.order();
-        let all = std::mem::replace(&mut self.population, Population { points: Vec::new(), merits: Vec::new() });
-        self.population.points = order[..size].iter().map(|&i| all.points[i].clone()).collect();
-        self.population.merits = order[..size].iter().map(|&i| all.merits[i]).collect();
+        let answers = oracle.evaluate(&children[..size])?;
+        self.population.points.extend(children.drain(..size));
+        self.population.merits.extend(answers.iter().map(|answer| answer.merit));
+        let dead = self.population.keep_best(size);
+        children.extend(dead);
+        self.children = children;
         Ok(())
     }
 

@@ -158,17 +158,19 @@ fn fill(
     counts: &mut [usize],
     random: &mut Stream,
 ) {
+    let (mut rare, mut here): (Vec<usize>, Vec<usize>) = Default::default();
     while chosen.len() < wanted {
         let fewest = candidates.iter().map(|c| counts[c.direction]).min().expect("more candidates than places");
-        let mut rare: Vec<usize> =
-            candidates.iter().map(|c| c.direction).filter(|&direction| counts[direction] == fewest).collect();
+        rare.clear();
+        rare.extend(candidates.iter().map(|c| c.direction).filter(|&direction| counts[direction] == fewest));
         rare.sort_unstable();
         rare.dedup();
         let direction = rare[random.random_range(0..rare.len())];
-        let here: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].direction == direction).collect();
+        here.clear();
+        here.extend((0..candidates.len()).filter(|&i| candidates[i].direction == direction));
         let taken = if fewest == 0 {
             let nearer = |a: &usize, b: &usize| candidates[*a].distance.total_cmp(&candidates[*b].distance);
-            here.into_iter().min_by(nearer).expect("the direction has candidates")
+            here.iter().copied().min_by(nearer).expect("the direction has candidates")
         } else {
             here[random.random_range(0..here.len())]
         };

@@ -45,6 +45,15 @@ impl Population {
         order
     }
 
+    /// Keeps so many of the best, these in order, and gives the others' points, as memory for children.
+    pub fn keep_best(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
+        let order = self.order();
+        let (mut points, merits) = (std::mem::take(&mut self.points), std::mem::take(&mut self.merits));
+        self.points = order[..size].iter().map(|&i| std::mem::take(&mut points[i])).collect();
+        self.merits = order[..size].iter().map(|&i| merits[i]).collect();
+        points.into_iter().filter(|point| !point.is_empty())
+    }
+
     /// Whether the members no longer differ: in what they are worth, relative to `unit`, or in where they are.
     fn has_collapsed(&self, tolerance: f64, unit: f64) -> bool {
         let order = self.order();

@@ -91,12 +91,11 @@ impl Distribution {
         self.covariance *= 1.0 + lost - c_1 - c_mu * self.strategy.weights.iter().sum::<f64>();
         self.covariance.ger(c_1, &self.path_c, &self.path_c, 1.0);
         for (&weight, &member) in self.strategy.weights.iter().zip(order) {
-            let step = steps.column(member).into_owned();
-            let weight = if weight >= 0.0 {
-                weight
-            } else {
-                weight * n / self.whiten(&step).norm_squared().max(f64::MIN_POSITIVE)
-            };
+            let step = steps.column(member);
+            // The square of the length of `C^(-1/2) y`.
+            let along = self.axes.column_iter().zip(&self.lengths).map(|(axis, length)| axis.dot(&step) / length);
+            let square = || along.map(|z| z * z).sum::<f64>().max(f64::MIN_POSITIVE);
+            let weight = if weight >= 0.0 { weight } else { weight * n / square() };
             self.covariance.ger(c_mu * weight, &step, &step, 1.0);
         }
         self.keep_grids_within_reach();

@@ -83,6 +83,8 @@ struct State {
 struct Run {
     plan: Plan,
     distribution: Distribution,
+    /// Memory for the members of a generation.
+    members: Vec<Vec<f64>>,
     history: History,
     spent: usize,
     improved: bool,
@@ -174,6 +176,7 @@ impl CmaEs {
         let least = spacing.iter().map(|spacing| 0.2 * spacing).collect();
         Run {
             distribution: Distribution::new(start, plan.sigma, plan.population, least),
+            members: vec![vec![0.0; spacing.len()]; plan.population.max(Strategy::LEAST)],
             history: History::new(plan.sigma, self.options.tolerance),
             plan,
             spent: 0,
@@ -187,13 +190,13 @@ impl State {
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<Option<End>, Halt> {
         let run = &mut self.run;
         let steps = run.distribution.sample(&mut self.random);
-        let members = points(&run.distribution, &steps);
-        let answers = oracle.evaluate(&members)?;
+        place(&mut run.members, &run.distribution, &steps);
+        let answers = oracle.evaluate(&run.members)?;
         run.spent += answers.len();
         let order = ranked(&answers);
         if answers[order[0]].merit.is_better_than(&self.best) {
             self.best = answers[order[0]].merit;
-            self.point.clone_from(&members[order[0]]);
+            self.point.clone_from(&run.members[order[0]]);
             run.improved = true;
         }
         run.distribution.update(&steps, &order);
@@ -214,13 +217,13 @@ fn height(evaluation: &Evaluation) -> f64 {
     if evaluation.merit.is_feasible() { objective } else { violation.min(f64::MAX) }
 }
 
-/// The members of a generation, reflected into the box.
-fn points(distribution: &Distribution, steps: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    let member = |j: usize| {
-        let coordinates = distribution.mean.iter().zip(steps.column(j).iter().copied().collect::<Vec<_>>());
-        coordinates.map(|(m, y)| reflected(m + distribution.sigma * y)).collect()
-    };
-    (0..steps.ncols()).map(member).collect()
+/// Puts the members of a generation where their steps lead, reflected into the box.
+fn place(members: &mut [Vec<f64>], distribution: &Distribution, steps: &DMatrix<f64>) {
+    for (member, step) in members.iter_mut().zip(steps.column_iter()) {
+        for ((coordinate, m), y) in member.iter_mut().zip(&distribution.mean).zip(&step) {
+            *coordinate = reflected(m + distribution.sigma * y);
+        }
+    }
 }
 
 /// The coordinate in [0, 1] at which a ray that leaves the box arrives, reflected at every face it meets.

@@ -28,6 +28,9 @@ pub struct Strategy {
 }
 
 impl Strategy {
+    /// The fewest members.
+    pub const LEAST: usize = 4;
+
     /// The usual number of members, `4 + 3 ln n`.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn usual_population(n: usize) -> usize {
@@ -37,7 +40,7 @@ impl Strategy {
     /// The constants.
     #[allow(clippy::cast_precision_loss)]
     pub fn new(n: usize, population: usize) -> Self {
-        let population = population.max(4);
+        let population = population.max(Self::LEAST);
         let parents = population / 2;
         let nf = n as f64;
         let raw: Vec<f64> = (1..=population).map(|i| (population as f64 / 2.0 + 0.5).ln() - (i as f64).ln()).collect();

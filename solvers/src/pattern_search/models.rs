@@ -12,6 +12,12 @@ struct Quadratic {
     curvature: DMatrix<f64>,
 }
 
+/// `y'H y`, with room for `H y`.
+fn form(h: &DMatrix<f64>, y: &DVector<f64>, room: &mut DVector<f64>) -> f64 {
+    room.gemv(1.0, h, y, 0.0);
+    y.dot(room)
+}
+
 /// What a unit of squared misfit costs, in units of squared curvature over the trust region.
 const MISS: f64 = 1e-4;
 
@@ -51,11 +57,12 @@ impl Models {
         }
         let columns: Vec<DVector<f64>> = steps.iter().map(|step| DVector::from_column_slice(step)).collect();
         let earlier: Vec<DMatrix<f64>> = earlier.iter().map(|h| h * (radius * radius)).collect();
+        let mut room = DVector::zeros(n);
         let right = DMatrix::from_fn(size, earlier.len(), |i, row| {
             if i >= count {
                 return 0.0;
             }
-            values[i][row] - 0.5 * columns[i].dot(&(&earlier[row] * &columns[i]))
+            values[i][row] - 0.5 * form(&earlier[row], &columns[i], &mut room)
         });
         let found = system.lu().solve(&right)?;
         if !found.iter().all(|v| v.is_finite()) {
@@ -79,7 +86,8 @@ impl Models {
 
     /// Values of all rows after a step.
     pub fn values(&self, y: &DVector<f64>) -> Vec<f64> {
-        let value = |q: &Quadratic| q.constant + q.slope.dot(y) + 0.5 * y.dot(&(&q.curvature * y));
+        let mut room = DVector::zeros(y.len());
+        let value = |q: &Quadratic| q.constant + q.slope.dot(y) + 0.5 * form(&q.curvature, y, &mut room);
         self.rows.iter().map(value).collect()
     }
 

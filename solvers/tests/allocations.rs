@@ -1,0 +1,72 @@
+//! Memory that solvers ask for between evaluations.
+
+use mops_core::{Budget, Evaluation, Halt, Linearisation, Oracle, Progress, Run, Shape, Stream};
+use mops_problems::{Posed, Slope, suites};
+
+/// An oracle whose own memory does not count.
+struct Aside<'a>(&'a mut dyn Oracle);
+
+impl Oracle for Aside<'_> {
+    fn shape(&self) -> &Shape {
+        self.0.shape()
+    }
+
+    fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
+        uncounted(|| self.0.evaluate(points))
+    }
+
+    fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        uncounted(|| self.0.linearise(point, reach))
+    }
+
+    fn best(&self) -> Option<&Evaluation> {
+        self.0.best()
+    }
+
+    fn stream(&self, label: &str) -> Stream {
+        self.0.stream(label)
+    }
+}
+
+fn uncounted<T>(ask: impl FnOnce() -> T) -> T {
+    let mut answer = None;
+    allocation_counter::opt_out(|| answer = Some(ask()));
+    answer.expect("it was asked")
+}
+
+/// Blocks of memory per evaluation, the first few generations left out, that a solver of a kind asks for while it solves a problem of a suite.
+fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
+    let suite = suites().into_iter().find(|known| known.name == suite).expect("the suite is registered");
+    let problems = (suite.problems)();
+    let problem = problems.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
+    let posed = Posed::new(problem, Slope::Differences);
+    let mut run = Run::new(&posed, Budget { evaluations: budget }, &());
+    let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
+    let mut solver = kind.default_choice().make();
+    solver.begin(&mut run, &posed.start()).expect("the budget is larger");
+    // Room that is made once is made by then.
+    for _ in 0..3 {
+        solver.step(&mut Aside(&mut run)).expect("the budget is larger");
+    }
+    let before = run.archive().len();
+    let told = allocation_counter::measure(|| while let Ok(Progress::Continue) = solver.step(&mut Aside(&mut run)) {});
+    #[allow(clippy::cast_precision_loss)]
+    {
+        told.count_total as f64 / (run.archive().len() - before) as f64
+    }
+}
+
+/// A generation asks for a few blocks, whatever the number of its members: of 100 of them here, eight in `cma-es`.
+#[test]
+fn no_member_of_a_generation_asks_for_memory() {
+    for (kind, suite, problem, most) in [
+        ("genetic", "bbob", "f8 i1 n5", 0.25),
+        ("differential-evolution", "bbob", "f8 i1 n5", 0.25),
+        ("nsga2", "zdt", "ZDT1", 0.01),
+        ("nsga3", "zdt", "ZDT1", 0.25),
+        ("cma-es", "bbob", "f8 i1 n5", 2.5),
+    ] {
+        let blocks = blocks(kind, suite, problem, 5000);
+        assert!(blocks < most, "{kind}: {blocks} blocks per evaluation");
+    }
+}
