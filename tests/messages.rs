@@ -614,6 +614,13 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             called("a kind that is not there", &["describe", "settle-time"]),
             called("a data file that is not there", &["data", "swing.csv"]),
             called("an unknown command", &["rum", "study.toml"]),
+            called("slopes of studies that have their own", &["bench", "control", "--gradients"]),
+            called("a front under noise", &["bench", "zdt", "--noise", "0.1"]),
+            called("noise that is all there is", &["bench", "minimax", "--noise", "2"]),
+            called(
+                "a solver for none of the problems",
+                &["bench", "minimax", "--solver", "nsga2", "--problems", "CB2"],
+            ),
         ],
     );
 }

@@ -11,7 +11,7 @@ fn solve(kind: &str, problem: &Problem, slope: Slope, budget: usize) -> Measured
     let posed = Posed::new(problem, slope);
     let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
     let mut solver = kind.default_choice().make();
-    measure(&problem.answer, &posed, &posed.start(), solver.as_mut(), budget * (problem.dimension() + 1))
+    measure(&problem.answer, &posed, &posed.start(), solver.as_mut(), budget * (problem.dimension() + 1), None)
 }
 
 fn sqp(problem: &Problem, slope: Slope) -> Measured {

@@ -11,7 +11,7 @@ mod timed;
 use std::time::Instant;
 
 use mops_core::{Catalogue, Evaluator, Merit, SolverChoice, Stop, Watch};
-use mops_problems::{Posed, Slope, measure};
+use mops_problems::{Posed, Slope, Truth, measure};
 
 use super::each;
 pub(crate) use fronts::{Spread, published, spreads};
@@ -89,18 +89,20 @@ fn one(catalogue: &Catalogue, plan: &Plan, task: &Task<'_>) -> Option<Done> {
     match task.subject {
         Subject::Formula(problem) => {
             let posed = Posed::new(problem, task.slope).with_noise(plan.noise).with_seed(task.seed);
-            go(plan, task, &posed, &posed.start())
+            let clean = Posed::new(problem, task.slope);
+            let truth = |tuners: &[f64]| clean.evaluate(&clean.point_of(tuners)).merit;
+            go(plan, task, &posed, &posed.start(), if plan.noise > 0.0 { Some(&truth) } else { None })
         }
         Subject::Study(known) => {
             let posed = suite::posing(catalogue, known, task.seed);
             let start = posed.start();
-            go(plan, task, &posed, &start)
+            go(plan, task, &posed, &start, None)
         }
     }
 }
 
 /// `None` where the solver does not accept the problem.
-fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64]) -> Option<Done> {
+fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64], truth: Option<Truth<'_>>) -> Option<Done> {
     let Task { solver: choice, subject, seed, .. } = *task;
     let mut solver = choice.make();
     solver.accepts(posed.shape()).ok()?;
@@ -109,7 +111,7 @@ fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64]) -> Op
     let (budget, answer) = (plan.evaluations(start.len()), subject.answer());
     let (measured, seconds) = thread.install(|| {
         let begun = Instant::now();
-        let measured = measure(&answer, &timed, start, solver.as_mut(), budget);
+        let measured = measure(&answer, &timed, start, solver.as_mut(), budget, truth);
         (measured, begun.elapsed().as_secs_f64())
     });
     let fine = measured.evaluations_to(subject.accuracy(&plan.suite));

@@ -127,10 +127,11 @@ impl Results {
         self.rows.iter().filter(move |row| row.solver == solver)
     }
 
-    /// The row of the same run in these results.
+    /// The row of the same run in these results; of another solver where they have but one.
     pub fn same(&self, wanted: &Row) -> Option<&Row> {
-        let same = |row: &&Row| row.problem == wanted.problem && row.seed == wanted.seed;
-        self.of(&wanted.solver).find(same).or_else(|| self.rows.iter().find(same))
+        let solvers = self.solvers();
+        let solver = if let [only] = solvers[..] { only } else { &wanted.solver };
+        self.of(solver).find(|row| row.problem == wanted.problem && row.seed == wanted.seed)
     }
 
     #[allow(clippy::cast_precision_loss)]

@@ -84,6 +84,14 @@ impl Subject {
         }
     }
 
+    pub fn is_study(&self) -> bool {
+        matches!(self, Self::Study(_))
+    }
+
+    pub fn has_front(&self) -> bool {
+        matches!(self.answer(), Answer::Front { .. })
+    }
+
     pub fn answer(&self) -> Answer {
         match self {
             Self::Formula(problem) => problem.answer.clone(),

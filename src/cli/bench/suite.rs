@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     /// Evaluations a run may take, for every variable and one more; as is usual for the suite where absent.
     #[arg(long, value_name = "NUMBER")]
     budget: Option<usize>,
-    /// Relative noise that is added to all values.
+    /// Relative noise that is added to all values; what is reached is judged without it.
     #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
     noise: f64,
     /// Problems by name; all where absent.
@@ -85,7 +85,8 @@ impl FromArgMatches for Chosen {
 
 pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, Trouble> {
     let Chosen { suite, arguments } = chosen;
-    let before = arguments.against.as_deref().map(read).transpose()?;
+    let before = arguments.against.as_deref().map(|path| read(path, suite)).transpose()?;
+    posable(suite, arguments)?;
     let plan = Plan {
         suite: *suite,
         solvers: arguments.solvers.iter().map(|name| solver(catalogue, name)).collect::<Result<_, _>>()?,
@@ -99,6 +100,10 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     let progress = Progress::of_cases(!arguments.quiet);
     let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
     progress.finish();
+    if let Some(idle) = plan.solvers.iter().find(|solver| results.of(solver.kind).next().is_none()) {
+        let help = format!("`mops describe {}` says for what it is", idle.kind);
+        return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
+    }
     let text = text(&results, before.as_ref());
     print(&text);
     if let Some(folder) = &arguments.out {
@@ -131,10 +136,33 @@ fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> 
     }
 }
 
-fn read(path: &Path) -> Result<Results, Diagnostic> {
+/// Studies are posed as they are, and a front has no true members where there is noise.
+fn posable(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
+    let is_noisy = arguments.noise != 0.0;
+    let subjects = suite.subjects();
+    let wrong = if is_noisy && !(arguments.noise > 0.0 && arguments.noise < 1.0) {
+        Diagnostic::new(format!("the noise is relative, between 0 and 1, not {}", arguments.noise))
+    } else if subjects.iter().any(solvers::Subject::is_study) && (arguments.gradients || is_noisy) {
+        Diagnostic::new(format!("`{}` has studies, whose slopes and noise are their own", suite.name))
+            .with_help("leave `--gradients` and `--noise` out")
+    } else if is_noisy && subjects.iter().any(solvers::Subject::has_front) {
+        Diagnostic::new(format!("`{}` has fronts, which are not measured under noise", suite.name))
+            .with_help("leave `--noise` out")
+    } else {
+        return Ok(());
+    };
+    Err(wrong)
+}
+
+fn read(path: &Path, suite: &Suite) -> Result<Results, Diagnostic> {
     let mistake = |why: String| Diagnostic::new(format!("{}: {why}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| mistake(error.to_string()))?;
-    serde_json::from_str(&text).map_err(|error| mistake(format!("no results of a benchmark of solvers: {error}")))
+    let unread = |error: serde_json::Error| mistake(format!("no results of a benchmark of solvers: {error}"));
+    let results: Results = serde_json::from_str(&text).map_err(unread)?;
+    if results.suite != suite.name {
+        return Err(mistake(format!("these are results of `{}`, not of `{}`", results.suite, suite.name)));
+    }
+    Ok(results)
 }
 
 fn text(results: &Results, before: Option<&Results>) -> String {
@@ -144,20 +172,44 @@ fn text(results: &Results, before: Option<&Results>) -> String {
     let seeds = results.rows.iter().any(|row| row.seed > 1);
     let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
     header.extend(["all", "ms", "solved"]);
-    header.extend(before.map(|_| "before"));
+    let earlier = before.map(|before| match before.solvers()[..] {
+        [only] => format!("before, {only}"),
+        _ => "before".to_owned(),
+    });
+    header.extend(earlier.as_deref());
     let rows = results.rows.iter().map(|row| cells(row, seeds, before)).collect();
     let mut text = table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 12], rows);
     let fine = results.accuracy;
-    text.push_str(&format!(
-        "\nTo 1e-3, to the end: evaluations until the best feasible point is that near to f*, and {fine:e}, relative to the \
-         larger of 1 and |f*|; slopes by {}.\n",
-        if results.slopes == "exact" { "dual numbers, which count as no evaluation" } else { "differences" }
-    ));
+    let is_relative = suites().iter().any(|suite| suite.name == results.suite && suite.relative);
+    let reached = if is_relative {
+        format!(
+            "a feasible point has all but 1e-3, and {fine:e}, of the way from the start to f*, the least of all solvers"
+        )
+    } else {
+        format!(
+            "the best feasible point is within 1e-3 of f*, and {fine:e} or what the problem's source allows, relative to the \
+             larger of 1 and |f*|"
+        )
+    };
+    let slopes = |results: &Results| match results.slopes.as_str() {
+        "exact" => "slopes by dual numbers, which count as no evaluation",
+        _ => "slopes by differences",
+    };
+    let noise = if results.noise > 0.0 {
+        format!("; a noise of {} on all values, judged without it", results.noise)
+    } else {
+        String::new()
+    };
+    let how = if results.suite == "control" { "slopes as the studies have them" } else { slopes(results) };
+    text.push_str(&format!("\nTo 1e-3, to the end: evaluations until {reached}; {how}{noise}.\n"));
+    if let Some(before) = before.filter(|before| before.slopes != results.slopes || before.noise != results.noise) {
+        text.push_str(&format!("Before: {}, a noise of {}.\n", slopes(before), before.noise));
+    }
     for (name, results) in [(Some(results), ""), (before, "before: ")].into_iter().filter_map(|(r, n)| Some((n, r?))) {
         for solver in results.solvers() {
             text.push_str(&summary(name, results, solver));
         }
-        if suites().iter().any(|suite| suite.name == results.suite && suite.relative) {
+        if is_relative {
             text.push_str(&shares(name, results));
         }
     }

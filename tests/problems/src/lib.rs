@@ -16,7 +16,7 @@ mod posed;
 mod problem;
 
 pub use formula::{Formula, Functions, Outputs};
-pub use measure::{FrontFound, Measured, measure};
+pub use measure::{FrontFound, Measured, Truth, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
 

@@ -1,7 +1,7 @@
 //! How a solver does on a problem.
 
 use mops_core::front::{hypervolume, inverted_generational_distance, non_dominated};
-use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Oracle, Run, Solver, Stop};
+use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Oracle, Record, Run, Solver, Stop};
 
 use crate::problem::Answer;
 
@@ -51,21 +51,31 @@ impl Measured {
     }
 }
 
-/// Solves a problem with this answer from a point of the unit box with at most `budget` points.
+/// What a point is worth without noise, by the values of its tuners.
+pub type Truth<'a> = &'a (dyn Fn(&[f64]) -> Merit + Sync);
+
+/// Solves a problem with this answer from a point of the unit box with at most `budget` points. Where there is noise, `truth`
+/// judges: every point counts as the best one that was seen until then.
 pub fn measure<E: Evaluator>(
     answer: &Answer,
     posed: &E,
     start: &[f64],
     solver: &mut dyn Solver,
     budget: usize,
+    truth: Option<Truth<'_>>,
 ) -> Measured {
     let mut run = Run::new(posed, Budget { evaluations: budget }, &());
     let stop = run.solve(solver, start);
-    let history: Vec<Merit> = run.archive().iter().map(|record| record.merit).collect();
-    let best = history
-        .iter()
-        .copied()
-        .fold(Merit::FAILED, |best, merit| if merit.is_better_than(&best) { merit } else { best });
+    let (mut best, mut seen) = (Merit::FAILED, Merit::FAILED);
+    let worth = |record: &Record| {
+        let is_better = record.merit.is_better_than(&seen);
+        if is_better {
+            seen = record.merit;
+            best = truth.map_or(seen, |truth| truth(&record.tuners));
+        }
+        if truth.is_some() { best } else { record.merit }
+    };
+    let history: Vec<Merit> = run.archive().iter().map(worth).collect();
     let target = answer.nearest_minimum(best.objective);
     let linearisations = run.linearisations();
     let front = front(answer, &mut run, solver);
