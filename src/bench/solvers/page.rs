@@ -4,6 +4,9 @@ use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
 use crate::report::{Curve, CurveStyle, Ink, Plot, Upright, significant};
 
+/// Inks that differ.
+const INKS: usize = 6;
+
 /// The page, from the tables as text, and from the results with their names.
 pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     let suite = all.first().map_or("", |(_, results)| results.suite.as_str());
@@ -13,8 +16,13 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     // No point of a front is called solved.
     let of_fronts = all.iter().any(|(_, results)| results.rows.iter().any(|row| row.front.is_some()));
     let profiles = || {
-        let data = [data(all, rough, ROUGH), data(all, fine, accuracy)];
-        data.into_iter().chain([performance(all, rough, ROUGH), performance(all, fine, accuracy)]).collect()
+        let mut plots = vec![data(all, rough, ROUGH), performance(all, rough, ROUGH)];
+        // One accuracy is one pair of pictures.
+        if accuracy < ROUGH {
+            plots.insert(1, data(all, fine, accuracy));
+            plots.push(performance(all, fine, accuracy));
+        }
+        plots
     };
     let plots: Vec<Option<Plot>> = if of_fronts { vec![volumes(all)] } else { profiles() };
     let title = format!("Benchmark of solvers: {suite}");
@@ -87,13 +95,18 @@ fn scored(all: &[(String, &Results)], count: impl Fn(&Row) -> Option<usize> + Co
 }
 
 fn curves(profiles: Vec<(String, Vec<(f64, f64)>)>) -> Option<Vec<Curve>> {
-    let last = profiles.iter().flat_map(|(_, points)| points).map(|(x, _)| *x).fold(0.0, f64::max);
+    let ends = profiles.iter().flat_map(|(_, points)| points).map(|(x, _)| *x);
+    let [first, last] = ends.fold([f64::INFINITY, 0.0], |[low, high], x| [x.min(low), x.max(high)]);
     let curve = |(index, (name, mut points)): (usize, (String, Vec<(f64, f64)>))| {
-        // Up to the end of the picture.
-        if let Some(&(_, share)) = points.last() {
-            points.push((last, share));
+        // Up to the end of the picture; at 0 throughout where nothing is solved.
+        if points.is_empty() {
+            points.push((first, 0.0));
         }
-        Curve { name, points, ink: Ink::Series(index), ..Curve::default() }
+        let share = points.last().map_or(0.0, |&(_, share)| share);
+        points.push((last, share));
+        // Where the inks begin anew, lines are dashed.
+        let style = if (index / INKS).is_multiple_of(2) { CurveStyle::Line } else { CurveStyle::Dashed };
+        Curve { name, points, style, ink: Ink::Series(index), ..Curve::default() }
     };
     (last > 0.0).then(|| profiles.into_iter().enumerate().map(curve).collect())
 }
