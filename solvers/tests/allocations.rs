@@ -34,7 +34,8 @@ fn uncounted<T>(ask: impl FnOnce() -> T) -> T {
     answer.expect("it was asked")
 }
 
-/// Blocks of memory per evaluation, the first few generations left out, that a solver of a kind asks for while it solves a problem of a suite.
+/// Blocks of memory per evaluation that a solver of a kind asks for while it solves a problem of a suite, the first few
+/// generations left out.
 fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
     let suite = suites().into_iter().find(|known| known.name == suite).expect("the suite is registered");
     let problems = (suite.problems)();

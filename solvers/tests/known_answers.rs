@@ -7,6 +7,10 @@ fn problems(suite: &str) -> Vec<Problem> {
     (suite.problems)()
 }
 
+fn named(suite: &str, name: &str) -> Problem {
+    problems(suite).into_iter().find(|problem| problem.name == name).expect("the problem is in the suite")
+}
+
 fn solve(kind: &str, problem: &Problem, slope: Slope, budget: usize) -> Measured {
     let posed = Posed::new(problem, slope);
     let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
@@ -43,9 +47,7 @@ fn problems_with_constraints_are_solved() {
 #[test]
 fn a_second_opinion_leads_past_the_first_minimum() {
     for (name, least) in [("17 n5 m33", 5.46489e-5), ("15 n10 m10", 4.77271e-3)] {
-        let all = problems("more-wild");
-        let problem = all.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
-        let found = solve("auto", problem, Slope::Differences, 100).best.objective;
+        let found = solve("auto", &named("more-wild", name), Slope::Differences, 100).best.objective;
         assert!(found < least + 1e-3, "{name}: {found} beside {least}");
     }
 }
@@ -54,9 +56,7 @@ fn a_second_opinion_leads_past_the_first_minimum() {
 #[test]
 fn basins_along_the_axes_are_searched_one_axis_at_a_time() {
     for name in ["f3 i1 n5", "f4 i1 n5"] {
-        let all = problems("bbob");
-        let problem = all.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
-        let found = solve("cma-es", problem, Slope::Differences, 1500);
+        let found = solve("cma-es", &named("bbob", name), Slope::Differences, 1500);
         assert!(found.best.objective < 1e-8, "{name}: {:?}", found.best);
     }
 }
@@ -65,9 +65,7 @@ fn basins_along_the_axes_are_searched_one_axis_at_a_time() {
 #[test]
 fn a_pattern_search_follows_kinks_inside_a_row() {
     for name in ["5 n3 m3", "15 n6 m6"] {
-        let all = problems("more-wild-piecewise");
-        let problem = all.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
-        let found = solve("pattern-search", problem, Slope::Differences, 100);
+        let found = solve("pattern-search", &named("more-wild-piecewise", name), Slope::Differences, 100);
         assert!(found.best.objective < 1e-4, "{name}: {:?}", found.best);
     }
 }

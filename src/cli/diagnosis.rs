@@ -46,11 +46,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
         text += "\n";
     }
     let [probability, chance] = [words::probability(diagnosis.probability), significant(diagnosis.p_value, 2)];
-    let of = if diagnosis.found.len() > 1 && diagnosis.verdict == Verdict::Effect {
-        "that all of these are right"
-    } else {
-        "of the verdict"
-    };
+    let of = words::of_what(diagnosis);
     text += &format!(
         "\nprobability {of} {probability}; p-value of nothing missing {chance}; {} simulations, {seconds:.2} s\n",
         diagnosis.simulations

@@ -47,6 +47,12 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
     }
 }
 
+/// What the probability of a diagnosis is of.
+pub(crate) fn of_what(diagnosis: &Diagnosis) -> &'static str {
+    let several = diagnosis.verdict == Verdict::Effect && diagnosis.found.len() > 1;
+    if several { "that all of these are right" } else { "of the verdict" }
+}
+
 fn free_signal(unexplained: &Unexplained) -> String {
     format!("; a free signal there takes {} of what is above the noise", share(unexplained.share))
 }

@@ -154,7 +154,7 @@ fn header(report: &Report<'_>) -> Markup {
             p class=(class) { (rich(&sentence)) }
             dl {
                 @if let Some(found) = report.diagnosis {
-                    @for (name, value) in diagnosis::facts(found) { (fact(name, &value)) }
+                    @for (name, value) in diagnosis::facts(found) { (fact(&name, &value)) }
                 } @else {
                     (fact("Solver", &outcome.solver))
                     (fact("Evaluations", &outcome.evaluations.to_string()))

@@ -10,7 +10,7 @@ mod timed;
 
 use std::time::Instant;
 
-use mops_core::{Catalogue, Evaluator, Merit, SolverChoice, Stop, Watch};
+use mops_core::{Catalogue, Evaluator, Merit, Shape, SolverChoice, Stop, Watch};
 use mops_problems::{Posed, Slope, Truth, measure};
 
 use super::each;
@@ -37,6 +37,20 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// The problems asked for.
+    fn subjects(&self) -> Vec<Subject> {
+        let mut subjects = self.suite.subjects();
+        subjects.retain(|subject| self.only.is_empty() || self.only.iter().any(|name| name == subject.name()));
+        subjects
+    }
+
+    /// A solver that accepts none of the problems.
+    pub fn idle(&self, catalogue: &Catalogue) -> Option<&SolverChoice> {
+        let shapes: Vec<Shape> = self.subjects().iter().map(|subject| subject.shape(catalogue)).collect();
+        let accepts = |solver: &SolverChoice| shapes.iter().any(|shape| solver.make().accepts(shape).is_ok());
+        self.solvers.iter().find(|solver| !accepts(solver))
+    }
+
     fn evaluations(&self, variables: usize) -> usize {
         self.budget.map_or_else(|| (self.suite.budget)(variables), |budget| budget * (variables + 1))
     }
@@ -53,12 +67,10 @@ struct Done {
 
 /// Runs a plan on so many threads; every run has one to itself, so that times are comparable.
 pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {
-    let subjects: Vec<Subject> = plan.suite.subjects();
-    let chosen = |subject: &&Subject| plan.only.is_empty() || plan.only.iter().any(|name| name == subject.name());
-    let subjects: Vec<&Subject> = subjects.iter().filter(chosen).collect();
+    let subjects = plan.subjects();
     let mut tasks: Vec<Task<'_>> = Vec::new();
     for solver in &plan.solvers {
-        for &subject in &subjects {
+        for subject in &subjects {
             tasks.extend((1..=plan.seeds).map(|seed| Task { solver, subject, seed, slope: plan.slope }));
         }
     }
@@ -67,7 +79,7 @@ pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn W
     if plan.suite.relative {
         let rivals = relative::rivals(catalogue);
         let mut rivalling: Vec<Task<'_>> = Vec::new();
-        for &subject in &subjects {
+        for subject in &subjects {
             rivalling.extend(rivals.iter().map(|solver| Task { solver, subject, seed: 1, slope: Slope::Differences }));
         }
         let others = done(&rivalling);

@@ -1,8 +1,8 @@
 //! The suites: problems written as formulas, and studies.
 
 use mops_core::file::Files;
-use mops_core::{Catalogue, Problem as Posing, Shipped};
-use mops_problems::{Answer, Problem};
+use mops_core::{Catalogue, Evaluator, Problem as Posing, Shape, Shipped};
+use mops_problems::{Answer, Posed, Problem, Slope};
 use mops_studies::Known;
 
 /// Problems that belong together.
@@ -81,6 +81,14 @@ impl Subject {
                 let size = known.minimum.abs();
                 if size > 0.0 { suite.accuracy * size.min(1.0) } else { suite.accuracy }
             }
+        }
+    }
+
+    /// What a solver is told of it.
+    pub fn shape(&self, catalogue: &Catalogue) -> Shape {
+        match self {
+            Self::Formula(problem) => Posed::new(problem, Slope::Differences).shape().clone(),
+            Self::Study(known) => posing(catalogue, known, 1).shape().clone(),
         }
     }
 

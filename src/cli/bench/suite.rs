@@ -96,14 +96,14 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         noise: arguments.noise,
         only: problems(suite, &arguments.problems)?,
     };
+    if let Some(idle) = plan.idle(catalogue) {
+        let help = format!("`mops describe {}` says for what it is", idle.kind);
+        return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
+    }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let progress = Progress::of_cases(!arguments.quiet);
     let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
     progress.finish();
-    if let Some(idle) = plan.solvers.iter().find(|solver| results.of(solver.kind).next().is_none()) {
-        let help = format!("`mops describe {}` says for what it is", idle.kind);
-        return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
-    }
     let text = text(&results, before.as_ref());
     print(&text);
     if let Some(folder) = &arguments.out {
@@ -180,7 +180,8 @@ fn text(results: &Results, before: Option<&Results>) -> String {
     let rows = results.rows.iter().map(|row| cells(row, seeds, before)).collect();
     let mut text = table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 12], rows);
     let fine = results.accuracy;
-    let is_relative = suites().iter().any(|suite| suite.name == results.suite && suite.relative);
+    let suite = suites().into_iter().find(|suite| suite.name == results.suite);
+    let is_relative = suite.is_some_and(|suite| suite.relative);
     let reached = if is_relative {
         format!(
             "a feasible point has all but 1e-3, and {fine:e}, of the way from the start to f*, the least of all solvers"
@@ -200,7 +201,8 @@ fn text(results: &Results, before: Option<&Results>) -> String {
     } else {
         String::new()
     };
-    let how = if results.suite == "control" { "slopes as the studies have them" } else { slopes(results) };
+    let has_studies = suite.is_some_and(|suite| suite.subjects().iter().any(solvers::Subject::is_study));
+    let how = if has_studies { "slopes as the studies have them" } else { slopes(results) };
     text.push_str(&format!("\nTo 1e-3, to the end: evaluations until {reached}; {how}{noise}.\n"));
     if let Some(before) = before.filter(|before| before.slopes != results.slopes || before.noise != results.noise) {
         text.push_str(&format!("Before: {}, a noise of {}.\n", slopes(before), before.noise));

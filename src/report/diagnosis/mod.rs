@@ -48,17 +48,15 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> (Tone, String) {
 }
 
 /// Facts below the verdict: name and value.
-pub(super) fn facts(diagnosis: &Diagnosis) -> [(&'static str, String); 2] {
+pub(super) fn facts(diagnosis: &Diagnosis) -> [(String, String); 2] {
     let chance = match diagnosis.p_value {
         p if p.is_finite() && p < 1e-6 => "below 1e-6".to_owned(),
         p => significant(p, 2),
     };
-    let probability = if diagnosis.found.len() > 1 && diagnosis.verdict == Verdict::Effect {
-        "Probability that all of these are right"
-    } else {
-        "Probability of the verdict"
-    };
-    [(probability, words::probability(diagnosis.probability)), ("p-value: nothing missing", chance)]
+    [
+        (format!("Probability {}", words::of_what(diagnosis)), words::probability(diagnosis.probability)),
+        ("p-value: nothing missing".to_owned(), chance),
+    ]
 }
 
 /// The sections of the page, in the order in which they convince.
