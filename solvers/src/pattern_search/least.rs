@@ -3,6 +3,7 @@
 use mops_core::{Shape, Usage};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use super::barrier::{Promise, violation};
 use super::models::Models;
 use crate::epigraph::{self, Multipliers, Rows};
 
@@ -50,42 +51,113 @@ impl Aim<'_> {
         models.curvature(weights)
     }
 
-    /// The least of the models' penalised objective over `low <= y <= high`, from `y = 0`, by sequential quadratic programming
-    /// on the models: the step, and what it promises. `None` where it promises nothing.
-    pub fn least(&self, models: &Models, low: &[f64], high: &[f64]) -> Option<(DVector<f64>, f64)> {
+    /// How much more a unit of violation counts than one of the objective.
+    pub fn weight(&self) -> f64 {
+        self.penalty / self.unit
+    }
+
+    /// What a step of the models promises.
+    pub fn promise(&self, models: &Models, y: &DVector<f64>) -> Promise {
+        let [before, after] = [&DVector::zeros(y.len()), y].map(|y| self.shape.merit(&models.values(y)));
+        Promise { objective: before.objective - after.objective, violation: violation(&before) - violation(&after) }
+    }
+
+    /// By how much the penalised objective falls if a promise is kept.
+    pub fn worth_of(&self, promise: &Promise) -> f64 {
+        (self.unit * promise.objective + self.penalty * promise.violation).max(0.0)
+    }
+
+    /// As [`Aim::least`], with a weight of the violation that grows until the violation falls by most of what the models let
+    /// it fall.
+    ///
+    /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
+    pub fn least_violating(&mut self, models: &Models, low: &[f64], high: &[f64]) -> Option<DVector<f64>> {
+        let mut step = self.least(models, low, high);
+        let after = |step: Option<&DVector<f64>>| {
+            let merit = self.shape.merit(&models.values(step.unwrap_or(&DVector::zeros(low.len()))));
+            violation(&merit)
+        };
+        if self.shape.has_constraints() && after(step.as_ref()) > 0.0 {
+            let most = Aim { penalty: LARGEST_PENALTY, ..*self }.least(models, low, high);
+            let least = after(most.as_ref());
+            let wanted = least + 0.1 * (after(None) - least).max(0.0);
+            while after(step.as_ref()) > wanted && self.penalty < LARGEST_PENALTY {
+                self.penalty *= 10.0;
+                step = self.least(models, low, high);
+            }
+        }
+        step
+    }
+
+    /// The step to the least of the models' penalised objective over `low <= y <= high`, from `y = 0`, by sequential quadratic
+    /// programming on the models, in a trust region of its own and with second-order corrections. `None` where no step lessens
+    /// it.
+    fn least(&self, models: &Models, low: &[f64], high: &[f64]) -> Option<DVector<f64>> {
         let n = low.len();
         let mut y = DVector::zeros(n);
         let begin = self.worth(&models.values(&y));
         let mut worth = begin;
         let mut rows = self.rows(models, &y);
-        // At first the largest row has all the weight.
-        let top = rows.objective();
-        let on_top = rows.objectives.iter().filter(|row| row.value >= top).count();
-        #[allow(clippy::cast_precision_loss)]
-        let share = 1.0 / on_top.max(1) as f64;
-        let mut multipliers = Multipliers {
-            objectives: rows.objectives.iter().map(|row| if row.value >= top { share } else { 0.0 }).collect(),
-            inequalities: vec![0.0; rows.inequalities.len()],
-            equalities: vec![0.0; rows.equalities.len()],
-        };
-        for _ in 0..12 {
+        let mut multipliers = on_top(&rows);
+        let (mut reach, mut failures) = (1.0_f64, 0);
+        for _ in 0..ITERATIONS {
             let hessian = convex(self.curvature(models, &multipliers));
-            let room_low: Vec<f64> = (0..n).map(|j| (low[j] - y[j]).min(0.0)).collect();
-            let room_high: Vec<f64> = (0..n).map(|j| (high[j] - y[j]).max(0.0)).collect();
-            let Some(direction) = epigraph::solve(&rows, &hessian, &room_low, &room_high, self.penalty) else { break };
-            let step = DVector::from_vec(direction.step);
-            let shorter = [1.0, 0.5, 0.25, 0.1, 0.03].into_iter().map(|t| &y + &step * t);
-            let better = shorter.map(|y| (self.worth(&models.values(&y)), y)).find(|(found, _)| *found < worth);
-            let Some((found, there)) = better else { break };
+            let room_low: Vec<f64> = (0..n).map(|j| (low[j] - y[j]).clamp(-reach, 0.0)).collect();
+            let room_high: Vec<f64> = (0..n).map(|j| (high[j] - y[j]).clamp(0.0, reach)).collect();
+            let solve = |rows: &Rows| epigraph::solve(rows, &hessian, &room_low, &room_high, self.penalty);
+            let tried = |step: &[f64]| {
+                let there = &y + DVector::from_column_slice(step);
+                (self.worth(&models.values(&there)), there)
+            };
+            let Some(direction) = solve(&rows) else { break };
+            let length = direction.step.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+            let (mut found, mut there) = tried(&direction.step);
+            if found >= worth
+                && let Some(again) = solve(&rows.corrected(&self.rows(models, &there), &direction.step))
+            {
+                (found, there) = tried(&again.step);
+            }
+            // Even where the step failed, its multipliers tell more of the curvature.
+            multipliers = direction.multipliers;
+            if found >= worth {
+                failures += 1;
+                reach = 0.3 * length.min(reach);
+                if failures > FAILURES {
+                    break;
+                }
+                continue;
+            }
             let gained = worth - found;
             (y, worth) = (there, found);
             if gained < 1e-3 * (begin - worth) {
                 break;
             }
+            reach = 2.0 * length.max(reach);
             rows = self.rows(models, &y);
-            multipliers = direction.multipliers;
         }
-        (worth < begin).then_some((y, begin - worth))
+        (worth < begin).then_some(y)
+    }
+}
+
+/// The largest weight of a violation.
+const LARGEST_PENALTY: f64 = 1e7;
+
+/// Quadratic programmes on the models for one step.
+const ITERATIONS: usize = 30;
+
+/// Steps of these that may fail.
+const FAILURES: usize = 8;
+
+/// At first the largest row has all the weight.
+fn on_top(rows: &Rows) -> Multipliers {
+    let top = rows.objective();
+    let count = rows.objectives.iter().filter(|row| row.value >= top).count();
+    #[allow(clippy::cast_precision_loss)]
+    let share = 1.0 / count.max(1) as f64;
+    Multipliers {
+        objectives: rows.objectives.iter().map(|row| if row.value >= top { share } else { 0.0 }).collect(),
+        inequalities: vec![0.0; rows.inequalities.len()],
+        equalities: vec![0.0; rows.equalities.len()],
     }
 }
 
@@ -115,7 +187,23 @@ mod tests {
         let models = Models::through(&steps, &rows, &vec![DMatrix::zeros(1, 1); 2], 1.0).unwrap();
         let shape = Shape { spacing: vec![0.0], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
         let aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
-        let (y, promise) = aim.least(&models, &[-1.0], &[1.0]).unwrap();
+        let y = aim.least(&models, &[-1.0], &[1.0]).unwrap();
+        let promise = aim.worth_of(&aim.promise(&models, &y));
         assert!((y[0] - 0.5).abs() < 1e-3 && (promise - 0.75).abs() < 1e-3, "{y} {promise}");
+    }
+    #[test]
+    fn a_step_goes_along_a_curved_constraint() {
+        // -y_1 inside the circle y'y <= 1, from its edge at (0, 1): the slopes alone lead straight off the circle.
+        let f = |y: &[f64]| [-y[0], y[0] * y[0] + y[1] * y[1]];
+        let steps = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.7, 0.6]];
+        let steps: Vec<Vec<f64>> = steps.map(|y| y.to_vec()).into();
+        let values: Vec<[f64; 2]> = steps.iter().map(|y| f(&[y[0], y[1] + 1.0])).collect();
+        let rows: Vec<&[f64]> = values.iter().map(|v| &v[..]).collect();
+        let models = Models::through(&steps, &rows, &vec![DMatrix::zeros(2, 2); 2], 1.0).unwrap();
+        let usages = vec![(Usage::Minimise, 1.0), (Usage::Inequality, 1.0)];
+        let shape = Shape { spacing: vec![0.0; 2], rows: usages, ..Shape::default() };
+        let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
+        let y = aim.least_violating(&models, &[-1.0; 2], &[1.0; 2]).unwrap();
+        assert!(y[0] > 0.15 && f(&[y[0], y[1] + 1.0])[1] < 1.0 + 1e-3, "{y}");
     }
 }

@@ -1,5 +1,6 @@
 //! Pattern search: polls a pattern of points around the best one, and shrinks it where nothing is better.
 
+mod barrier;
 mod least;
 mod models;
 mod pattern;
@@ -13,6 +14,7 @@ use crate::epigraph::Rows;
 use crate::sqp::SqpOptions;
 use crate::start::usable_start;
 use crate::texture::{Texture, texture};
+use barrier::{Barrier, Promise};
 use least::Aim;
 use models::Models;
 use pattern::Pattern;
@@ -23,7 +25,8 @@ use pattern::Pattern;
 ///
 /// Before it polls, it searches: every row has a quadratic model of its own through the points around the best one, and the
 /// point where the largest of the models is least is tried, inside a trust region. So the kink where two criteria meet is
-/// seen. Constraints enter by an exact penalty, which grows while the search ends at infeasible points.
+/// seen. Constraints are kept by a progressive barrier: objective and violation are judged apart, and what may be violated
+/// falls as the search goes on.
 ///
 /// Where neither models nor pattern lead on although the models promise much, a row has kinks of its own: unless its values
 /// are noise, slopes by differences are followed from there (as `sqp` does), as long as they lead on.
@@ -31,7 +34,8 @@ use pattern::Pattern;
 /// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); turned patterns: M. A. Abramson, C. Audet,
 /// J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N. Vicente,
 /// Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one for every row: J. Larson, M. Menickelly,
-/// S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563.
+/// S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563; barrier: C. Audet, J. E. Dennis, SIAM J. Optimization 20 (2009)
+/// 445-472.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
@@ -39,13 +43,15 @@ pub struct PatternSearchOptions {
     pub size: f64,
     /// Distance at which the search ends.
     pub tolerance: f64,
+    /// Factor of that distance where nothing in the pattern is better. Less leads to the end sooner; more polls more often.
+    pub shrink: f64,
     /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
     pub batch: usize,
 }
 
 impl Default for PatternSearchOptions {
     fn default() -> Self {
-        Self { size: 0.1, tolerance: 1e-7, batch: 2 }
+        Self { size: 0.1, tolerance: 1e-7, shrink: 0.5, batch: 2 }
     }
 }
 
@@ -73,11 +79,15 @@ struct State {
     promised: f64,
     /// Times that the search began again because of a kink.
     restarts: i32,
+    /// Times that the search went back from an infeasible end.
+    returns: usize,
     /// Steps of the models in a row that led nowhere.
     failures: usize,
     /// The best point at the last turn of the pattern.
     turned_at: Option<Vec<f64>>,
+    /// Weight of the violation in the models' objective.
     penalty: f64,
+    barrier: Barrier,
     unit: f64,
     pattern: Pattern,
     /// Points that are evaluated at once; 0 for whole patterns.
@@ -112,12 +122,13 @@ impl Solver for PatternSearch {
             unit: Rows::new(oracle.shape(), &scaled, &none).unit(),
             known: vec![(best.point.clone(), scaled)],
             turned_at: None,
-            best,
             radius: self.options.size,
             failures: 0,
             promised: 0.0,
             restarts: 0,
+            returns: 0,
             penalty: 10.0,
+            barrier: Barrier::at(&best.merit),
             pattern: Pattern::straight(n),
             batch: self.options.batch,
             random: oracle.stream("pattern-search"),
@@ -127,6 +138,7 @@ impl Solver for PatternSearch {
             slopes: None,
             followed_from: f64::INFINITY,
             texture: None,
+            best,
         });
         Ok(())
     }
@@ -150,20 +162,22 @@ impl Solver for PatternSearch {
             return Ok(Progress::Continue);
         }
         if state.radius > self.options.tolerance && !state.is_on_finest_grid() {
-            state.shrink();
+            state.shrink(self.options.shrink);
             return Ok(Progress::Continue);
         }
         // The models still promise what the problem does not keep: a kink inside a row. Again, with more turns on the way.
         let worth = state.worth(oracle.shape(), &state.best);
         if state.promised > KEPT * worth.abs() && state.restarts < RESTARTS {
             state.restarts += 1;
-            state.radius = SHRINK * self.options.size;
+            state.radius = self.options.shrink * self.options.size;
             return Ok(Progress::Continue);
         }
-        // An infeasible end: the penalty was too small, or nothing is feasible.
-        if !state.best.merit.is_feasible() && state.penalty < 1e6 {
-            state.penalty *= 100.0;
-            // Nothing is worth what it was.
+        // An infeasible end: on from the best feasible point, or with a wide pattern from here.
+        if !state.best.merit.is_feasible() && state.returns < RETURNS {
+            state.returns += 1;
+            if let Some(best) = oracle.best().filter(|best| best.merit.is_feasible()) {
+                state.best = best.clone();
+            }
             state.followed_from = f64::INFINITY;
             state.radius = self.options.size;
             return Ok(Progress::Continue);
@@ -171,9 +185,6 @@ impl Solver for PatternSearch {
         Ok(if state.best.merit.is_feasible() { Progress::Converged } else { Progress::Stalled })
     }
 }
-
-/// How much the pattern shrinks when nothing in it is better; the root of that after a restart, the root of that after two.
-const SHRINK: f64 = 0.25;
 
 /// A promise at the end, relative to what the best point is worth, that tells of a kink.
 const KEPT: f64 = 1e-10;
@@ -187,6 +198,9 @@ const FOLLOWED: f64 = 3.0;
 /// Times that the search begins again because of a kink.
 const RESTARTS: i32 = 4;
 
+/// Times that the search goes back from an infeasible end.
+const RETURNS: usize = 3;
+
 /// Steps of the models in a row that lead nowhere before the pattern is polled.
 const FAILURES: usize = 2;
 
@@ -199,21 +213,22 @@ impl State {
         evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.aim(shape).worth(scaled))
     }
 
-    /// Evaluates points, keeps their values, and moves to the best if it is better; says how much better.
-    fn visit(&mut self, oracle: &mut dyn Oracle, points: &[Vec<f64>]) -> Result<f64, Halt> {
-        let answers = oracle.evaluate(points)?;
-        let shape = oracle.shape();
-        let before = self.worth(shape, &self.best);
-        let mut gained = 0.0;
-        for answer in answers {
+    /// Evaluates points, keeps their values, and moves to the best if the barrier admits it; `true` when it moved.
+    fn visit(&mut self, oracle: &mut dyn Oracle, points: &[Vec<f64>], promise: Option<Promise>) -> Result<bool, Halt> {
+        let before = self.best.merit;
+        let mut moved = false;
+        for answer in oracle.evaluate(points)? {
             self.remember(&answer);
-            let worth = self.worth(shape, &answer);
-            if before - worth > gained {
-                gained = before - worth;
+            if self.barrier.admits(&self.best.merit, &answer.merit, promise) {
+                self.barrier.saw(&answer.merit);
                 self.best = answer;
+                moved = true;
             }
         }
-        Ok(gained)
+        if moved {
+            self.barrier.lower(&before, &self.best.merit);
+        }
+        Ok(moved)
     }
 
     fn remember(&mut self, answer: &Evaluation) {
@@ -243,19 +258,27 @@ impl State {
         let Some(models) = self.models(&near) else { return Ok(false) };
         let shape = oracle.shape();
         let (low, high) = self.room();
-        let step = self.aim(shape).least(&models, &low, &high);
-        self.promised = step.as_ref().map_or(0.0, |(_, promised)| *promised);
-        let Some((y, promised)) = step else { return self.mend(oracle, &near, &models) };
+        let mut aim = self.aim(shape);
+        let step = aim.least_violating(&models, &low, &high);
+        self.penalty = aim.penalty;
+        let Some(y) = step else {
+            self.promised = 0.0;
+            return self.mend(oracle, &near, &models);
+        };
+        let promise = aim.promise(&models, &y);
+        let weight = aim.weight();
+        self.promised = aim.worth_of(&promise);
         let length = self.radius * y.amax();
         let floor = 1e-14 * self.worth(shape, &self.best).abs();
         let point = self.at(&y);
-        if promised <= floor || point == self.best.point {
+        if self.promised <= floor || point == self.best.point {
             return self.mend(oracle, &near, &models);
         }
         let points = self.filled(shape, Some(&models), vec![point]);
-        let gained = self.visit(oracle, &points)?;
-        let ratio = gained / promised;
-        if gained > 0.0 {
+        let before = self.best.merit;
+        let moved = self.visit(oracle, &points, Some(promise))?;
+        let ratio = if moved { promise.kept(&before, &self.best.merit, weight) } else { 0.0 };
+        if moved {
             self.failures = 0;
         } else if self.mend(oracle, &near, &models)? {
             // The models were wrong for want of points.
@@ -283,7 +306,7 @@ impl State {
         }
         let count = self.known.len();
         let points = self.filled(oracle.shape(), Some(models), vec![point]);
-        self.visit(oracle, &points)?;
+        self.visit(oracle, &points, None)?;
         Ok(self.known.len() > count)
     }
 
@@ -297,7 +320,7 @@ impl State {
         let batch = if batch == 0 { points.len().max(1) } else { batch };
         for points in points.chunks(batch) {
             let before = self.best.point.clone();
-            if self.visit(oracle, points)? > 0.0 {
+            if self.visit(oracle, points, None)? {
                 self.run_on(oracle, before)?;
                 return Ok(true);
             }
@@ -351,7 +374,7 @@ impl State {
             // At the edge of the box few are left.
             let models = if points.len() < self.batch { self.models(&self.near()) } else { None };
             let points = self.filled(oracle.shape(), models.as_ref(), points);
-            if self.visit(oracle, &points)? == 0.0 {
+            if !self.visit(oracle, &points, None)? {
                 return Ok(());
             }
             before = here;
@@ -391,13 +414,15 @@ impl State {
             && self.worth(shape, best) < self.worth(shape, &self.best)
         {
             self.best = best.clone();
+            self.barrier.saw(&best.merit);
             self.remember(best);
         }
         Ok(())
     }
 
-    fn shrink(&mut self) {
-        self.radius *= SHRINK.powf(0.5_f64.powi(self.restarts));
+    /// Shrinks and turns the pattern; by less after every restart.
+    fn shrink(&mut self, factor: f64) {
+        self.radius *= factor.powf(0.5_f64.powi(self.restarts));
         // Where the search went tells where it may go on.
         match self.turned_at.replace(self.best.point.clone()) {
             Some(before) if before != self.best.point => {
