@@ -267,6 +267,17 @@ fn values_of_the_wrong_type() {
             design("a fraction for a whole number", "name = \"loop\"", "name = \"loop\"\nseed = 1.5"),
             design("a whole number beyond all bounds", "max = 20.0", "max = 100000000000000000000"),
             design("a negative number of steps", "horizon =", "tolerance = { max-steps = -1 }\nhorizon ="),
+            design(
+                "a solver's option below its range",
+                "[cases]",
+                "[solver.pattern-search]\ntolerance = -1.0\n[cases]",
+            ),
+            design(
+                "a solver's option above its range",
+                "[cases]",
+                "[solver.genetic]\npopulation = 10_000_000\n[cases]",
+            ),
+            design("a solver's option that is no number", "[cases]", "[solver.cma-es]\nsize = nan\n[cases]"),
             design("a word that is no usage", "demand = 0.10", "demand = 0.10, usage = \"minimize\""),
             design("a word that is no scale", "scale = \"log\"", "scale = \"cubic\""),
             calibration("a word that is no role", "free     =", "role     = \"training\"\nfree     ="),

@@ -30,6 +30,7 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
     /// Number of starts, the study's own included.
+    #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
 

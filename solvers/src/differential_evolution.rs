@@ -19,10 +19,13 @@ use crate::ranking::compare;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct DifferentialEvolutionOptions {
     /// Number of members; 0 for ten per tuner, at least 20 and at most 100.
+    #[schemars(range(max = 1_000_000))]
     pub population: usize,
     /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Generations without a better point after which the members are drawn anew.
+    #[schemars(range(min = 1))]
     pub patience: usize,
     /// Number of times that the members are drawn anew.
     pub restarts: usize,

@@ -46,12 +46,6 @@ pub struct Direction {
     pub multipliers: Multipliers,
 }
 
-/// Solves the subproblem for steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding
-/// keeps the method from an end.
-pub fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
-    Subproblem::default().solve(rows, hessian, low, high, penalty)
-}
-
 /// The subproblem, with its memory, which is used again from step to step.
 ///
 /// Level and elastic violation have no curvature of their own. They get one that is small beside all others, about the level
@@ -68,7 +62,8 @@ impl Subproblem {
     /// Curvature of level and violation, relative to what the objective can fall by.
     const CURVATURE: f64 = 1e-7;
 
-    /// As [`solve`].
+    /// The solution with steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding keeps
+    /// the method from an end.
     pub fn solve(
         &mut self,
         rows: &Rows,
@@ -186,6 +181,10 @@ impl Subproblem {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
+        Subproblem::default().solve(rows, hessian, low, high, penalty)
+    }
 
     fn linear(value: f64, slope: &[f64]) -> Linear {
         Linear { value, slope: slope.to_vec() }

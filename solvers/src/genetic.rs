@@ -20,16 +20,22 @@ use crate::variation::Variation;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct GeneticOptions {
     /// Number of members.
+    #[schemars(range(min = 4, max = 1_000_000))]
     pub population: usize,
     /// Probability that a pair of parents is crossed.
+    #[schemars(range(min = 0, max = 1))]
     pub crossover: f64,
     /// Distribution index of the crossover: large keeps children near their parents.
+    #[schemars(range(min = 0, max = 1000))]
     pub crossover_index: f64,
     /// Distribution index of the mutation: large takes small steps. A coordinate is mutated with probability `1 / n`.
+    #[schemars(range(min = 0, max = 1000))]
     pub mutation_index: f64,
     /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Generations without a better point after which it begins again.
+    #[schemars(range(min = 1))]
     pub patience: usize,
     /// Number of times that it begins again.
     pub restarts: usize,

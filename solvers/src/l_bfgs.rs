@@ -24,8 +24,10 @@ use smooth::Smooth;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LBfgsOptions {
     /// Steps that the curvature is remembered of.
+    #[schemars(range(min = 1, max = 1000))]
     pub memory: usize,
     /// Largest number of iterations of a round.
+    #[schemars(range(min = 1))]
     pub max_iterations: u64,
 }
 

@@ -22,10 +22,13 @@ use crate::start::usable_start;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LevenbergMarquardtOptions {
     /// Stop when a step promises less than this part of the sum of squares.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Number of starts, the study's own included.
+    #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
     /// Largest number of iterations from each start.
+    #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
 

@@ -18,10 +18,13 @@ use crate::start::usable_start;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct NelderMeadOptions {
     /// Length of the first simplex's edges, in the unit box.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// A simplex ends when the standard deviation of the values at its corners is below this.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Largest number of iterations of a simplex.
+    #[schemars(range(min = 1))]
     pub max_iterations: u64,
 }
 

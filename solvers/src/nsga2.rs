@@ -23,8 +23,10 @@ use thinning::Thinning;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga2Options {
     /// Number of members.
+    #[schemars(range(min = 4, max = 1_000_000))]
     pub population: usize,
     /// Number of generations.
+    #[schemars(range(min = 1))]
     pub generations: usize,
 }
 

@@ -25,8 +25,10 @@ use scale::Scale;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga3Options {
     /// Divisions of every objective between the reference directions; 0 for as many as give at most 100 directions.
+    #[schemars(range(max = 200))]
     pub divisions: usize,
     /// Number of generations.
+    #[schemars(range(min = 1))]
     pub generations: usize,
 }
 

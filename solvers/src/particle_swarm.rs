@@ -16,8 +16,10 @@ use crate::argmin_adapter::Cost;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct ParticleSwarmOptions {
     /// Number of particles.
+    #[schemars(range(min = 2, max = 1_000_000))]
     pub particles: usize,
     /// Number of iterations.
+    #[schemars(range(min = 1))]
     pub max_iterations: u64,
 }
 

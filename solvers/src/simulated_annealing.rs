@@ -22,8 +22,10 @@ use crate::start::usable_start;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SimulatedAnnealingOptions {
     /// Standard deviation of the first steps along every coordinate, in the unit box.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// Number of iterations, each of which evaluates a point.
+    #[schemars(range(min = 1))]
     pub max_iterations: u64,
 }
 

@@ -224,7 +224,10 @@ fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
         let indent = "  ".repeat(depth);
         let default = option.get("default").filter(|d| !d.is_null()).map(|d| format!(", default {d}"));
         let need = if required.contains(&key.as_str()) { ", required".to_owned() } else { default.unwrap_or_default() };
-        *page += &format!("{indent}{key} ({}{need})\n", type_name(option));
+        // That a count is not negative goes without saying.
+        let range = super::shape::range_in_words(option).filter(|range| range != "at least 0");
+        let range = range.map_or_else(String::new, |range| format!(", {range}"));
+        *page += &format!("{indent}{key} ({}{range}{need})\n", type_name(option));
         let about = option.get("description").and_then(Value::as_str).unwrap_or_default();
         for line in about.lines() {
             *page += &format!("{indent}    {line}\n");

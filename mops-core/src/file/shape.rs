@@ -1,4 +1,5 @@
-//! Whether a value has the shape that a schema describes: keys, types, words; where not, what is wrong in plain words.
+//! Whether a value has the shape that a schema describes: keys, types, words, ranges; where not, what is wrong in plain
+//! words.
 
 use serde_json::Value;
 use toml::de::{DeInteger, DeValue};
@@ -14,7 +15,7 @@ struct Key<'k> {
     about: Option<&'k str>,
 }
 
-/// Refuses keys that are unknown or missing and values of the wrong type, at any depth.
+/// Refuses keys that are unknown or missing and values of the wrong type or out of range, at any depth.
 pub(super) fn check(node: &Node<'_>, schema: &Value) -> Result<(), Diagnostic> {
     let name = node.key_text();
     check_value(node, schema, Key { name: &name, about: None })
@@ -31,6 +32,7 @@ fn check_value(node: &Node<'_>, schema: &Value, key: Key<'_>) -> Result<(), Diag
         DeValue::Array(_) => check_list(node, fitting[0], key),
         DeValue::String(text) => check_word(node, text, &fitting, key),
         DeValue::Integer(number) => check_whole(node, number, fitting[0], key),
+        DeValue::Float(number) => number.as_str().parse().map_or(Ok(()), |v| check_range(node, v, fitting[0], key)),
         _ => Ok(()),
     }
 }
@@ -74,9 +76,42 @@ fn check_whole(node: &Node<'_>, number: &DeInteger<'_>, schema: &Value, key: Key
             .diagnostic(format!("{number} is too large for a whole number"))
             .with_help("write it with a point or an exponent, as in 1e20"));
     };
-    match schema["minimum"].as_i64() {
-        Some(least) if value < least => {
-            Err(node.diagnostic(format!("`{}` must be at least {least}, not {value}", key.name)).with_help(help(key)))
+    #[allow(clippy::cast_precision_loss)]
+    check_range(node, value as f64, schema, key)
+}
+
+/// The range of numbers that a schema allows, in words; nothing where it allows all, or all that are not negative.
+pub(super) fn range_in_words(schema: &Value) -> Option<String> {
+    let bound = |name: &str| schema[name].as_f64();
+    if let (Some(low), Some(high)) = (bound("minimum"), bound("maximum")) {
+        return Some(format!("from {low} to {high}"));
+    }
+    let low = match (bound("exclusiveMinimum"), bound("minimum")) {
+        (Some(low), _) => Some(format!("above {low}")),
+        (None, Some(low)) => Some(format!("at least {low}")),
+        (None, None) => None,
+    };
+    let high = match (bound("exclusiveMaximum"), bound("maximum")) {
+        (Some(high), _) => Some(format!("below {high}")),
+        (None, Some(high)) => Some(format!("at most {high}")),
+        (None, None) => None,
+    };
+    match (low, high) {
+        (Some(low), Some(high)) => Some(format!("{low} and {high}")),
+        (low, high) => low.or(high),
+    }
+}
+
+fn check_range(node: &Node<'_>, value: f64, schema: &Value, key: Key<'_>) -> Result<(), Diagnostic> {
+    let within = |name: &str, holds: fn(&f64, &f64) -> bool| schema[name].as_f64().is_none_or(|b| holds(&value, &b));
+    let allowed = within("minimum", f64::ge)
+        && within("maximum", f64::le)
+        && within("exclusiveMinimum", f64::gt)
+        && within("exclusiveMaximum", f64::lt);
+    match range_in_words(schema) {
+        Some(range) if !allowed => {
+            let fact = format!("`{}` must be {range}, not {}", key.name, node.value_text());
+            Err(node.diagnostic(fact).with_help(help(key)))
         }
         _ => Ok(()),
     }

@@ -135,6 +135,11 @@ impl<'t> Node<'t> {
         self.source.text[self.key.clone()].trim_matches(['"', '\'']).to_owned()
     }
 
+    /// The value as it is written.
+    pub fn value_text(&self) -> &str {
+        &self.source.text[self.value.span()]
+    }
+
     fn as_table(&self) -> Result<&DeTable<'t>, Diagnostic> {
         match self.value.get_ref().as_table() {
             Some(table) => Ok(table),

@@ -35,12 +35,16 @@ use strategy::Strategy;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CmaEsOptions {
     /// Members of the first generations; 0 for `4 + 3 ln n`.
+    #[schemars(range(max = 1_000_000))]
     pub population: usize,
     /// First standard deviation, in the unit box.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// A run ends when the best values of its last generations differ by less than this, relative to the objective.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Number of restarts that double the population; as many evaluations go into small populations.
+    #[schemars(range(max = 30))]
     pub restarts: usize,
 }
 

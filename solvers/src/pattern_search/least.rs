@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::barrier::{Promise, violation};
 use super::models::Models;
-use crate::epigraph::{self, Multipliers, Rows};
+use crate::epigraph::{Multipliers, Rows, Subproblem};
 
 /// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
 pub struct Aim<'a> {
@@ -99,12 +99,13 @@ impl Aim<'_> {
         let mut worth = begin;
         let mut rows = self.rows(models, &y);
         let mut multipliers = on_top(&rows);
+        let mut subproblem = Subproblem::default();
         let (mut reach, mut failures) = (1.0_f64, 0);
         for _ in 0..ITERATIONS {
             let hessian = convex(self.curvature(models, &multipliers));
             let room_low: Vec<f64> = (0..n).map(|j| (low[j] - y[j]).clamp(-reach, 0.0)).collect();
             let room_high: Vec<f64> = (0..n).map(|j| (high[j] - y[j]).clamp(0.0, reach)).collect();
-            let solve = |rows: &Rows| epigraph::solve(rows, &hessian, &room_low, &room_high, self.penalty);
+            let mut solve = |rows: &Rows| subproblem.solve(rows, &hessian, &room_low, &room_high, self.penalty);
             let tried = |step: &[f64]| {
                 let there = &y + DVector::from_column_slice(step);
                 (self.worth(&models.values(&there)), there)

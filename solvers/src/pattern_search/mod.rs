@@ -40,10 +40,13 @@ use pattern::Pattern;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
     /// First distance of the pattern's points, in the unit box.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// Distance at which the search ends.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Factor of that distance where nothing in the pattern is better. Less leads to the end sooner; more polls more often.
+    /// Factor of the pattern's size where nothing in it is better. Less leads to the end sooner; more polls more often.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
     /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
     pub batch: usize,

@@ -32,10 +32,13 @@ use state::{SATISFIED, State, Tried};
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SqpOptions {
     /// Stop when the subproblem promises less than this, relative to 1 + |objective|.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// First radius of the trust region, in the unit box.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub radius: f64,
     /// Largest number of iterations.
+    #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
 

@@ -47,8 +47,10 @@ use subproblem::Subproblems;
 pub struct WeightedChebyshevOptions {
     /// Number of points; 0 for as many as the study asks for, else 30. Three criteria and more take the largest number of
     /// evenly spread weights that is not above it.
+    #[schemars(range(max = 10_000))]
     pub points: usize,
     /// Starts of the search for the least of each criterion, the study's own included.
+    #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
 
