@@ -1,12 +1,11 @@
 //! The fit of the model as declared: by windows that grow to the whole record, from several starts.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_core::{Role, Stream, stream};
 use rand::Rng;
 
 use crate::fit::{Fit, Fitted, Global, Piece, Point, Sets};
 use crate::least_squares::sum_of_squares;
+use crate::meter::Meter;
 use crate::subject::Subject;
 use crate::windows::{cut, whole};
 
@@ -36,7 +35,7 @@ pub fn first_locals(pieces: &[Piece]) -> Vec<Vec<f64>> {
 
 /// Fits the declared model to the calibration experiments: windows (8, 4, 2 of each record), then whole records; from the
 /// start values of the study, and from random points around them where that ends badly.
-pub fn fit(subject: &Subject, seed: u64, simulations: &AtomicUsize) -> Option<Fitted> {
+pub fn fit(subject: &Subject, seed: u64, simulations: &Meter<'_>) -> Option<Fitted> {
     let problem = |pieces: Vec<Piece>| Fit {
         subject,
         model: subject.model.clone(),

@@ -1,13 +1,13 @@
 //! Brute force, to compare with: the declared model refitted with every effect of the catalogue in turn.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{Effect, Mistake, Role, Study};
 use rayon::prelude::*;
 
 use crate::base;
 use crate::fit::Point;
+use crate::meter::Meter;
 use crate::screen::{Scene, screen};
 use crate::subject::Subject;
 use crate::variant::{Added, problem};
@@ -38,7 +38,7 @@ pub struct BruteForce {
 #[allow(clippy::cast_precision_loss)]
 pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteForce, Mistake> {
     let subject = Subject::new(study)?;
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let failed = || Mistake::here("the model cannot be simulated near its start values");
     let declared = base::fit(&subject, study.seed, &simulations).ok_or_else(failed)?;
     subject.take_pace(&declared.point.globals);
@@ -67,6 +67,6 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
         let candidate = &candidate.added.candidate;
         best = BruteForce { best: Some((candidate.effect.name().to_owned(), candidate.place())), bic, ..best };
     }
-    best.simulations = simulations.load(Ordering::Relaxed);
+    best.simulations = simulations.count();
     Ok(best)
 }

@@ -1,7 +1,6 @@
 //! The whole way from a study to a diagnosis.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{Effect, Mistake, Study, Watch};
 use rayon::prelude::*;
@@ -12,6 +11,7 @@ use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
 use crate::judge::{Judgement, agreed, judge};
 use crate::locate::locate;
+use crate::meter::Meter;
 use crate::screen::Scene;
 use crate::search::{Limits, Search};
 use crate::stopgap::is_table;
@@ -47,8 +47,19 @@ pub fn diagnose(
     options: &Options,
     watch: &dyn Watch,
 ) -> Result<Diagnosis, Mistake> {
+    let done = explain(study, effects, options, watch);
+    // Simulations that were not made any more make everything that follows from them void.
+    if watch.wants_stop() { Err(Mistake::here("the diagnosis was interrupted")) } else { done }
+}
+
+fn explain(
+    study: &Study,
+    effects: &[Arc<dyn Effect>],
+    options: &Options,
+    watch: &dyn Watch,
+) -> Result<Diagnosis, Mistake> {
     let subject = Subject::new(study)?;
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(watch);
     let limits = Limits::at(options.level);
     let search = Search::new(&subject, effects, limits, &simulations);
     let lost = || {
@@ -65,7 +76,7 @@ pub fn diagnose(
     let scene = Scene::new(&base.fit, &base.variant.model, &base.fitted);
     let mut located = scene.as_ref().map_or_else(Vec::new, |scene| locate(&base.fit, &base.variant.model, scene));
 
-    let growth = search.grow(&base, options, watch)?;
+    let growth = search.grow(&base, options, watch);
     let growth = search.settle(growth, watch);
     let (growth, last, held) = search.reduce(growth);
     watch.stage("the repaired model", 0.9);
@@ -128,6 +139,6 @@ pub fn diagnose(
         predictions: predictions(&subject, &before, &after),
         notes: subject.notes.iter().cloned().chain(note).chain(full).collect(),
         starts,
-        simulations: simulations.load(Ordering::Relaxed),
+        simulations: simulations.count(),
     })
 }

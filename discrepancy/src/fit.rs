@@ -1,7 +1,6 @@
 //! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start values of
 //! each piece.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{Case, Job, Model};
@@ -9,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::least_squares::Normal;
+use crate::meter::Meter;
 use crate::subject::{Local, Series, Subject};
 
 /// An unknown of all pieces.
@@ -97,7 +97,7 @@ pub struct Fit<'a> {
     /// What is expected of some of the globals.
     pub expected: Vec<Expected>,
     /// Counts simulations.
-    pub simulations: &'a AtomicUsize,
+    pub simulations: &'a Meter<'a>,
 }
 
 /// Globals, one after the other, that are expected to be normal about 0.
@@ -244,7 +244,9 @@ impl Fit<'_> {
         let parameters = self.parameters(piece, point);
         let signals = p.signals();
         let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
-        self.simulations.fetch_add(1, Ordering::Relaxed);
+        if !self.simulations.admits() {
+            return None;
+        }
         let all = self.seeds(piece, point, parameters.len(), slopes);
         // What does nothing here needs no simulation.
         let (columns, seeds): (Vec<usize>, Vec<Vec<f64>>) =

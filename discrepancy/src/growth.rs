@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use mops_core::{Mistake, Watch};
+use mops_core::Watch;
 use rayon::prelude::*;
 
 use crate::candidate::Candidate;
@@ -52,18 +52,15 @@ impl<'a> Growth<'a> {
 
 impl<'a> Search<'a> {
     /// Adds effects to the declared model.
-    ///
-    /// # Errors
-    /// The user ended it.
     #[allow(clippy::cast_precision_loss)]
-    pub fn grow(&self, declared: &Trial<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
-        let mut growth = self.onward(Growth::begun(declared.clone()), options, watch)?;
+    pub fn grow(&self, declared: &Trial<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
+        let mut growth = self.onward(Growth::begun(declared.clone()), options, watch);
         if growth.last.added.is_empty() || options.max_effects < 2 {
-            return Ok(growth);
+            return growth;
         }
         let best = self.whole(&growth.last);
         if best.as_ref().is_some_and(|whole| whole.fitted.normalised() <= UNEXPLAINED) {
-            return Ok(growth);
+            return growth;
         }
         // Where the best first step led nowhere, another may lead on.
         watch.stage("other ways, as something is left", 0.76);
@@ -76,14 +73,14 @@ impl<'a> Search<'a> {
             further = ways.iter().filter_map(|way| self.whole(self.round(way)?.trials.first()?)).collect();
         }
         let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
-        let Some(way) = way else { return Ok(growth) };
+        let Some(way) = way else { return growth };
         growth.step("begun otherwise", way.clone());
-        let other = self.onward(Growth::begun(way.clone()), options, watch)?;
+        let other = self.onward(Growth::begun(way.clone()), options, watch);
         if is_clearly_better(&other.last, Some(way)) {
             growth.steps.extend(other.steps);
             growth.last = other.last;
         }
-        Ok(growth)
+        growth
     }
 
     /// Single effects to begin with again, best first: runners-up of the first round, and what a fit that begins where the
@@ -107,15 +104,12 @@ impl<'a> Search<'a> {
 
     /// Adds effects to a model that may have some.
     #[allow(clippy::cast_precision_loss)]
-    fn onward(&self, begun: Growth<'a>, options: &Options, watch: &dyn Watch) -> Result<Growth<'a>, Mistake> {
+    fn onward(&self, begun: Growth<'a>, options: &Options, watch: &dyn Watch) -> Growth<'a> {
         let mut growth = begun;
         let mut exchanges = EXCHANGES;
         let most = options.max_effects;
         while growth.last.added.len() < most {
             let count = growth.last.added.len();
-            if watch.wants_stop() {
-                return Err(Mistake::here("the diagnosis was interrupted"));
-            }
             watch.stage(&format!("search for effect {}", count + 1), 0.1 + 0.7 * count as f64 / most as f64);
             let Some(round) = self.round(&growth.last) else { break };
             if count == 0 {
@@ -149,7 +143,7 @@ impl<'a> Search<'a> {
                 growth.step("exchanged", better);
             }
         }
-        Ok(growth)
+        growth
     }
 
     /// The best single effect; or a pair, where it beats that with the best that can be added to it.

@@ -20,6 +20,7 @@ mod least_squares;
 mod locate;
 #[cfg(test)]
 mod locate_tests;
+mod meter;
 mod plan;
 mod profile;
 mod quantum;

@@ -1,12 +1,11 @@
 //! Places of residuals, on a mass with spring and damper behind a slow motor; the data come from equations of their own.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_core::{Hold, Input};
 
 use crate::diagnosis::Evidence;
 use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
+use crate::meter::Meter;
 use crate::screen::Scene;
 use crate::search::{Limits, Search};
 use crate::stopgap::{stopgap, unexplained};
@@ -65,7 +64,7 @@ fn plant(hidden: Hidden, label: &str) -> Subject {
 
 /// Places, best first, and what the best foretells.
 fn places(subject: &Subject) -> (Vec<Located>, f64) {
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (fit, variant, _, scene) = fitted(subject, &simulations);
     let found = locate(&fit, &variant.model, &scene);
     let gain = predictive_gain(&found[0], &fit, &variant.model, &scene);
@@ -138,7 +137,7 @@ fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
         4.0 * (-((x - 0.1) / 0.05).powi(2)).exp()
     }
     let subject = plant(Hidden { force: Some(|_, x| bulge(x[0])), ..Hidden::default() }, "bulge");
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &[], limits, &simulations);
     let trial = search.trial(&[], &subject.start(), vec![vec![0.0; 3]], 1, 60).expect("it simulates");

@@ -1,6 +1,5 @@
 //! The search: which effects, one after the other, bring the residuals down to the noise.
 
-use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex};
 
 use mops_core::{Effect, Role, Scope, Strength, stream};
@@ -10,6 +9,7 @@ use crate::base;
 use crate::candidate::Candidate;
 use crate::diagnose::UNEXPLAINED;
 use crate::fit::{Fit, Fitted, Piece, dot};
+use crate::meter::Meter;
 use crate::repaired::Calibrated;
 use crate::round::Round;
 use crate::subject::{Local, Subject};
@@ -68,7 +68,7 @@ pub struct Search<'a> {
     /// Limits.
     pub limits: Limits,
     /// Counts simulations.
-    pub simulations: &'a AtomicUsize,
+    pub simulations: &'a Meter<'a>,
     /// Rounds that were looked at.
     pub(crate) looked: Mutex<Vec<Arc<Round<'a>>>>,
 }
@@ -79,7 +79,7 @@ impl<'a> Search<'a> {
         subject: &'a Subject,
         effects: &'a [Arc<dyn Effect>],
         limits: Limits,
-        simulations: &'a AtomicUsize,
+        simulations: &'a Meter<'a>,
     ) -> Self {
         Self { subject, effects, limits, simulations, looked: Mutex::default() }
     }

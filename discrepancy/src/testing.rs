@@ -1,6 +1,5 @@
 //! Subjects for tests: a model from text, and records that the test computes by itself.
 
-use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{
@@ -13,6 +12,7 @@ use rand_distr::{Distribution, Normal};
 
 use crate::base::{first_locals, pieces};
 use crate::fit::{Fit, Fitted};
+use crate::meter::Meter;
 use crate::screen::Scene;
 use crate::subject::{Local, Measurement, Series, Subject};
 use crate::variant::{Variant, problem};
@@ -149,7 +149,7 @@ pub fn study(subject: &Subject) -> Study {
 }
 
 /// The subject's model fitted to its records, and what a screening sees of it.
-pub fn fitted<'a>(subject: &'a Subject, simulations: &'a AtomicUsize) -> (Fit<'a>, Variant, Fitted, Scene) {
+pub fn fitted<'a>(subject: &'a Subject, simulations: &'a Meter<'a>) -> (Fit<'a>, Variant, Fitted, Scene) {
     let pieces = pieces(subject, |_| true);
     let locals = first_locals(&pieces);
     let (fit, point, variant) = problem(subject, &[], pieces, &subject.start(), locals, &[], simulations);

@@ -7,6 +7,7 @@ mod correlated;
 mod derivatives;
 mod drawn;
 mod holds;
+mod interrupted;
 mod intervals;
 mod namesakes;
 mod pairs;

@@ -228,7 +228,7 @@ fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicUsize;
+    use crate::meter::Meter;
 
     use mops_core::{Hold, Input, Job, Model};
 
@@ -254,7 +254,7 @@ mod tests {
     fn a_unit_force_moves_an_oscillator_at_rest_as_the_closed_form_says() {
         // m x'' + k x = 1 from rest: x = (1 - cos(w t))/k, w^2 = k/m = 4; coarse steps of 0.2 rad.
         let subject = subject(OSCILLATOR, &[2.0, 0.0, 8.0, 0.0, 0.0, 0.0], 2, vec![record(&["x", "a"], 0.0, 0.1)]);
-        let simulations = AtomicUsize::new(0);
+        let simulations = Meter::new(&());
         let (_, _, _, scene) = fitted(&subject, &simulations);
         let along = &scene.trajectories[0];
         let unit = vec![1.0; along.moments.len()];
@@ -276,7 +276,7 @@ mod tests {
     fn a_constant_force_along_a_nonlinear_motion_has_the_tangent_of_the_simulation() {
         let truth = [2.0, 0.8, 8.0, 0.5, 0.3, -0.2];
         let subject = subject(OSCILLATOR, &truth, 2, vec![record(&["x", "v", "a"], 6.0, 0.02)]);
-        let simulations = AtomicUsize::new(0);
+        let simulations = Meter::new(&());
         let (fit, variant, mut at, _) = fitted(&subject, &simulations);
         at.point.globals = truth[..4].to_vec();
         at.point.locals = vec![truth[4..].to_vec()];

@@ -1,7 +1,6 @@
 //! Variants: the declared model with effects at chosen strengths, as a least-squares problem.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Model, Scope, Strength, Trials};
 use mops_models::WithEffects;
@@ -10,6 +9,7 @@ use nalgebra::DMatrix;
 use crate::base::globals;
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Expected, Fit, Global, Piece, Point, Sets};
+use crate::meter::Meter;
 use crate::subject::{Local, Subject};
 
 /// A candidate with strengths to start from.
@@ -145,7 +145,7 @@ pub fn problem<'a>(
     tuners: &[f64],
     mut locals: Vec<Vec<f64>>,
     held: &[usize],
-    simulations: &'a AtomicUsize,
+    simulations: &'a Meter<'a>,
 ) -> (Fit<'a>, Point, Variant) {
     let variant = Variant::new(subject, added, &pieces);
     let mut all = globals(subject);

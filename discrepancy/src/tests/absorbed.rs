@@ -1,11 +1,10 @@
 //! Parameters absorb what is missing: the fit is fine, the forecast is not.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_core::Role;
 use mops_models::effects::effects;
 
 use crate::base;
+use crate::meter::Meter;
 use crate::search::{Limits, Search};
 use crate::subject::Subject;
 use crate::testing::{Record, subject, white};
@@ -42,7 +41,7 @@ fn ball() -> Subject {
 
 #[test]
 fn a_fit_that_is_fine_as_gravity_absorbs_the_drag_forecasts_badly_and_the_drag_is_found() {
-    let (subject, simulations, effects) = (ball(), AtomicUsize::new(0), effects());
+    let (subject, simulations, effects) = (ball(), Meter::new(&()), effects());
     let alone = base::fit(&subject, 1, &simulations).expect("it simulates");
     assert!(alone.normalised() < 1.15 && alone.point.globals[0] < 8.5, "{} {:?}", alone.normalised(), alone.point);
 

@@ -1,10 +1,9 @@
 //! The best of many candidates gains by chance alone: noise shows how much, as the unknowns leave it.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_models::effects::effects;
 
 use crate::candidate::{Candidate, candidates};
+use crate::meter::Meter;
 use crate::screen::{Screening, screen};
 use crate::search::{Limits, Search};
 use crate::subject::Subject;
@@ -45,7 +44,7 @@ fn all(subject: &Subject) -> Vec<Candidate> {
 
 #[test]
 fn noise_gains_as_much_as_what_a_fit_leaves_of_it() {
-    let (subject, simulations) = (oscillator(), AtomicUsize::new(0));
+    let (subject, simulations) = (oscillator(), Meter::new(&()));
     let (fit, variant, _, mut scene) = fitted(&subject, &simulations);
     let draws = draws(20, scene.residuals.len());
     let screening = screen(&all(&subject), &fit, &variant.model, &scene, &draws);
@@ -58,7 +57,7 @@ fn noise_gains_as_much_as_what_a_fit_leaves_of_it() {
 
 #[test]
 fn a_phase_of_every_experiment_is_paid_for_with_its_samples() {
-    let (subject, simulations, effects) = (oscillator(), AtomicUsize::new(0), effects());
+    let (subject, simulations, effects) = (oscillator(), Meter::new(&()), effects());
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let screened = screen(&all(&subject), &fit, &variant.model, &scene, &[]).screened;
     let periodic = screened.iter().find(|s| s.added.candidate.effect.name() == "periodic-disturbance");
@@ -76,7 +75,7 @@ fn a_phase_of_every_experiment_is_paid_for_with_its_samples() {
 fn the_probability_of_what_noise_gains_is_uniform() {
     const KNOWN: usize = 40;
     const OTHERS: u32 = 160;
-    let (subject, simulations) = (oscillator(), AtomicUsize::new(0));
+    let (subject, simulations) = (oscillator(), Meter::new(&()));
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let draws = draws(KNOWN + OTHERS as usize, scene.residuals.len());
     let screening = screen(&all(&subject), &fit, &variant.model, &scene, &draws);

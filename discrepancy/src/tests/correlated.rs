@@ -1,9 +1,8 @@
 //! Residuals next to each other that are alike are not worth as much as many of their own.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_models::effects::effects;
 
+use crate::meter::Meter;
 use crate::search::{Limits, Search, Trial};
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
@@ -42,7 +41,7 @@ fn decay(r: f64, label: &str) -> Subject {
 }
 
 fn with<T>(subject: &Subject, look: impl FnOnce(&Trial<'_>) -> T) -> T {
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let limits = Limits::at(0.01);
     let search = Search::new(subject, &[], limits, &simulations);
     look(&search.trial(&[], &subject.start(), vec![vec![50.0]], 1, 60).expect("it simulates"))

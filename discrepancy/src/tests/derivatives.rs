@@ -1,11 +1,11 @@
 //! Differentiating: what is left of an acceleration by differences is noise, where outputs still tell the effect.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
+use crate::meter::Meter;
 use crate::screen::screen;
 use crate::search::{Limits, Search};
 use crate::testing::{Record, fitted, integrated, subject, white};
@@ -71,7 +71,7 @@ fn by_differences(record: &Record) -> &'static str {
 fn by_outputs(record: Record) -> String {
     let mut subject = subject(CART, &[1.5, 14.0, 0.5, 0.3, 0.0], 2, vec![record]);
     subject.measurements[0].locals[0].start = 0.3;
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let named: Vec<Arc<dyn Effect>> =
         effects().into_iter().filter(|e| TERMS.iter().any(|(name, _)| *name == e.name())).collect();

@@ -1,11 +1,11 @@
 //! The wrong hold of an input hides an effect: what the command did between its samples looks like a force of its own.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
+use crate::meter::Meter;
 use crate::screen::screen;
 use crate::search::{Limits, Search};
 use crate::testing::{Record, fitted, integrated, subject, white};
@@ -46,7 +46,7 @@ fn record(hold: Hold) -> Record {
 /// Share of what the declared model leaves that the missing effect explains.
 fn explained(hold: Hold) -> f64 {
     let subject = subject(OSCILLATOR, &[1.2, 30.0, 0.6, 0.0, 0.0], 2, vec![record(hold)]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let named: Vec<Arc<dyn Effect>> = effects();
     let limits = Limits::at(0.01);

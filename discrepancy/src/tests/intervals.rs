@@ -1,7 +1,6 @@
 //! Intervals go by the sum of squares itself: where it is no parabola, multiples of a standard error do not hold the truth.
 
-use std::sync::atomic::AtomicUsize;
-
+use crate::meter::Meter;
 use crate::profile::interval95;
 use crate::testing::{Record, fitted, subject, white};
 
@@ -30,7 +29,7 @@ fn an_interval_ends_where_the_profile_of_the_sum_of_squares_does() {
     };
     let record = Record { inputs: Vec::new(), times: times.clone(), signals: vec![("x", values.clone(), NOISE)] };
     let subject = subject(DECAY, &[2.0, 1.0], 1, vec![record]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (fit, _, fitted, _) = fitted(&subject, &simulations);
     let (best, error) = (fitted.point.globals[0], fit.covariance(&fitted, 1.0)[(0, 0)].sqrt());
     let end = |mut inside: f64, mut outside: f64| {

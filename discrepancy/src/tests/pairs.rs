@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Effect, Role};
+use mops_core::{Effect, Role, Study};
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Diagnosis, Options, diagnose};
@@ -28,6 +28,11 @@ fn swing(label: &str, start: f64) -> Record {
 }
 
 fn diagnosis(effects: &[Arc<dyn Effect>], max_effects: usize) -> Diagnosis {
+    diagnose(&swings(), effects, &Options { max_effects, level: 0.01, seed: 1 }, &()).expect("it simulates")
+}
+
+/// Three swings of it.
+pub fn swings() -> Study {
     let records = vec![swing("wide", 2.4), swing("middle", 1.6), swing("other", 2.0)];
     let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.0, 0.0], 2, records);
     subject.measurements[2].role = Role::Selection;
@@ -37,7 +42,7 @@ fn diagnosis(effects: &[Arc<dyn Effect>], max_effects: usize) -> Diagnosis {
     let mut study = study(&subject);
     // Friction takes energy: the coefficient is not negative.
     study.tuners[1].bounds = [0.0, 1.0];
-    diagnose(&study, effects, &Options { max_effects, level: 0.01, seed: 1 }, &()).expect("it simulates")
+    study
 }
 
 #[test]
@@ -63,7 +68,7 @@ fn dry_friction_alone_would_want_a_negative_viscous_coefficient() {
     let records = vec![swing("wide", 2.4)];
     let mut subject = subject(PENDULUM, &[62.0, 0.05, 2.4, 0.0], 2, records);
     subject.measurements[0].locals[0].start = 2.4;
-    let simulations = std::sync::atomic::AtomicUsize::new(0);
+    let simulations = crate::meter::Meter::new(&());
     let effects = catalogue(&["coulomb-friction"]);
     let limits = crate::search::Limits::at(0.01);
     let search = crate::search::Search::new(&subject, &effects, limits, &simulations);

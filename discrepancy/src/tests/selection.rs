@@ -1,12 +1,12 @@
 //! Selection data help to choose; parameters come from calibration data; validation data decide nothing.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Effect, Role};
 
 use crate::base;
 use crate::diagnosis::StrengthValue;
+use crate::meter::Meter;
 use crate::search::{Limits, Search};
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject};
@@ -50,7 +50,7 @@ fn diagnosis(subject: &Subject) -> Diagnosis {
 
 /// Effects with their probabilities, best first; and what calibration data alone say of the strength of the best.
 fn weighed(subject: &Subject) -> (Vec<(String, f64)>, StrengthValue) {
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (named, limits) = (named(), Limits::at(0.01));
     let search = Search::new(subject, &named, limits, &simulations);
     let calibrated = base::fit(subject, 1, &simulations).expect("it simulates");

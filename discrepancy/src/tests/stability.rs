@@ -1,7 +1,6 @@
 //! A choice that rests on noise, or on one experiment alone, is told from one that rests on all data.
 
-use std::sync::atomic::AtomicUsize;
-
+use crate::meter::Meter;
 use crate::search::{Limits, Search};
 use crate::stability::{Stability, stability};
 use crate::testing::{Record, catalogue, integrated, subject};
@@ -28,7 +27,7 @@ fn record(label: &str, dry: f64, bent: f64) -> Record {
 fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
     let count = records.len();
     let subject = subject(OSCILLATOR, &[20.0, 0.2, 1.0, 0.0], 2, records);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let some = catalogue(named);
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &some, limits, &simulations);

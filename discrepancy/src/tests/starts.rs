@@ -1,10 +1,9 @@
 //! What a hidden state starts with is unknown, and no error of the model.
 
-use std::sync::atomic::AtomicUsize;
-
 use mops_core::{Hold, Input};
 
 use crate::base::first_locals;
+use crate::meter::Meter;
 use crate::search::{Limits, Search};
 use crate::testing::{Record, catalogue, integrated, subject, white};
 
@@ -43,7 +42,7 @@ fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise(
     const PULL: f64 = 6.0;
     let record = pulled(PULL, "pull");
     let subject = subject(CART, &[M, D, 0.0, 0.0], 2, vec![record]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let lag = catalogue(&["actuator-lag"]);
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &lag, limits, &simulations);
@@ -72,7 +71,7 @@ fn a_state_that_nobody_measures_begins_anew_in_every_window() {
     let record = pulled(0.0, "motor");
     // Where the pull begins is known; where it is as a window begins is not.
     let subject = subject(MOTOR, &[M, D, TAU, 0.0, 0.0, 0.0], 2, vec![record]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let search = Search::new(&subject, &[], Limits::at(0.01), &simulations);
     let locals = first_locals(&search.pieces(8));
     let windows = search.trial(&[], &subject.start(), locals, 8, 40).expect("it simulates");

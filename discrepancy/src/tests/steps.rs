@@ -1,11 +1,11 @@
 //! Stairs have no slope: the size of steps is searched for, and a gain that makes up for a wrong size does not hide the right one.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
+use crate::meter::Meter;
 use crate::search::{Limits, Search};
 use crate::testing::{Record, integrated, subject, white};
 
@@ -39,7 +39,7 @@ fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let inputs = vec![("u", Input::Sampled { times: times.clone(), values: samples, hold: Hold::Zero })];
     let record = Record { inputs, times, signals: vec![("x", values, NOISE)] };
     let subject = subject(LAG, &[1.2, 1.0, 0.5], 1, vec![record]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let all: Vec<Arc<dyn Effect>> = effects();
     let limits = Limits::at(0.01);
     let search = Search::new(&subject, &all, limits, &simulations);

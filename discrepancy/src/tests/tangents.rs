@@ -1,13 +1,13 @@
 //! A candidate is screened by its tangent: a secant sees the curvature of what the unknowns absorb.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use mops_core::{Hold, Input, Job, Model, Trials};
 use mops_models::effects::effects;
 
 use crate::candidate::candidates;
 use crate::fit::dot;
+use crate::meter::Meter;
 use crate::testing::{Record, fitted, subject};
 use crate::trace_of::{View, sizes};
 use crate::variant::{Added, Variant};
@@ -32,7 +32,7 @@ fn record() -> Record {
 #[test]
 fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the_simulation() {
     let subject = subject(PLANT, &TRUTH, 2, vec![record()]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (fit, variant, mut at, mut scene) = fitted(&subject, &simulations);
     at.point.globals = TRUTH[..3].to_vec();
     at.point.locals = vec![TRUTH[3..].to_vec()];

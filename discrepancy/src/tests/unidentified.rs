@@ -1,9 +1,8 @@
 //! Parameters that the data cannot tell apart are uncertain, also where one of them stands at a bound by chance.
 
-use std::sync::atomic::AtomicUsize;
-
 use nalgebra::DVector;
 
+use crate::meter::Meter;
 use crate::testing::{Record, fitted, integrated, subject};
 
 /// A block on a spring, of which only ratios show: `m v' = -k x - d v`.
@@ -18,7 +17,7 @@ fn of_ratios_that_alone_are_known_no_part_is_certain() {
     let states = integrated(|_, x: &[f64; 2]| [x[1], -9.0 * x[0] - 0.4 * x[1]], [1.0, 0.0], 0.02, 250);
     let record = Record::of_first("x", &states, 0.02, 0.002, "ratios");
     let subject = subject(BLOCK, &[2.0, 16.0, 1.0, 1.0, 0.0], 2, vec![record]);
-    let simulations = AtomicUsize::new(0);
+    let simulations = Meter::new(&());
     let (mut fit, _, fitted, _) = fitted(&subject, &simulations);
     let value = fitted.point.globals.clone();
     // Rounding decides which of the two bounds it leans on.
