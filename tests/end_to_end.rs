@@ -381,6 +381,17 @@ fn benched(arguments: &[&str]) -> String {
 }
 
 #[test]
+fn a_benchmark_that_cannot_be_written_is_not_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "kept").unwrap();
+    let done = mops(&["bench", "minimax", "--problems", "CB2", "--quiet", "--out", file.to_str().unwrap()]).output();
+    let done = done.unwrap();
+    assert_eq!((done.status.code(), done.stdout.len()), (Some(3), 0));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+}
+
+#[test]
 fn the_default_solver_finds_known_optima_of_control_design_and_calibration() {
     let problems =
         "lq-double-integrator,itae-third-order,settling-second-order,minimum-time,absorber-h2,tank,misra1a,boxbod";

@@ -355,6 +355,7 @@ fn tuners_that_cannot_be_tuned() {
             design("bounds the wrong way round", "min = 0.2,  max = 20.0", "min = 20.0, max = 0.2"),
             design("bounds that are equal", "min = 0.2,  max = 20.0", "min = 2.0,  max = 2.0"),
             design("a bound that is not a number", "max = 20.0", "max = nan"),
+            design("a range wider than numbers reach", "min = 0.1,  max = 50.0", "min = 1e-300, max = 1e300"),
             design("a logarithmic range from zero", "min = 0.1, ", "min = 0.0, "),
             design("a bound without meaning for the parameter", "min = 0.2", "min = 0.0"),
             design("a bound in a unit that does not fit", "max = 20.0", "max = \"20 m\""),

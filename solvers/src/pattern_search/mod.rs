@@ -48,6 +48,7 @@ pub struct PatternSearchOptions {
     /// Factor of the pattern's size where nothing in it is better. Less leads to the end sooner; more polls more often.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
+    #[schemars(range(max = 10_000))]
     /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
     pub batch: usize,
 }

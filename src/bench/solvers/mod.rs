@@ -85,7 +85,7 @@ pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn W
         let others = done(&rivalling);
         relative::judge(&mut found, &others, plan.suite.accuracy);
     }
-    Results::new(plan, found.into_iter().map(|done| done.row).collect())
+    Results::new(plan, found.into_iter().map(|done| done.row).collect(), watch.wants_stop())
 }
 
 /// A run to be done.

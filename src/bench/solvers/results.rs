@@ -22,6 +22,9 @@ pub(crate) struct Results {
     pub budget: Option<usize>,
     /// Relative noise that was added.
     pub noise: f64,
+    /// Whether the user ended it before all runs were made.
+    #[serde(default)]
+    pub interrupted: bool,
     pub rows: Vec<Row>,
 }
 
@@ -38,8 +41,10 @@ pub(crate) struct Row {
     /// The known minimum that is nearest.
     pub known: Option<f64>,
     /// The best objective.
+    #[serde(deserialize_with = "infinite_where_null")]
     pub reached: f64,
     /// Largest violation of a constraint there.
+    #[serde(deserialize_with = "infinite_where_null")]
     pub violation: f64,
     pub evaluations: usize,
     /// Exact slopes taken.
@@ -67,10 +72,16 @@ pub(crate) struct Front {
     pub hypervolume: f64,
     /// Hypervolume of all points.
     pub archive: f64,
-    /// Inverted generational distance of the members.
+    /// Inverted generational distance of the members; infinite where there are none.
+    #[serde(deserialize_with = "infinite_where_null")]
     pub distance: f64,
     /// Hypervolume of the true front.
     pub known: f64,
+}
+
+/// JSON has no infinity: it stands as `null`.
+fn infinite_where_null<'d, D: serde::Deserializer<'d>>(value: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(value)?.unwrap_or(f64::INFINITY))
 }
 
 impl From<FrontFound> for Front {
@@ -90,15 +101,17 @@ pub(crate) struct Summary {
     /// Runs that end with an optimum that violates a constraint.
     pub false_claims: usize,
     /// Medians over the solved runs.
-    pub median_rough: Option<usize>,
-    pub median_fine: Option<usize>,
+    /// Median of the runs that got there.
+    pub median_rough: Option<f64>,
+    /// The same.
+    pub median_fine: Option<f64>,
     pub seconds: f64,
     /// Solver and engine, per evaluation, in ns.
     pub nanoseconds: f64,
 }
 
 impl Results {
-    pub fn new(plan: &Plan, rows: Vec<Row>) -> Self {
+    pub fn new(plan: &Plan, rows: Vec<Row>, interrupted: bool) -> Self {
         Self {
             format: 1,
             mops: env!("CARGO_PKG_VERSION").to_owned(),
@@ -107,6 +120,7 @@ impl Results {
             accuracy: plan.suite.accuracy,
             budget: plan.budget,
             noise: plan.noise,
+            interrupted,
             rows,
         }
     }
@@ -153,9 +167,31 @@ impl Results {
     }
 }
 
-/// The upper median.
-fn median(counts: impl Iterator<Item = usize>) -> Option<usize> {
+#[allow(clippy::cast_precision_loss)]
+fn median(counts: impl Iterator<Item = usize>) -> Option<f64> {
     let mut counts: Vec<usize> = counts.collect();
     counts.sort_unstable();
-    counts.get(counts.len() / 2).copied()
+    let upper = *counts.get(counts.len() / 2)?;
+    let lower = counts[(counts.len() - 1) / 2];
+    Some(0.5 * (lower + upper) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_median_of_an_even_number_lies_between() {
+        assert_eq!(median([9, 3, 5].into_iter()), Some(5.0));
+        assert_eq!(median([9, 3, 6, 5].into_iter()), Some(5.5));
+        assert_eq!(median(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn an_infinite_distance_is_read_as_it_was_written() {
+        let front = Front { hypervolume: 0.0, archive: 0.0, distance: f64::INFINITY, known: 1.0 };
+        let text = serde_json::to_string(&front).unwrap();
+        assert!(text.contains(r#""distance":null"#), "{text}");
+        assert!(serde_json::from_str::<Front>(&text).unwrap().distance.is_infinite());
+    }
 }

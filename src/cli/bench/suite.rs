@@ -9,7 +9,7 @@ use mops_problems::Slope;
 
 use super::super::progress::Progress;
 use super::super::tables::{number, table};
-use super::super::{Trouble, print};
+use super::super::{Trouble, cannot_write, print};
 use super::write;
 use crate::bench::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
 
@@ -100,6 +100,9 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         let help = format!("`mops describe {}` says for what it is", idle.kind);
         return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
     }
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+    }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let progress = Progress::of_cases(!arguments.quiet);
     let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
@@ -166,9 +169,18 @@ fn read(path: &Path, suite: &Suite) -> Result<Results, Diagnostic> {
 }
 
 fn text(results: &Results, before: Option<&Results>) -> String {
-    if results.rows.iter().any(|row| row.front.is_some()) {
-        return fronts(results, before);
+    let has_fronts = results.rows.iter().any(|row| row.front.is_some());
+    let mut text = if has_fronts { fronts(results, before) } else { minima(results, before) };
+    for (results, which) in [(Some(results), "These results are"), (before, "Those of before are")] {
+        if results.is_some_and(|results| results.interrupted) {
+            text.push_str(&format!("{which} not whole: the benchmark was interrupted.\n"));
+        }
     }
+    text
+}
+
+/// What is reached beside the known minima.
+fn minima(results: &Results, before: Option<&Results>) -> String {
     let seeds = results.rows.iter().any(|row| row.seed > 1);
     let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
     header.extend(["all", "ms", "solved"]);
@@ -188,8 +200,8 @@ fn text(results: &Results, before: Option<&Results>) -> String {
         )
     } else {
         format!(
-            "the best feasible point is within 1e-3 of f*, and {fine:e} or what the problem's source allows, relative to the \
-             larger of 1 and |f*|"
+            "a point that violates nothing by more than 1e-6, which may take it below f*, is at most 1e-3, and {fine:e} or \
+             what the problem's source allows, above f*, relative to the larger of 1 and |f*|"
         )
     };
     let slopes = |results: &Results| match results.slopes.as_str() {
@@ -247,8 +259,10 @@ fn fronts(results: &Results, before: Option<&Results>) -> String {
     let earlier = before.map(spreads).unwrap_or_default();
     let row = |spread: solvers::Spread| {
         let (volume, distance) = published(&spread.problem).unzip();
-        let figure =
-            |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+        let figure = |value: Option<f64>, digits: usize| match value.filter(|value| value.is_finite()) {
+            Some(value) => format!("{value:.digits$}"),
+            None => "-".to_owned(),
+        };
         let published = [figure(volume, 5), figure(distance.flatten(), 4)];
         let mut cells = vec![
             spread.problem.clone(),
@@ -259,8 +273,8 @@ fn fronts(results: &Results, before: Option<&Results>) -> String {
             format!("{:.5}", spread.hypervolume[1]),
             format!("{:.5}", spread.known),
             format!("{:.5}", spread.archive),
-            format!("{:.5}", spread.distance[0]),
-            format!("{:.5}", spread.distance[1]),
+            figure(Some(spread.distance[0]), 5),
+            figure(Some(spread.distance[1]), 5),
         ];
         cells.extend(published);
         let same = earlier.iter().find(|e| e.problem == spread.problem && e.solver == spread.solver);
@@ -309,7 +323,7 @@ fn cells(row: &Row, seeds: bool, before: Option<&Results>) -> Vec<String> {
 #[allow(clippy::cast_precision_loss)]
 fn summary(name: &str, results: &Results, solver: &str) -> String {
     let of = results.summary(solver);
-    let count = |count: Option<usize>| count.map_or("-".to_owned(), |count| count.to_string());
+    let count = |count: Option<f64>| count.map_or("-".to_owned(), number);
     let claims = if of.false_claims > 0 {
         format!(", {} claim an optimum that violates a constraint", of.false_claims)
     } else {
@@ -323,8 +337,8 @@ fn summary(name: &str, results: &Results, solver: &str) -> String {
         );
     }
     format!(
-        "{name}{}: {} of {} solved ({:.1} %), median evaluations {} to 1e-3 and {} to the end, {:.2} s, {:.0} ns per \
-         evaluation of its own{claims}\n",
+        "{name}{}: {} of {} solved ({:.1} %), median evaluations of those that got there {} to 1e-3 and {} to \
+         the end; {:.2} s in all, {:.0} ns per evaluation of the solver's own{claims}\n",
         of.solver,
         of.solved,
         of.judged,

@@ -123,6 +123,11 @@ pub(super) fn build_tuner(
         return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
             .with_help("raise `min`, or leave `scale` out"));
     }
+    let width = if draft.scale == Scale::Log { max / min } else { max - min };
+    if !fixed && !width.is_finite() {
+        return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} is wider than numbers reach"))
+            .with_help("narrow the bounds to what is plausible"));
+    }
     if let Some(parameter) = parameter {
         let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
         for (key, bound) in [("min", min), ("max", max)] {
