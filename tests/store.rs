@@ -30,7 +30,7 @@ fn result(out: &Path) -> Value {
     result
 }
 
-/// Of `known` points, those met again, and those simulated, as the terminal tells.
+/// Known points, evaluations that met one of them, and those that were simulated, as the terminal tells.
 fn counts(said: &str) -> [usize; 3] {
     let line = said.lines().find(|line| line.contains("known points")).unwrap_or_else(|| panic!("{said}"));
     let numbers: Vec<usize> = line.split(|c: char| !c.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect();

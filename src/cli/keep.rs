@@ -126,7 +126,7 @@ pub(super) fn told(start: &Start, known: usize, opened: &Opened) -> String {
     match start {
         Start::Fresh | Start::Look => String::new(),
         Start::Resume | Start::Reuse(_) => format!(
-            "\nof {known} known points {} were met again and not simulated; {} were simulated\n",
+            "\n{known} known points; {} evaluations met one of them and were not simulated, {} were simulated\n",
             opened.reused, opened.simulated
         ),
     }
