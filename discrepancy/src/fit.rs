@@ -96,7 +96,7 @@ pub struct Fit<'a> {
     pub pieces: Vec<Piece>,
     /// What is expected of some of the globals.
     pub expected: Vec<Expected>,
-    /// Counts simulations.
+    /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
 }
 

@@ -4,8 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::Watch;
 
-/// Counts simulations. Once its watch wants an end it admits none: what is under way then fails within moments, whichever
-/// search it belongs to.
+/// Counts simulations. Once its watch wants an end it admits none: every fit that is under way then fails.
 pub struct Meter<'a> {
     count: AtomicUsize,
     watch: &'a dyn Watch,

@@ -67,7 +67,7 @@ pub struct Search<'a> {
     pub effects: &'a [Arc<dyn Effect>],
     /// Limits.
     pub limits: Limits,
-    /// Counts simulations.
+    /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
     /// Rounds that were looked at.
     pub(crate) looked: Mutex<Vec<Arc<Round<'a>>>>,

@@ -42,6 +42,35 @@ fn problems_with_constraints_are_solved() {
     check("hock-schittkowski", &names, 1e-6);
 }
 
+/// Equalities, curved constraints, and starts that violate them; no slopes.
+#[test]
+fn pattern_search_keeps_constraints() {
+    for name in ["HS7", "HS9", "HS29", "HS43", "HS56", "HS62", "HS71", "HS76", "HS100"] {
+        let found = solve("pattern-search", &named("hock-schittkowski", name), Slope::Differences, 1000);
+        assert!(found.evaluations_to(1e-6).is_some(), "{name}: {:?}", found.best);
+    }
+}
+
+/// What a user writes down from `mops describe` is accepted.
+#[test]
+fn every_default_is_within_its_range() {
+    let mut ranges = 0;
+    for kind in mops_solvers::kinds() {
+        let schema = (kind.schema)().to_value();
+        for (name, option) in schema["properties"].as_object().into_iter().flatten() {
+            let bound = |key: &str| option[key].as_f64();
+            let Some(default) = option["default"].as_f64() else { continue };
+            let holds = bound("minimum").is_none_or(|low| default >= low)
+                && bound("maximum").is_none_or(|high| default <= high)
+                && bound("exclusiveMinimum").is_none_or(|low| default > low)
+                && bound("exclusiveMaximum").is_none_or(|high| default < high);
+            assert!(holds, "{} {name}: {option}", kind.name);
+            ranges += usize::from(bound("maximum").or(bound("exclusiveMinimum")).is_some());
+        }
+    }
+    assert!(ranges > 20, "{ranges}");
+}
+
 /// From these starts slopes lead to where exponentials are flat (Osborne 1), or to the minimum 6.50395e-3 that the literature
 /// lists (Chebyquad of ten variables); models of a wider neighbourhood lead to less.
 #[test]

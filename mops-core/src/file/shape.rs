@@ -80,7 +80,7 @@ fn check_whole(node: &Node<'_>, number: &DeInteger<'_>, schema: &Value, key: Key
     check_range(node, value as f64, schema, key)
 }
 
-/// The range of numbers that a schema allows, in words; nothing where it allows all, or all that are not negative.
+/// The range of numbers that a schema allows, in words; nothing where it allows all.
 pub(super) fn range_in_words(schema: &Value) -> Option<String> {
     let bound = |name: &str| schema[name].as_f64();
     if let (Some(low), Some(high)) = (bound("minimum"), bound("maximum")) {

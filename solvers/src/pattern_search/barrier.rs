@@ -2,7 +2,8 @@
 
 use mops_core::{FEASIBLE, Merit};
 
-/// A violation up to which a constraint holds: well below what the user is granted, so that none of it is spent.
+/// A violation up to which a constraint holds for the search: well below what the user is granted, so that a point that spends
+/// some of that is not the best feasible one.
 const HOLDS: f64 = 1e-9;
 
 /// Share of what was promised that a step must keep.
@@ -45,6 +46,7 @@ impl Promise {
 /// Toint, Computational Optimization and Applications 61 (2015) 25-49 (funnel).
 #[derive(Debug, Clone)]
 pub struct Barrier {
+    /// The largest violation that is admitted; never less than what the user is granted.
     limit: f64,
     /// The least objective of a feasible point.
     feasible: f64,

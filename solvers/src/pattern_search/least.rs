@@ -112,6 +112,9 @@ impl Aim<'_> {
             };
             let Some(direction) = solve(&rows) else { break };
             let length = direction.step.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+            if length == 0.0 {
+                break;
+            }
             let (mut found, mut there) = tried(&direction.step);
             if found >= worth
                 && let Some(again) = solve(&rows.corrected(&self.rows(models, &there), &direction.step))

@@ -48,8 +48,8 @@ pub struct PatternSearchOptions {
     /// Factor of the pattern's size where nothing in it is better. Less leads to the end sooner; more polls more often.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
-    #[schemars(range(max = 10_000))]
     /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
+    #[schemars(range(max = 10_000))]
     pub batch: usize,
 }
 
@@ -91,6 +91,7 @@ struct State {
     turned_at: Option<Vec<f64>>,
     /// Weight of the violation in the models' objective.
     penalty: f64,
+    /// What may be moved to.
     barrier: Barrier,
     unit: f64,
     pattern: Pattern,
@@ -180,7 +181,7 @@ impl Solver for PatternSearch {
         if !state.best.merit.is_feasible() && state.returns < RETURNS {
             state.returns += 1;
             if let Some(best) = oracle.best().filter(|best| best.merit.is_feasible()) {
-                state.best = best.clone();
+                state.adopt(best);
             }
             state.followed_from = f64::INFINITY;
             state.radius = self.options.size;
@@ -217,13 +218,14 @@ impl State {
         evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.aim(shape).worth(scaled))
     }
 
-    /// Evaluates points, keeps their values, and moves to the best if the barrier admits it; `true` when it moved.
+    /// Evaluates points, keeps their values, and moves to the best if the barrier admits it; `true` when it moved. What is
+    /// promised is promised of the first point.
     fn visit(&mut self, oracle: &mut dyn Oracle, points: &[Vec<f64>], promise: Option<Promise>) -> Result<bool, Halt> {
         let before = self.best.merit;
         let mut moved = false;
-        for answer in oracle.evaluate(points)? {
+        for (index, answer) in oracle.evaluate(points)?.into_iter().enumerate() {
             self.remember(&answer);
-            if self.barrier.admits(&self.best.merit, &answer.merit, promise) {
+            if self.barrier.admits(&self.best.merit, &answer.merit, promise.filter(|_| index == 0)) {
                 self.barrier.saw(&answer.merit);
                 self.best = answer;
                 moved = true;
@@ -241,6 +243,13 @@ impl State {
         {
             self.known.push((answer.point.clone(), scaled.clone()));
         }
+    }
+
+    /// Goes on from a point that others have found.
+    fn adopt(&mut self, best: &Evaluation) {
+        self.best = best.clone();
+        self.barrier.saw(&best.merit);
+        self.remember(best);
     }
 
     /// Forgets the oldest points where there are many: few of them are near.
@@ -264,7 +273,11 @@ impl State {
         let (low, high) = self.room();
         let mut aim = self.aim(shape);
         let step = aim.least_violating(&models, &low, &high);
-        self.penalty = aim.penalty;
+        if aim.penalty > self.penalty {
+            self.penalty = aim.penalty;
+            // Nothing is worth what it was.
+            self.followed_from = f64::INFINITY;
+        }
         let Some(y) = step else {
             self.promised = 0.0;
             return self.mend(oracle, &near, &models);
@@ -417,9 +430,7 @@ impl State {
         if let Some(best) = oracle.best()
             && self.worth(shape, best) < self.worth(shape, &self.best)
         {
-            self.best = best.clone();
-            self.barrier.saw(&best.merit);
-            self.remember(best);
+            self.adopt(best);
         }
         Ok(())
     }

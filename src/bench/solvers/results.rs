@@ -100,10 +100,9 @@ pub(crate) struct Summary {
     pub solved: usize,
     /// Runs that end with an optimum that violates a constraint.
     pub false_claims: usize,
-    /// Medians over the solved runs.
-    /// Median of the runs that got there.
+    /// Median evaluations to 1e-3, of the runs that got there.
     pub median_rough: Option<f64>,
-    /// The same.
+    /// Median evaluations to the accuracy that counts as solved, of the runs that got there.
     pub median_fine: Option<f64>,
     pub seconds: f64,
     /// Solver and engine, per evaluation, in ns.
@@ -167,6 +166,7 @@ impl Results {
     }
 }
 
+/// The median; between the two in the middle of an even number.
 #[allow(clippy::cast_precision_loss)]
 fn median(counts: impl Iterator<Item = usize>) -> Option<f64> {
     let mut counts: Vec<usize> = counts.collect();

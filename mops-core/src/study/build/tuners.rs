@@ -123,7 +123,7 @@ pub(super) fn build_tuner(
         return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
             .with_help("raise `min`, or leave `scale` out"));
     }
-    let width = if draft.scale == Scale::Log { max / min } else { max - min };
+    let width = if draft.scale == Scale::Log { (max / min).ln() } else { max - min };
     if !fixed && !width.is_finite() {
         return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} is wider than numbers reach"))
             .with_help("narrow the bounds to what is plausible"));
