@@ -93,7 +93,7 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &Meter<'_>) -> Option<Fitt
     let in_short = |values: &[f64]| windows.all(&begin(&windows, values)).map(|all| sum_of_squares(&all));
     let draws = if in_short(&start).is_some() { 1 } else { 50 };
     for attempt in 0..40 {
-        if attempt >= 4 && best.is_some() {
+        if simulations.is_over() || attempt >= 4 && best.is_some() {
             break;
         }
         if agreeing >= 2 || best.as_ref().is_some_and(|best| best.normalised() < 1.2) {

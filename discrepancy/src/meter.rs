@@ -18,11 +18,16 @@ impl<'a> Meter<'a> {
 
     /// Whether there may be another simulation, which is then counted.
     pub fn admits(&self) -> bool {
-        let goes_on = !self.watch.wants_stop();
+        let goes_on = !self.is_over();
         if goes_on {
             self.count.fetch_add(1, Ordering::Relaxed);
         }
         goes_on
+    }
+
+    /// Whether an end is wanted: nothing more will be simulated.
+    pub fn is_over(&self) -> bool {
+        self.watch.wants_stop()
     }
 
     /// Simulations so far.

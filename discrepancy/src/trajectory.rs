@@ -228,10 +228,9 @@ fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::meter::Meter;
-
     use mops_core::{Hold, Input, Job, Model};
 
+    use crate::meter::Meter;
     use crate::testing::{Record, fitted, subject};
 
     const OSCILLATOR: &str = r#"

@@ -195,6 +195,7 @@ mod tests {
         let promise = aim.worth_of(&aim.promise(&models, &y));
         assert!((y[0] - 0.5).abs() < 1e-3 && (promise - 0.75).abs() < 1e-3, "{y} {promise}");
     }
+
     #[test]
     fn a_step_goes_along_a_curved_constraint() {
         // -y_1 inside the circle y'y <= 1, from its edge at (0, 1): the slopes alone lead straight off the circle.
