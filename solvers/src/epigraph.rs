@@ -13,10 +13,11 @@
 use nalgebra::DMatrix;
 
 use crate::active_set::{ActiveSet, Constraints, dot};
+use crate::definite::cholesky;
 pub use crate::rows::{Linear, Rows};
 
 /// What the rows weigh at the solution.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Multipliers {
     /// Of the objective rows; they sum to 1.
     pub objectives: Vec<f64>,
@@ -34,7 +35,7 @@ impl Multipliers {
 }
 
 /// The solution of the subproblem.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Direction {
     /// The step.
     pub step: Vec<f64>,
@@ -56,14 +57,17 @@ pub struct Subproblem {
     constraints: Constraints,
     factor: Vec<f64>,
     linear: Vec<f64>,
+    slope: Vec<f64>,
+    weights: Vec<f64>,
 }
 
 impl Subproblem {
     /// Curvature of level and violation, relative to what the objective can fall by.
     const CURVATURE: f64 = 1e-7;
 
-    /// The solution with steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding keeps
-    /// the method from an end.
+    /// Finds the solution with steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding
+    /// keeps the method from an end.
+    #[must_use]
     pub fn solve(
         &mut self,
         rows: &Rows,
@@ -71,7 +75,8 @@ impl Subproblem {
         low: &[f64],
         high: &[f64],
         penalty: f64,
-    ) -> Option<Direction> {
+        into: &mut Direction,
+    ) -> Option<()> {
         let n = low.len();
         let level = rows.objective();
         let first = self.collect(rows, level, low, high);
@@ -83,18 +88,14 @@ impl Subproblem {
         if !self.method.solve(&self.factor, &self.linear, &self.constraints, &[first, no_violation]) {
             return None;
         }
-        let step: Vec<f64> = (0..n).map(|j| self.method.x()[j].clamp(low[j], high[j])).collect();
-        let after = |rows: &[Linear], step: &[f64]| {
-            rows.iter().map(|row| row.value + dot(&row.slope, step)).collect::<Vec<f64>>()
-        };
-        let violation = after(&rows.inequalities, &step).into_iter().fold(0.0, f64::max);
-        let violation = after(&rows.equalities, &step).into_iter().map(f64::abs).fold(violation, f64::max);
-        Some(Direction {
-            level: after(&rows.objectives, &step).into_iter().fold(f64::NEG_INFINITY, f64::max),
-            violation,
-            multipliers: self.multipliers(rows),
-            step,
-        })
+        into.step.clear();
+        into.step.extend((0..n).map(|j| self.method.x()[j].clamp(low[j], high[j])));
+        let after = |row: &Linear| row.value + dot(&row.slope, &into.step);
+        into.level = rows.objectives.iter().map(after).fold(f64::NEG_INFINITY, f64::max);
+        let violation = rows.inequalities.iter().map(after).fold(0.0, f64::max);
+        into.violation = rows.equalities.iter().map(|row| after(row).abs()).fold(violation, f64::max);
+        self.weigh(rows, &mut into.multipliers);
+        Some(())
     }
 
     /// The rows as constraints on step, level and violation, in the order of `rows`, then the box, then no violation; the
@@ -139,29 +140,30 @@ impl Subproblem {
         self.factor.resize(size * size, 0.0);
         let l = &mut self.factor;
         for k in 0..n {
-            for i in k..n {
-                let known: f64 = (0..k).map(|m| l[m * size + i] * l[m * size + k]).sum();
-                let left = hessian[(i, k)] - known;
-                l[k * size + i] = if i > k { left / l[k * size + k] } else { left.sqrt() };
-            }
-            if !(l[k * size + k] > 0.0 && l[k * size + k].is_finite()) {
-                return None;
-            }
+            l[k * size + k..k * size + n].copy_from_slice(&hessian.as_slice()[k * n + k..(k + 1) * n]);
+        }
+        if !cholesky(l, n, size) {
+            return None;
         }
         // What the first row falls by without the others: |L^-1 g|^2.
-        let mut y = slope.to_vec();
+        let y = &mut self.slope;
+        y.clear();
+        y.extend_from_slice(slope);
         for k in 0..n {
             y[k] = (y[k] - (0..k).map(|m| l[m * size + k] * y[m]).sum::<f64>()) / l[k * size + k];
         }
-        let small = (Self::CURVATURE / (1.0 + dot(&y, &y))).sqrt();
+        let small = (Self::CURVATURE / (1.0 + dot(y, y))).sqrt();
         l[n * size + n] = small;
         l[(n + 1) * size + n + 1] = small;
         Some(())
     }
 
-    fn multipliers(&self, rows: &Rows) -> Multipliers {
+    /// What the rows weigh at the solution.
+    fn weigh(&mut self, rows: &Rows, multipliers: &mut Multipliers) {
         let (f, c, h) = (rows.objectives.len(), rows.inequalities.len(), rows.equalities.len());
-        let mut all = vec![0.0; f + c + h];
+        let all = &mut self.weights;
+        all.clear();
+        all.resize(f + c + h, 0.0);
         for (p, multiplier) in self.method.active() {
             match p {
                 p if p < f + c => all[p] = multiplier,
@@ -172,9 +174,14 @@ impl Subproblem {
                 _ => {}
             }
         }
-        let equalities = all.split_off(f + c);
-        let inequalities = all.split_off(f);
-        Multipliers { objectives: all, inequalities, equalities }
+        for (group, range) in [
+            (&mut multipliers.objectives, 0..f),
+            (&mut multipliers.inequalities, f..f + c),
+            (&mut multipliers.equalities, f + c..f + c + h),
+        ] {
+            group.clear();
+            group.extend_from_slice(&all[range]);
+        }
     }
 }
 
@@ -183,7 +190,8 @@ mod tests {
     use super::*;
 
     fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
-        Subproblem::default().solve(rows, hessian, low, high, penalty)
+        let mut direction = Direction::default();
+        Subproblem::default().solve(rows, hessian, low, high, penalty, &mut direction).map(|()| direction)
     }
 
     fn linear(value: f64, slope: &[f64]) -> Linear {

@@ -4,6 +4,7 @@ mod active_set;
 mod argmin_adapter;
 pub mod auto;
 pub mod cma_es;
+mod definite;
 pub mod differential_evolution;
 mod directions;
 pub mod epigraph;

@@ -4,7 +4,7 @@ use mops_core::{Linearisation, Objective, Oracle, Pareto, Shape, Usage};
 use nalgebra::DMatrix;
 
 use crate::active_set::dot;
-use crate::epigraph::{Linear, Rows, Subproblem};
+use crate::epigraph::{Direction, Linear, Rows, Subproblem};
 
 /// Improvement per unit of step, relative to the steepest slope of its row, below which a direction is none: the accuracy
 /// of slopes by differences.
@@ -179,7 +179,9 @@ impl Cone {
         let low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
         let high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
         // A penalty above every multiplier keeps the direction inside the cone.
-        let direction = Subproblem::default().solve(&cone, &(DMatrix::identity(n, n) * 1e-6), &low, &high, 1e4)?;
+        let mut direction = Direction::default();
+        let hessian = DMatrix::identity(n, n) * 1e-6;
+        Subproblem::default().solve(&cone, &hessian, &low, &high, 1e4, &mut direction)?;
         let promised = (0..self.objectives.len()).map(|k| self.fall(k, &direction.step)).sum();
         // The sum of the rows, and what keeps each of them from rising.
         let held = &direction.multipliers.inequalities;

@@ -71,3 +71,19 @@ fn no_member_of_a_generation_asks_for_memory() {
         assert!(blocks < most, "{kind}: {blocks} blocks per evaluation");
     }
 }
+
+/// Steps of `sqp` and of `pattern-search` use the same memory again; what they ask for is room that grows with the pieces, the
+/// points and the directions that they keep.
+#[test]
+fn no_step_asks_for_memory() {
+    for (kind, suite, problem, most) in [
+        ("sqp", "minimax", "Polak3", 0.05),
+        ("sqp", "minimax", "EQUIL", 0.05),
+        ("pattern-search", "minimax", "Polak3", 0.5),
+        ("pattern-search", "minimax", "EQUIL", 1.0),
+        ("pattern-search", "more-wild", "11 n6 m31", 0.5),
+    ] {
+        let blocks = blocks(kind, suite, problem, 5000);
+        assert!(blocks < most, "{kind} {problem}: {blocks} blocks per evaluation");
+    }
+}

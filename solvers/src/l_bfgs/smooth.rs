@@ -57,7 +57,7 @@ impl<'a> Smooth<'a> {
     pub fn new(oracle: &'a mut dyn Oracle, start: &[f64], sharpness: f64) -> Result<Option<Self>, Halt> {
         let at = oracle.evaluate(&[start.to_vec()])?.pop().expect("one point, one answer");
         let Some(scaled) = &at.scaled else { return Ok(None) };
-        let unit = Rows::new(oracle.shape(), scaled, &vec![Vec::new(); scaled.len()]).unit();
+        let unit = Rows::of_values(oracle.shape(), scaled).unit();
         let state = State { oracle, halt: None, last: None, safe: start.to_vec(), worth: 0.0 };
         Ok(Some(Self { state: Mutex::new(state), sharpness, unit }))
     }
@@ -88,7 +88,8 @@ impl<'a> Smooth<'a> {
         })?;
         let (value, along) = match found {
             Some(at) => {
-                let rows = Rows::of(state.oracle.shape(), &at).with_objective_times(self.unit);
+                let mut rows = Rows::of(state.oracle.shape(), &at);
+                rows.multiply_objective(self.unit);
                 let (value, slope) = self.together(&rows);
                 (state.safe, state.worth) = (point.clone(), value);
                 (value, slope)

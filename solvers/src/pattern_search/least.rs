@@ -1,13 +1,15 @@
 //! The step that makes the models' objective least.
 
 use mops_core::{Shape, Usage};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::DMatrix;
 
 use super::barrier::{Promise, violation};
 use super::models::Models;
-use crate::epigraph::{Multipliers, Rows, Subproblem};
+use crate::definite::cholesky;
+use crate::epigraph::{Direction, Multipliers, Rows, Subproblem};
 
 /// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
+#[derive(Clone, Copy)]
 pub struct Aim<'a> {
     /// Sizes and kinds.
     pub shape: &'a Shape,
@@ -24,31 +26,36 @@ impl Aim<'_> {
         self.unit * merit.objective + self.penalty * merit.violation
     }
 
-    fn rows(&self, models: &Models, y: &DVector<f64>) -> Rows {
-        Rows::new(self.shape, &models.values(y), &models.slopes(y)).with_objective_times(self.unit)
+    /// The rows of the models, with given values, after a step.
+    fn rows(&self, models: &Models, y: &[f64], values: &[f64], rows: &mut Rows) {
+        rows.fill(self.shape, values, y.len(), |row, weight, sum| models.add_slope(row, y, weight, sum));
+        rows.multiply_objective(self.unit);
     }
 
     /// The curvature of the Lagrangian.
-    fn curvature(&self, models: &Models, multipliers: &Multipliers) -> DMatrix<f64> {
+    fn curvature(&self, models: &Models, multipliers: &Multipliers, curvature: &mut DMatrix<f64>) {
         let sum = multipliers.objectives.len() == 1;
         let (mut objective, mut inequality, mut equality) = (0, 0, 0);
-        let weights = self.shape.rows.iter().map(|(usage, weight)| match usage {
-            Usage::Minimise => {
-                let multiplier = multipliers.objectives[if sum { 0 } else { objective }];
-                objective += 1;
-                self.unit * weight * multiplier
-            }
-            Usage::Inequality => {
-                inequality += 1;
-                multipliers.inequalities[inequality - 1]
-            }
-            Usage::Equality => {
-                equality += 1;
-                multipliers.equalities[equality - 1]
-            }
-            Usage::Monitor => 0.0,
-        });
-        models.curvature(weights)
+        curvature.fill(0.0);
+        for (row, (usage, weight)) in self.shape.rows.iter().enumerate() {
+            let weight = match usage {
+                Usage::Minimise => {
+                    let multiplier = multipliers.objectives[if sum { 0 } else { objective }];
+                    objective += 1;
+                    self.unit * weight * multiplier
+                }
+                Usage::Inequality => {
+                    inequality += 1;
+                    multipliers.inequalities[inequality - 1]
+                }
+                Usage::Equality => {
+                    equality += 1;
+                    multipliers.equalities[equality - 1]
+                }
+                Usage::Monitor => continue,
+            };
+            models.add_curvature(row, weight, curvature);
+        }
     }
 
     /// How much more a unit of violation counts than one of the objective.
@@ -56,9 +63,9 @@ impl Aim<'_> {
         self.penalty / self.unit
     }
 
-    /// What a step of the models promises.
-    pub fn promise(&self, models: &Models, y: &DVector<f64>) -> Promise {
-        let [before, after] = [&DVector::zeros(y.len()), y].map(|y| self.shape.merit(&models.values(y)));
+    /// What a step promises that leads from some scaled values to others.
+    pub fn promise(&self, from: &[f64], to: &[f64]) -> Promise {
+        let [before, after] = [from, to].map(|scaled| self.shape.merit(scaled));
         Promise { objective: before.objective - after.objective, violation: violation(&before) - violation(&after) }
     }
 
@@ -66,63 +73,132 @@ impl Aim<'_> {
     pub fn worth_of(&self, promise: &Promise) -> f64 {
         (self.unit * promise.objective + self.penalty * promise.violation).max(0.0)
     }
+}
 
-    /// As [`Aim::least`], with a weight of the violation that grows until the violation falls by most of what the models let
-    /// it fall.
-    ///
-    /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
-    pub fn least_violating(&mut self, models: &Models, low: &[f64], high: &[f64]) -> Option<DVector<f64>> {
-        let mut step = self.least(models, low, high);
-        let after = |step: Option<&DVector<f64>>| {
-            let merit = self.shape.merit(&models.values(step.unwrap_or(&DVector::zeros(low.len()))));
-            violation(&merit)
-        };
-        if self.shape.has_constraints() && after(step.as_ref()) > 0.0 {
-            let most = Aim { penalty: LARGEST_PENALTY, ..*self }.least(models, low, high);
-            let least = after(most.as_ref());
-            let wanted = least + 0.1 * (after(None) - least).max(0.0);
-            while after(step.as_ref()) > wanted && self.penalty < LARGEST_PENALTY {
-                self.penalty *= 10.0;
-                step = self.least(models, low, high);
-            }
-        }
-        step
+/// The search for the least of the models' penalised objective, with its memory, which is used again from step to step.
+#[derive(Default)]
+pub struct Least {
+    /// The step that was found.
+    y: Vec<f64>,
+    /// The values of all rows after it.
+    values: Vec<f64>,
+    /// Another step, and the values after it.
+    there: Vec<f64>,
+    values_there: Vec<f64>,
+    /// The first step and its values, while others are looked at.
+    first: [Vec<f64>; 2],
+    rows: Rows,
+    rows_there: Rows,
+    corrected: Rows,
+    hessian: DMatrix<f64>,
+    factor: Vec<f64>,
+    multipliers: Multipliers,
+    /// The box around the step.
+    low: Vec<f64>,
+    high: Vec<f64>,
+    directions: [Direction; 2],
+    subproblem: Subproblem,
+}
+
+impl Least {
+    /// The step that was found.
+    pub fn step(&self) -> &[f64] {
+        &self.y
     }
 
-    /// The step to the least of the models' penalised objective over `low <= y <= high`, from `y = 0`, by sequential quadratic
-    /// programming on the models, in a trust region of its own and with second-order corrections. `None` where no step lessens
-    /// it.
-    fn least(&self, models: &Models, low: &[f64], high: &[f64]) -> Option<DVector<f64>> {
+    /// The models' values after it.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Finds the step to the least of the models' penalised objective over `low <= y <= high`, with a weight of the violation
+    /// that grows until the violation falls by most of what the models let it fall. `false` where no step lessens it.
+    ///
+    /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
+    pub fn find(&mut self, aim: &mut Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
+        let found = self.search(aim, models, low, high);
+        let mut left = self.violation(aim.shape);
+        if left == 0.0 {
+            return found;
+        }
+        self.swap_first();
+        self.search(&Aim { penalty: LARGEST_PENALTY, ..*aim }, models, low, high);
+        let least = self.violation(aim.shape);
+        let before = violation(&aim.shape.merit(models.constants()));
+        let wanted = least + 0.1 * (before - least).max(0.0);
+        if left <= wanted || aim.penalty >= LARGEST_PENALTY {
+            self.swap_first();
+            return found;
+        }
+        let mut found = found;
+        while left > wanted && aim.penalty < LARGEST_PENALTY {
+            aim.penalty *= 10.0;
+            found = self.search(aim, models, low, high);
+            left = self.violation(aim.shape);
+        }
+        found
+    }
+
+    fn swap_first(&mut self) {
+        std::mem::swap(&mut self.y, &mut self.first[0]);
+        std::mem::swap(&mut self.values, &mut self.first[1]);
+    }
+
+    /// What the models leave violated after the step.
+    fn violation(&self, shape: &Shape) -> f64 {
+        violation(&shape.merit(&self.values))
+    }
+
+    /// As [`Least::find`], from `y = 0`, by sequential quadratic programming on the models, in a trust region of its own and
+    /// with second-order corrections.
+    fn search(&mut self, aim: &Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
         let n = low.len();
-        let mut y = DVector::zeros(n);
-        let begin = self.worth(&models.values(&y));
+        let Self { y, values, there, values_there, rows, rows_there, corrected, hessian, factor, .. } = self;
+        let Self { multipliers, low: room_low, high: room_high, subproblem, .. } = self;
+        let [direction, again] = &mut self.directions;
+        if hessian.nrows() != n {
+            *hessian = DMatrix::zeros(n, n);
+        }
+        y.clear();
+        y.resize(n, 0.0);
+        values.clear();
+        values.extend_from_slice(models.constants());
+        let begin = aim.worth(values);
         let mut worth = begin;
-        let mut rows = self.rows(models, &y);
-        let mut multipliers = on_top(&rows);
-        let mut subproblem = Subproblem::default();
+        aim.rows(models, y, values, rows);
+        on_top(rows, multipliers);
         let (mut reach, mut failures) = (1.0_f64, 0);
         for _ in 0..ITERATIONS {
-            let hessian = convex(self.curvature(models, &multipliers));
-            let room_low: Vec<f64> = (0..n).map(|j| (low[j] - y[j]).clamp(-reach, 0.0)).collect();
-            let room_high: Vec<f64> = (0..n).map(|j| (high[j] - y[j]).clamp(0.0, reach)).collect();
-            let mut solve = |rows: &Rows| subproblem.solve(rows, &hessian, &room_low, &room_high, self.penalty);
-            let tried = |step: &[f64]| {
-                let there = &y + DVector::from_column_slice(step);
-                (self.worth(&models.values(&there)), there)
+            aim.curvature(models, multipliers, hessian);
+            make_convex(hessian, factor);
+            room_low.clear();
+            room_low.extend(low.iter().zip(&*y).map(|(low, y)| (low - y).clamp(-reach, 0.0)));
+            room_high.clear();
+            room_high.extend(high.iter().zip(&*y).map(|(high, y)| (high - y).clamp(0.0, reach)));
+            let mut try_step = |y: &[f64], step: &[f64], values: &mut Vec<f64>| {
+                there.clear();
+                there.extend(y.iter().zip(step).map(|(y, d)| y + d));
+                models.values(there, values);
+                aim.worth(values)
             };
-            let Some(direction) = solve(&rows) else { break };
+            if subproblem.solve(rows, hessian, room_low, room_high, aim.penalty, direction).is_none() {
+                break;
+            }
             let length = direction.step.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
             if length == 0.0 {
                 break;
             }
-            let (mut found, mut there) = tried(&direction.step);
-            if found >= worth
-                && let Some(again) = solve(&rows.corrected(&self.rows(models, &there), &direction.step))
-            {
-                (found, there) = tried(&again.step);
+            let mut found = try_step(y, &direction.step, values_there);
+            if found >= worth {
+                rows_there.evaluate(aim.shape, values_there);
+                rows_there.multiply_objective(aim.unit);
+                corrected.correct(rows, rows_there, &direction.step);
+                if subproblem.solve(corrected, hessian, room_low, room_high, aim.penalty, again).is_some() {
+                    found = try_step(y, &again.step, values_there);
+                }
             }
             // Even where the step failed, its multipliers tell more of the curvature.
-            multipliers = direction.multipliers;
+            std::mem::swap(multipliers, &mut direction.multipliers);
             if found >= worth {
                 failures += 1;
                 reach = 0.3 * length.min(reach);
@@ -132,14 +208,16 @@ impl Aim<'_> {
                 continue;
             }
             let gained = worth - found;
-            (y, worth) = (there, found);
+            worth = found;
+            std::mem::swap(y, there);
+            std::mem::swap(values, values_there);
             if gained < 1e-3 * (begin - worth) {
                 break;
             }
             reach = 2.0 * length.max(reach);
-            rows = self.rows(models, &y);
+            aim.rows(models, y, values, rows);
         }
-        (worth < begin).then_some(y)
+        worth < begin
     }
 }
 
@@ -153,62 +231,102 @@ const ITERATIONS: usize = 30;
 const FAILURES: usize = 8;
 
 /// At first the largest row has all the weight.
-fn on_top(rows: &Rows) -> Multipliers {
+fn on_top(rows: &Rows, multipliers: &mut Multipliers) {
     let top = rows.objective();
     let count = rows.objectives.iter().filter(|row| row.value >= top).count();
     #[allow(clippy::cast_precision_loss)]
     let share = 1.0 / count.max(1) as f64;
-    Multipliers {
-        objectives: rows.objectives.iter().map(|row| if row.value >= top { share } else { 0.0 }).collect(),
-        inequalities: vec![0.0; rows.inequalities.len()],
-        equalities: vec![0.0; rows.equalities.len()],
-    }
+    multipliers.objectives.clear();
+    multipliers.objectives.extend(rows.objectives.iter().map(|row| if row.value >= top { share } else { 0.0 }));
+    multipliers.inequalities.clear();
+    multipliers.inequalities.resize(rows.inequalities.len(), 0.0);
+    multipliers.equalities.clear();
+    multipliers.equalities.resize(rows.equalities.len(), 0.0);
 }
 
-/// The matrix with the absolute values of its eigenvalues, none much smaller than the largest.
-fn convex(matrix: DMatrix<f64>) -> DMatrix<f64> {
+/// The first multiple of the identity that is added to a matrix that is not positive definite, relative to its norm.
+const ADDED: f64 = 1e-3;
+
+/// The smallest pivot relative to the largest entry that counts as positive.
+const POSITIVE: f64 = 1e-8;
+
+/// Makes a symmetric matrix positive definite, where it is not, by a multiple of the identity.
+///
+/// Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition (2006), algorithm 3.3.
+fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
     let n = matrix.nrows();
-    let size = matrix.amax();
+    let size = matrix.iter().fold(0.0_f64, |most, h| if h.is_finite() { most.max(h.abs()) } else { f64::INFINITY });
     if !(size.is_finite() && size > 0.0) {
-        return DMatrix::identity(n, n) * 1e-9;
+        matrix.fill_with_identity();
+        *matrix *= 1e-9;
+        return;
     }
-    let eigen = SymmetricEigen::new(matrix);
-    let least = 1e-8 * eigen.eigenvalues.amax();
-    let values = eigen.eigenvalues.map(|value| value.abs().max(least));
-    &eigen.eigenvectors * DMatrix::from_diagonal(&values) * eigen.eigenvectors.transpose()
+    // In units of the largest entry, so that nothing overflows: no eigenvalue is below -n.
+    let least = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
+    let first = ADDED * matrix.iter().map(|h| (h / size).powi(2)).sum::<f64>().sqrt();
+    let mut added = if least > 0.0 { 0.0 } else { first - least };
+    loop {
+        factor.clear();
+        factor.extend(matrix.iter().map(|h| h / size));
+        (0..n).for_each(|i| factor[i * n + i] += added - POSITIVE);
+        if cholesky(factor, n, n) {
+            (0..n).for_each(|i| matrix[(i, i)] += added * size);
+            return;
+        }
+        added = first.max(2.0 * added);
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::models::tests::through;
     use super::*;
 
     #[test]
     fn the_kink_of_two_parabolas_is_found() {
         // y^2 and (y - 1)^2 meet at 1/2.
-        let steps: Vec<Vec<f64>> = [0.0, 1.0, -1.0].map(|y| vec![y]).into();
-        let values: Vec<[f64; 2]> = steps.iter().map(|y| [y[0] * y[0], (y[0] - 1.0).powi(2)]).collect();
-        let rows: Vec<&[f64]> = values.iter().map(|v| &v[..]).collect();
-        let models = Models::through(&steps, &rows, &vec![DMatrix::zeros(1, 1); 2], 1.0).unwrap();
+        let models = through(&[[0.0], [1.0], [-1.0]], |y| vec![y[0] * y[0], (y[0] - 1.0).powi(2)]);
         let shape = Shape { spacing: vec![0.0], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
-        let aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
-        let y = aim.least(&models, &[-1.0], &[1.0]).unwrap();
-        let promise = aim.worth_of(&aim.promise(&models, &y));
-        assert!((y[0] - 0.5).abs() < 1e-3 && (promise - 0.75).abs() < 1e-3, "{y} {promise}");
+        let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
+        let mut least = Least::default();
+        assert!(least.find(&mut aim, &models, &[-1.0], &[1.0]));
+        let promise = aim.worth_of(&aim.promise(models.constants(), least.values()));
+        assert!((least.step()[0] - 0.5).abs() < 1e-3 && (promise - 0.75).abs() < 1e-3, "{:?} {promise}", least.step());
     }
 
     #[test]
     fn a_step_goes_along_a_curved_constraint() {
         // -y_1 inside the circle y'y <= 1, from its edge at (0, 1): the slopes alone lead straight off the circle.
-        let f = |y: &[f64]| [-y[0], y[0] * y[0] + y[1] * y[1]];
+        let f = |y: &[f64]| vec![-y[0], y[0] * y[0] + y[1] * y[1]];
         let steps = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.7, 0.6]];
-        let steps: Vec<Vec<f64>> = steps.map(|y| y.to_vec()).into();
-        let values: Vec<[f64; 2]> = steps.iter().map(|y| f(&[y[0], y[1] + 1.0])).collect();
-        let rows: Vec<&[f64]> = values.iter().map(|v| &v[..]).collect();
-        let models = Models::through(&steps, &rows, &vec![DMatrix::zeros(2, 2); 2], 1.0).unwrap();
+        let models = through(&steps, |y| f(&[y[0], y[1] + 1.0]));
         let usages = vec![(Usage::Minimise, 1.0), (Usage::Inequality, 1.0)];
         let shape = Shape { spacing: vec![0.0; 2], rows: usages, ..Shape::default() };
         let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
-        let y = aim.least_violating(&models, &[-1.0; 2], &[1.0; 2]).unwrap();
-        assert!(y[0] > 0.15 && f(&[y[0], y[1] + 1.0])[1] < 1.0 + 1e-3, "{y}");
+        let mut least = Least::default();
+        assert!(least.find(&mut aim, &models, &[-1.0; 2], &[1.0; 2]));
+        let y = least.step();
+        assert!(y[0] > 0.15 && f(&[y[0], y[1] + 1.0])[1] < 1.0 + 1e-3, "{y:?}");
+    }
+
+    #[test]
+    fn a_matrix_becomes_convex_by_a_multiple_of_the_identity() {
+        let mut factor = Vec::new();
+        let convex = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
+        let mut matrix = convex.clone();
+        make_convex(&mut matrix, &mut factor);
+        assert_eq!(matrix, convex);
+        // Eigenvalues 3 and -1: at least 1 has to be added, and no more than twice as much is.
+        let indefinite = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+        for size in [1.0, 1e-300, 1e300] {
+            let mut matrix = &indefinite * size;
+            make_convex(&mut matrix, &mut factor);
+            let added = matrix / size - &indefinite;
+            assert!(added[(0, 0)] > 1.0 && added[(0, 0)] <= 2.1, "{added}");
+            assert!((&added - DMatrix::identity(2, 2) * added[(0, 0)]).amax() < 1e-12);
+        }
+        let mut matrix = DMatrix::from_element(2, 2, f64::NAN);
+        make_convex(&mut matrix, &mut factor);
+        assert_eq!(matrix, DMatrix::identity(2, 2) * 1e-9);
     }
 }

@@ -1,23 +1,28 @@
 //! Pattern search: polls a pattern of points around the best one, and shrinks it where nothing is better.
 
 mod barrier;
+mod known;
 mod least;
 mod models;
 mod pattern;
+mod points;
 
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::definite::factored;
 use crate::epigraph::Rows;
 use crate::sqp::SqpOptions;
 use crate::start::usable_start;
 use crate::texture::{Texture, texture};
 use barrier::{Barrier, Promise};
-use least::Aim;
+use known::Known;
+use least::{Aim, Least};
 use models::Models;
 use pattern::Pattern;
+use points::Points;
 
 /// Mesh-adaptive direct search on the unit box: points of a pattern are polled around the best one, those first that look
 /// best; a better one is taken, else the pattern shrinks and turns. Ends at a mesh size. Needs no slopes: for criteria that
@@ -63,7 +68,7 @@ impl SolverOptions for PatternSearchOptions {
     const KIND: &'static str = "pattern-search";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(PatternSearch { options: self.clone(), state: None })
+        Box::new(PatternSearch { options: self.clone(), state: None, room: Room::default() })
     }
 }
 
@@ -71,12 +76,34 @@ impl SolverOptions for PatternSearchOptions {
 struct PatternSearch {
     options: PatternSearchOptions,
     state: Option<State>,
+    room: Room,
+}
+
+/// Models of the rows, and memory that is used again from step to step.
+#[derive(Default)]
+struct Room {
+    models: Models,
+    least: Least,
+    /// The known points around the best one, with their distances.
+    near: Vec<(f64, usize)>,
+    /// The trust region inside the box, in steps of the models.
+    low: Vec<f64>,
+    high: Vec<f64>,
+    /// Unknown points of the pattern, and their order: what looks best first.
+    pattern: Points,
+    order: Vec<(f64, usize)>,
+    /// Points to ask for.
+    asked: Points,
+    step: Vec<f64>,
+    values: Vec<f64>,
+    /// Where the search stood.
+    before: Vec<f64>,
+    spread: Vec<f64>,
 }
 
 struct State {
     best: Evaluation,
-    /// Points with values: what the models go through.
-    known: Vec<(Vec<f64>, Vec<f64>)>,
+    known: Known,
     /// Size of the pattern and of the trust region.
     radius: f64,
     /// What the models promised at last.
@@ -99,8 +126,6 @@ struct State {
     batch: usize,
     random: Stream,
     spacing: Vec<f64>,
-    /// Curvature of every row as the last models have it, per unit of the box.
-    curvatures: Vec<DMatrix<f64>>,
     /// Whether the first pattern has been polled.
     polled: bool,
     /// What follows a kink inside a row, while it does.
@@ -121,11 +146,13 @@ impl Solver for PatternSearch {
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let best = oracle.evaluate(&[start])?.pop().expect("one point, one answer");
         let n = best.point.len();
-        let scaled = best.scaled.clone().expect("the start is usable");
-        let none = vec![vec![0.0; n]; scaled.len()];
+        let scaled = best.scaled.as_ref().expect("the start is usable");
+        let mut known = Known::new(n, scaled.len());
+        known.remember(&best.point, scaled);
+        self.room = Room { models: Models::new(n, scaled.len()), ..Room::default() };
         self.state = Some(State {
-            unit: Rows::new(oracle.shape(), &scaled, &none).unit(),
-            known: vec![(best.point.clone(), scaled)],
+            unit: Rows::of_values(oracle.shape(), scaled).unit(),
+            known,
             turned_at: None,
             radius: self.options.size,
             failures: 0,
@@ -138,7 +165,6 @@ impl Solver for PatternSearch {
             batch: self.options.batch,
             random: oracle.stream("pattern-search"),
             spacing: oracle.shape().spacing.clone(),
-            curvatures: vec![DMatrix::zeros(n, n); none.len()],
             polled: false,
             slopes: None,
             followed_from: f64::INFINITY,
@@ -149,7 +175,8 @@ impl Solver for PatternSearch {
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        let Self { options, state, room } = self;
+        let Some(state) = state else { return Ok(Progress::Stalled) };
         if state.best.point.is_empty() {
             return Ok(Progress::Converged);
         }
@@ -158,23 +185,23 @@ impl Solver for PatternSearch {
             return Ok(Progress::Continue);
         }
         state.forget();
-        if state.polled && state.search(oracle)? {
+        if state.polled && state.search(oracle, room)? {
             return Ok(Progress::Continue);
         }
-        let better = state.poll(oracle)?;
+        let better = state.poll(oracle, room)?;
         state.polled = true;
         if better || state.meets_kink(oracle)? {
             return Ok(Progress::Continue);
         }
-        if state.radius > self.options.tolerance && !state.is_on_finest_grid() {
-            state.shrink(self.options.shrink);
+        if state.radius > options.tolerance && !state.is_on_finest_grid() {
+            state.shrink(options.shrink);
             return Ok(Progress::Continue);
         }
         // The models still promise what the problem does not keep: a kink inside a row. Again, with more turns on the way.
         let worth = state.worth(oracle.shape(), &state.best);
         if state.promised > KEPT * worth.abs() && state.restarts < RESTARTS {
             state.restarts += 1;
-            state.radius = self.options.shrink * self.options.size;
+            state.radius = options.shrink * options.size;
             return Ok(Progress::Continue);
         }
         // An infeasible end: on from the best feasible point, or with a wide pattern from here.
@@ -184,7 +211,7 @@ impl Solver for PatternSearch {
                 state.adopt(best);
             }
             state.followed_from = f64::INFINITY;
-            state.radius = self.options.size;
+            state.radius = options.size;
             return Ok(Progress::Continue);
         }
         Ok(if state.best.merit.is_feasible() { Progress::Converged } else { Progress::Stalled })
@@ -238,10 +265,8 @@ impl State {
     }
 
     fn remember(&mut self, answer: &Evaluation) {
-        if let Some(scaled) = &answer.scaled
-            && !self.knows(&answer.point)
-        {
-            self.known.push((answer.point.clone(), scaled.clone()));
+        if let Some(scaled) = &answer.scaled {
+            self.known.remember(&answer.point, scaled);
         }
     }
 
@@ -252,52 +277,51 @@ impl State {
         self.remember(best);
     }
 
-    /// Forgets the oldest points where there are many: few of them are near.
+    /// Forgets the oldest points where there are many.
     fn forget(&mut self) {
-        let n = self.best.point.len();
-        if self.known.len() > MEMORY + 2 * (n + 1) * (n + 2) {
-            self.known.drain(..MEMORY);
-            self.remember(&self.best.clone());
+        if self.known.forget()
+            && let Some(scaled) = &self.best.scaled
+        {
+            self.known.remember(&self.best.point, scaled);
         }
     }
 
     /// Tries where the models are least, and beside it as much of the pattern as fills a batch; `true` while that is worth
     /// going on with, `false` when it is time to poll.
-    fn search(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        if self.spacing.iter().all(|&spacing| spacing > 0.0) {
+    fn search(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
+        if self.spacing.iter().all(|&spacing| spacing > 0.0) || !self.fit(room) {
             return Ok(false);
         }
-        let near = self.near();
-        let Some(models) = self.models(&near) else { return Ok(false) };
         let shape = oracle.shape();
-        let (low, high) = self.room();
         let mut aim = self.aim(shape);
-        let step = aim.least_violating(&models, &low, &high);
+        let found = self.least(&mut aim, room);
         if aim.penalty > self.penalty {
             self.penalty = aim.penalty;
             // Nothing is worth what it was.
             self.followed_from = f64::INFINITY;
         }
-        let Some(y) = step else {
+        if !found {
             self.promised = 0.0;
-            return self.mend(oracle, &near, &models);
-        };
-        let promise = aim.promise(&models, &y);
+            return self.mend(oracle, room);
+        }
+        let promise = aim.promise(room.models.constants(), room.least.values());
         let weight = aim.weight();
         self.promised = aim.worth_of(&promise);
-        let length = self.radius * y.amax();
+        let y = room.least.step();
+        let length = self.radius * y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         let floor = 1e-14 * self.worth(shape, &self.best).abs();
-        let point = self.at(&y);
-        if self.promised <= floor || point == self.best.point {
-            return self.mend(oracle, &near, &models);
+        room.asked.clear();
+        room.asked.push(self.at(y));
+        if self.promised <= floor || room.asked.as_slice()[0] == self.best.point {
+            return self.mend(oracle, room);
         }
-        let points = self.filled(shape, Some(&models), vec![point]);
+        self.fill(shape, true, room);
         let before = self.best.merit;
-        let moved = self.visit(oracle, &points, Some(promise))?;
+        let moved = self.visit(oracle, room.asked.as_slice(), Some(promise))?;
         let ratio = if moved { promise.kept(&before, &self.best.merit, weight) } else { 0.0 };
         if moved {
             self.failures = 0;
-        } else if self.mend(oracle, &near, &models)? {
+        } else if self.mend(oracle, room)? {
             // The models were wrong for want of points.
             return Ok(true);
         } else {
@@ -311,90 +335,125 @@ impl State {
         Ok(self.failures < FAILURES)
     }
 
-    /// Adds a point in the direction in which those around the best one tell least; `false` where they tell enough.
-    fn mend(&mut self, oracle: &mut dyn Oracle, near: &[usize], models: &Models) -> Result<bool, Halt> {
-        let Some(direction) = self.unknown_direction(near) else { return Ok(false) };
+    /// Lays models through the known points around the best one; `false` where these do not determine them.
+    fn fit(&self, room: &mut Room) -> bool {
+        self.known.near(&self.best.point, self.radius, &mut room.near);
+        room.models.fit(&self.known, &room.near, &self.best.point, self.radius)
+    }
+
+    /// Finds where the models are least, in the trust region and inside the box.
+    fn least(&self, aim: &mut Aim, room: &mut Room) -> bool {
+        room.low.clear();
+        room.low.extend(self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)));
+        room.high.clear();
+        room.high.extend(self.best.point.iter().map(|u| ((1.0 - u) / self.radius).min(1.0)));
+        room.least.find(aim, &room.models, &room.low, &room.high)
+    }
+
+    /// Adds a point in the direction in which those that the models go through tell least; `false` where they tell enough.
+    fn mend(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
+        let Room { models, step, values, spread, .. } = &mut *room;
+        if !find_unknown(models, self.best.point.len(), spread, step) {
+            return Ok(false);
+        }
         let aim = self.aim(oracle.shape());
-        let [up, down] = [1.0, -1.0].map(|side| &direction * side);
-        let point = if aim.worth(&models.values(&up)) <= aim.worth(&models.values(&down)) { up } else { down };
-        let point = self.at(&point);
-        if self.knows(&point) {
+        let mut worth = |step: &[f64]| {
+            models.values(step, values);
+            aim.worth(values)
+        };
+        let there = worth(step);
+        step.iter_mut().for_each(|d| *d = -*d);
+        if there <= worth(step) {
+            step.iter_mut().for_each(|d| *d = -*d);
+        }
+        room.asked.clear();
+        room.asked.push(self.at(&room.step));
+        if self.known.contains(&room.asked.as_slice()[0]) {
             return Ok(false);
         }
         let count = self.known.len();
-        let points = self.filled(oracle.shape(), Some(models), vec![point]);
-        self.visit(oracle, &points, None)?;
+        self.fill(oracle.shape(), true, room);
+        self.visit(oracle, room.asked.as_slice(), None)?;
         Ok(self.known.len() > count)
     }
 
     /// Polls the pattern, what looks best first; `true` when a point was better.
-    fn poll(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+    fn poll(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
         self.failures = 0;
-        let models = self.models(&self.near());
-        let points = self.pattern(oracle.shape(), models.as_ref());
+        let fitted = self.fit(room);
+        self.lay_pattern(oracle.shape(), fitted, room);
+        let count = room.order.len();
         // The first pattern is what the first models go through.
-        let batch = if self.polled { self.batch } else { 0 };
-        let batch = if batch == 0 { points.len().max(1) } else { batch };
-        for points in points.chunks(batch) {
-            let before = self.best.point.clone();
-            if self.visit(oracle, points, None)? {
-                self.run_on(oracle, before)?;
+        let batch = if self.polled && self.batch > 0 { self.batch } else { count.max(1) };
+        for first in (0..count).step_by(batch) {
+            room.asked.clear();
+            for &(_, i) in &room.order[first..(first + batch).min(count)] {
+                room.asked.push(room.pattern.as_slice()[i].iter().copied());
+            }
+            room.before.clone_from(&self.best.point);
+            if self.visit(oracle, room.asked.as_slice(), None)? {
+                self.run_on(oracle, room)?;
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// Points, and as much of the pattern as fills a batch, what looks best first.
-    fn filled(&self, shape: &Shape, models: Option<&Models>, mut points: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        if points.len() < self.batch {
-            let room = self.batch - points.len();
-            points.extend(self.pattern(shape, models).into_iter().take(room));
+    /// Adds as much of the pattern to what is asked as fills a batch, what looks best first.
+    fn fill(&self, shape: &Shape, fitted: bool, room: &mut Room) {
+        if room.asked.len() < self.batch {
+            self.lay_pattern(shape, fitted, room);
+            for &(_, i) in room.order.iter().take(self.batch - room.asked.len()) {
+                room.asked.push(room.pattern.as_slice()[i].iter().copied());
+            }
         }
-        points
     }
 
-    /// Unknown points of the pattern around the best one, what looks best to the models first.
-    fn pattern(&self, shape: &Shape, models: Option<&Models>) -> Vec<Vec<f64>> {
-        let mut points = self.pattern.points(&self.best.point, self.radius, &self.spacing);
-        points.retain(|point| !self.knows(point));
-        let Some(models) = models else { return points };
+    /// Collects the unknown points of the pattern around the best one, in the order in which they look best to the models, if
+    /// these were fitted.
+    fn lay_pattern(&self, shape: &Shape, fitted: bool, room: &mut Room) {
+        let Room { models, pattern, order, step, values, .. } = room;
+        self.pattern.points(&self.best.point, self.radius, &self.spacing, pattern);
         let aim = self.aim(shape);
-        let worth = |point: &Vec<f64>| {
-            let y = DVector::from_fn(point.len(), |j, _| (point[j] - self.best.point[j]) / self.radius);
-            aim.worth(&models.values(&y))
-        };
-        let mut ordered: Vec<(f64, Vec<f64>)> = points.into_iter().map(|point| (worth(&point), point)).collect();
-        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ordered.into_iter().map(|(_, point)| point).collect()
-    }
-
-    fn knows(&self, point: &[f64]) -> bool {
-        self.known.iter().any(|(known, _)| known == point)
+        order.clear();
+        for (i, point) in pattern.as_slice().iter().enumerate() {
+            if self.known.contains(point) {
+                continue;
+            }
+            if fitted {
+                step.clear();
+                step.extend(point.iter().zip(&self.best.point).map(|(a, b)| (a - b) / self.radius));
+                models.values(step, values);
+                order.push((aim.worth(values), i));
+            } else {
+                order.push((0.0, i));
+            }
+        }
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
     /// Goes on in the direction of a success, twice as far each time, while that is better.
-    fn run_on(&mut self, oracle: &mut dyn Oracle, mut before: Vec<f64>) -> Result<(), Halt> {
+    fn run_on(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<(), Halt> {
         loop {
-            let here = self.best.point.clone();
-            let mut step = DVector::from_fn(here.len(), |j, _| 2.0 * (here[j] - before[j]) / self.radius);
-            let mut points: Vec<Vec<f64>> = Vec::new();
+            let here = &self.best.point;
+            room.step.clear();
+            room.step.extend(here.iter().zip(&room.before).map(|(here, before)| 2.0 * (here - before) / self.radius));
+            room.asked.clear();
             for _ in 0..self.batch.max(1) {
-                points.push(self.at(&step));
-                step *= 2.0;
+                room.asked.push(self.at(&room.step));
+                room.asked.keep_last(|point, before| point != here && before.last().is_none_or(|last| point != last));
+                room.step.iter_mut().for_each(|step| *step *= 2.0);
             }
-            points.retain(|point| *point != here);
-            points.dedup();
-            if points.is_empty() {
+            if room.asked.len() == 0 {
                 return Ok(());
             }
+            room.before.clone_from(here);
             // At the edge of the box few are left.
-            let models = if points.len() < self.batch { self.models(&self.near()) } else { None };
-            let points = self.filled(oracle.shape(), models.as_ref(), points);
-            if !self.visit(oracle, &points, None)? {
+            let fitted = room.asked.len() < self.batch && self.fit(room);
+            self.fill(oracle.shape(), fitted, room);
+            if !self.visit(oracle, room.asked.as_slice(), None)? {
                 return Ok(());
             }
-            before = here;
         }
     }
 
@@ -453,71 +512,47 @@ impl State {
     }
 
     /// The point after a step of the models, inside the box and on the grids.
-    fn at(&self, y: &DVector<f64>) -> Vec<f64> {
+    fn at(&self, y: &[f64]) -> impl Iterator<Item = f64> {
         let coordinate = |j: usize| {
             let u = (self.best.point[j] + self.radius * y[j]).clamp(0.0, 1.0);
             let spacing = self.spacing[j];
             if spacing > 0.0 { ((u / spacing).round() * spacing).min(1.0) } else { u }
         };
-        (0..y.len()).map(coordinate).collect()
-    }
-
-    /// The trust region inside the box, in steps of the models.
-    fn room(&self) -> (Vec<f64>, Vec<f64>) {
-        let low = self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)).collect();
-        let high = self.best.point.iter().map(|u| ((1.0 - u) / self.radius).min(1.0)).collect();
-        (low, high)
-    }
-
-    /// Known points around the best one, the nearest first: at most as many as determine a quadratic.
-    fn near(&self) -> Vec<usize> {
-        let n = self.best.point.len();
-        let distance = |i: usize| {
-            self.known[i].0.iter().zip(&self.best.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / self.radius
-        };
-        let mut near: Vec<(f64, usize)> = (0..self.known.len()).map(|i| (distance(i), i)).collect();
-        near.retain(|(distance, _)| *distance <= REACH);
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.truncate((n + 1) * (n + 2) / 2);
-        near.into_iter().map(|(_, i)| i).collect()
-    }
-
-    fn step_to(&self, i: usize) -> Vec<f64> {
-        self.known[i].0.iter().zip(&self.best.point).map(|(a, b)| (a - b) / self.radius).collect()
-    }
-
-    /// Models through the given points, whose curvature changes as little as can be from the last ones.
-    fn models(&mut self, near: &[usize]) -> Option<Models> {
-        if near.len() <= self.best.point.len() {
-            return None;
-        }
-        let steps: Vec<Vec<f64>> = near.iter().map(|&i| self.step_to(i)).collect();
-        let values: Vec<&[f64]> = near.iter().map(|&i| self.known[i].1.as_slice()).collect();
-        let models = Models::through(&steps, &values, &self.curvatures, self.radius)?;
-        self.curvatures = models.curvatures(self.radius);
-        Some(models)
-    }
-
-    /// The direction in which the points around the best one are least spread; `None` where they are spread in all.
-    fn unknown_direction(&self, near: &[usize]) -> Option<DVector<f64>> {
-        let n = self.best.point.len();
-        let mut spread = DMatrix::zeros(n, n);
-        for &i in near {
-            let y = DVector::from_vec(self.step_to(i));
-            let shortened = &y / y.amax().max(1.0);
-            spread.ger(1.0, &shortened, &shortened, 1.0);
-        }
-        let eigen = SymmetricEigen::new(spread);
-        let least = eigen.eigenvalues.imin();
-        (eigen.eigenvalues[least] < SPREAD).then(|| eigen.eigenvectors.column(least).into_owned())
+        (0..y.len()).map(coordinate)
     }
 }
 
-/// Points that are forgotten at a time.
-const MEMORY: usize = 200;
+/// Finds the direction in which the points that the models go through are least spread, by inverse iteration; `false` where
+/// they are spread in all.
+fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mut Vec<f64>) -> bool {
+    let spread = |spread: &mut DMatrix<f64>| {
+        spread.fill_diagonal(NO_SPREAD);
+        for y in models.steps() {
+            let length = y.iter().fold(1.0_f64, |most, y| most.max(y.abs()));
+            let y = DVectorView::from_slice(y, n);
+            spread.ger(1.0 / (length * length), &y, &y, 1.0);
+        }
+    };
+    direction.clear();
+    direction.extend((0..n).map(|j| 1.0 / (1.0 + j as f64)));
+    let mut direction = DVectorViewMut::from_slice(direction, n);
+    let least = factored(memory, n, spread, |factor| {
+        let mut least = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            factor.solve_mut(&mut direction);
+            least = 1.0 / direction.norm();
+            direction *= least;
+        }
+        least
+    });
+    least.is_some_and(|least| least < SPREAD)
+}
 
-/// Points within this many radii take part in the models.
-const REACH: f64 = 2.5;
+/// Inverse iterations for an unknown direction.
+const ITERATIONS: usize = 20;
+
+/// What is added to sums of squared steps, so that none is 0.
+const NO_SPREAD: f64 = 1e-9;
 
 /// A sum of squared steps along a direction below which that direction is unknown.
 const SPREAD: f64 = 0.3;

@@ -4,6 +4,8 @@ use mops_core::Stream;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
+use super::points::Points;
+
 /// Directions of a pattern, one per column, turned at random.
 #[derive(Debug, Clone)]
 pub struct Pattern {
@@ -22,23 +24,29 @@ impl Pattern {
         let v = DVector::from_fn(n, |_, _| random.random_range(-1.0..1.0));
         let norm = v.norm_squared();
         if norm > 1e-6 {
-            self.basis = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / norm);
+            self.reflect(&v, norm);
         }
     }
 
     /// Turns the pattern so that its first direction is the given one.
     pub fn align(&mut self, direction: &DVector<f64>) {
-        let n = self.basis.nrows();
         let mut v = direction / direction.norm();
         v[0] += v[0].signum();
         let norm = v.norm_squared();
-        self.basis = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / norm);
+        self.reflect(&v, norm);
     }
 
-    /// Points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid away.
-    pub fn points(&self, centre: &[f64], size: f64, spacing: &[f64]) -> Vec<Vec<f64>> {
+    /// Becomes `I - 2 v v' / norm`.
+    fn reflect(&mut self, v: &DVector<f64>, norm: f64) {
+        self.basis.fill_with_identity();
+        self.basis.ger(-2.0 / norm, v, v, 1.0);
+    }
+
+    /// Collects points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid
+    /// away.
+    pub fn points(&self, centre: &[f64], size: f64, spacing: &[f64], points: &mut Points) {
         let n = centre.len();
-        let mut points = Vec::with_capacity(2 * n);
+        points.clear();
         for j in 0..n {
             for side in [1.0, -1.0] {
                 let at = |i: usize| {
@@ -52,10 +60,9 @@ impl Pattern {
                     };
                     (centre[i] + by).clamp(0.0, 1.0)
                 };
-                points.push((0..n).map(at).collect());
+                points.push((0..n).map(at));
+                points.keep_last(|point, _| point != centre);
             }
         }
-        points.retain(|point| point != centre);
-        points
     }
 }

@@ -8,6 +8,8 @@ use crate::epigraph::Rows;
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
     pieces: Vec<(Vec<f64>, Rows)>,
+    /// Memory of those that are forgotten.
+    spare: Vec<(Vec<f64>, Rows)>,
 }
 
 impl Bundle {
@@ -16,26 +18,31 @@ impl Bundle {
     }
 
     pub fn clear(&mut self) {
-        self.pieces.clear();
+        self.spare.append(&mut self.pieces);
     }
 
-    /// Keeps a piece, and forgets the oldest ones.
-    pub fn remember(&mut self, point: Vec<f64>, rows: Rows) {
+    /// Keeps a piece; where there are many, the oldest one gives way.
+    pub fn remember(&mut self, point: &[f64], rows: &Rows) {
         let most = 2 * (point.len() + 1);
-        self.pieces.push((point, rows));
-        self.pieces.drain(..self.pieces.len().saturating_sub(most));
+        if self.pieces.len() == most {
+            self.pieces.rotate_left(1);
+        } else {
+            self.pieces.push(self.spare.pop().unwrap_or_default());
+        }
+        let (at, piece) = self.pieces.last_mut().expect("there is room for one");
+        at.clear();
+        at.extend_from_slice(point);
+        piece.clone_from(rows);
     }
 
     /// Forgets pieces farther away than `reach`: they describe nothing here.
     pub fn keep_near(&mut self, here: &[f64], reach: f64) {
-        self.pieces.retain(|(point, _)| point.iter().zip(here).all(|(a, b)| (a - b).abs() <= reach));
+        let is_far = |(point, _): &mut (Vec<f64>, Rows)| point.iter().zip(here).any(|(a, b)| (*a - b).abs() > reach);
+        self.spare.extend(self.pieces.extract_if(.., is_far));
     }
 
     /// Adds the pieces, as they extend to here, to the rows here.
-    pub fn add_to(&self, rows: &mut Rows, here: &[f64]) {
-        for (point, pieces) in &self.pieces {
-            let back: Vec<f64> = here.iter().zip(point).map(|(a, b)| a - b).collect();
-            rows.add_pieces(pieces, &back);
-        }
+    pub fn add_to(&self, rows: &Rows, here: &[f64], all: &mut Rows) {
+        all.gather(rows, here, &self.pieces);
     }
 }

@@ -1,6 +1,6 @@
 //! The curvature of the Lagrangian, from the slopes at the two ends of a step.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// A damped BFGS matrix: positive definite whatever the curvature.
 ///
@@ -13,6 +13,10 @@ pub(super) struct Hessian {
     first: f64,
     /// Whether it has seen a step yet.
     learned: bool,
+    /// `B s`.
+    bs: DVector<f64>,
+    /// The damped change of the slope.
+    damped: DVector<f64>,
 }
 
 /// Curvature along a step that is left at least, as a share of what was there. N.B.: Powell takes 0.2.
@@ -26,7 +30,8 @@ impl Hessian {
     /// about a tenth of the box; several hold the step where they meet.
     pub fn new(n: usize, objectives: usize) -> Self {
         let first = if objectives > 1 { 1.0 } else { 10.0 };
-        Self { matrix: DMatrix::identity(n, n) * first, first, learned: false }
+        let [bs, damped] = [DVector::zeros(n), DVector::zeros(n)];
+        Self { matrix: DMatrix::identity(n, n) * first, first, learned: false, bs, damped }
     }
 
     pub fn matrix(&self) -> &DMatrix<f64> {
@@ -53,24 +58,28 @@ impl Hessian {
     }
 
     /// Takes in a step and the change of the Lagrangian's slope along it.
-    pub fn learn(&mut self, s: &DVector<f64>, y: &DVector<f64>) {
+    pub fn learn(&mut self, s: &[f64], y: &[f64]) {
+        let n = s.len();
+        let (s, y) = (DVectorView::from_slice(s, n), DVectorView::from_slice(y, n));
         // Across a kink or a jump the slopes change at once: that is no curvature.
         if s.norm() < 1e-12 || y.norm() > LARGEST * s.norm() {
             return;
         }
         if !self.learned {
-            let scale = if s.dot(y) > 0.0 { y.norm_squared() / s.dot(y) } else { self.first };
-            self.matrix = DMatrix::identity(s.len(), s.len()) * scale.clamp(1e-2, 1e4);
+            let scale = if s.dot(&y) > 0.0 { y.norm_squared() / s.dot(&y) } else { self.first };
+            self.matrix.fill_with_identity();
+            self.matrix *= scale.clamp(1e-2, 1e4);
             self.learned = true;
         }
-        let bs = &self.matrix * s;
-        let sbs = s.dot(&bs);
-        let sy = s.dot(y);
+        let Self { matrix, bs, damped, .. } = self;
+        bs.gemv(1.0, matrix, &s, 0.0);
+        let sbs = s.dot(bs);
+        let sy = s.dot(&y);
         let theta = if sy >= DAMPED * sbs { 1.0 } else { (1.0 - DAMPED) * sbs / (sbs - sy) };
-        let r = y * theta + &bs * (1.0 - theta);
-        self.matrix.ger(1.0 / s.dot(&r), &r, &r, 1.0);
-        self.matrix.ger(-1.0 / sbs, &bs, &bs, 1.0);
-        if self.matrix.iter().any(|h| !h.is_finite() || h.abs() > 1e9) {
+        damped.zip_zip_apply(&y, bs, |r, y, bs| *r = y * theta + bs * (1.0 - theta));
+        matrix.ger(1.0 / s.dot(damped), damped, damped, 1.0);
+        matrix.ger(-1.0 / sbs, bs, bs, 1.0);
+        if matrix.iter().any(|h| !h.is_finite() || h.abs() > 1e9) {
             self.forget();
         }
     }

@@ -5,13 +5,13 @@ mod hessian;
 mod scaling;
 mod state;
 
-use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::epigraph::{Direction, Rows};
 use crate::start::usable_start;
-use state::{SATISFIED, State, Tried};
+use state::{SATISFIED, State};
 
 /// Sequential quadratic programming for `min max_i f_i` with constraints: every row is linearised on its own, so that
 /// the kink where two criteria meet is an ordinary solution, and a step solves the epigraph subproblem inside a trust
@@ -52,7 +52,7 @@ impl SolverOptions for SqpOptions {
     const KIND: &'static str = "sqp";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Sqp { options: self.clone(), state: None })
+        Box::new(Sqp { options: self.clone(), state: None, room: Room::default() })
     }
 }
 
@@ -60,6 +60,18 @@ impl SolverOptions for SqpOptions {
 struct Sqp {
     options: SqpOptions,
     state: Option<State>,
+    room: Room,
+}
+
+/// Memory that is used again from step to step.
+#[derive(Default)]
+struct Room {
+    /// The step and its second-order correction.
+    directions: [Direction; 2],
+    /// The rows after them, without slopes.
+    tried: [Rows; 2],
+    /// The rows of a linearisation.
+    linear: Rows,
 }
 
 /// The radius below which the trust region has collapsed: a kink or a jump that no model describes.
@@ -98,39 +110,42 @@ impl Solver for Sqp {
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         // Every point tried has failed, or there is nothing to change.
-        let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
+        let Self { options, state, room } = self;
+        let Some(state) = state else { return Ok(Progress::Stalled) };
         if state.at.at.point.is_empty() {
             return Ok(Progress::Converged);
         }
         state.iterations += 1;
-        if state.iterations > self.options.max_iterations {
+        if state.iterations > options.max_iterations {
             return Ok(Progress::Stalled);
         }
         state.rescale();
-        let Some(direction) = state.direction() else {
+        let [direction, second] = &mut room.directions;
+        if state.direction(direction).is_none() {
             // The Hessian may be at fault: forget it, once.
             if !state.hessian.has_learned() {
                 return Ok(Progress::Stalled);
             }
             state.hessian.forget();
             return Ok(Progress::Continue);
-        };
+        }
         let merit = state.merit(&state.rows);
         let promised =
             merit - (direction.level + state.penalty * direction.violation + state.hessian.half(&direction.step));
         let size = state.scaling.objective().min(1.0) + state.rows.objective().abs();
-        let tolerance = self.options.tolerance * size;
+        let tolerance = options.tolerance * size;
         if promised <= tolerance || state.radius < SMALLEST_RADIUS {
-            return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= tolerance));
+            return Ok(state.conclude(direction, merit, tolerance, options.radius, promised <= tolerance));
         }
         let before = [state.rows.objective(), state.rows.violation()];
-        let tried = state.try_corrected(oracle, &direction, merit, promised)?;
-        state.judge(oracle, tried, &direction, merit, promised)?;
+        let tried = state.try_corrected(oracle, direction, second, &mut room.tried, merit, promised)?;
+        let tried = tried.as_ref().map(|evaluation| (evaluation, &room.tried[0]));
+        state.judge(oracle, tried, &mut room.linear, direction, merit, promised)?;
         let change = (before[0] - state.rows.objective()).abs().max((before[1] - state.rows.violation()).abs());
         state.idle = if change <= IDLE * size { state.idle + 1 } else { 0 };
         if state.idle >= MOST_IDLE {
             state.idle = 0;
-            return Ok(state.conclude(&direction, merit, tolerance, self.options.radius, promised <= 1e4 * tolerance));
+            return Ok(state.conclude(direction, merit, tolerance, options.radius, promised <= 1e4 * tolerance));
         }
         Ok(Progress::Continue)
     }
@@ -152,40 +167,48 @@ impl State {
         if optimal && self.rows.violation() <= 10.0 * SATISFIED { Progress::Converged } else { Progress::Stalled }
     }
 
-    /// The step, or its second-order correction where the step fails and the correction is better.
+    /// Tries the step, and its second-order correction where the step fails; the rows of what is better come first in `rows`.
     fn try_corrected(
         &mut self,
         oracle: &mut dyn Oracle,
         direction: &Direction,
+        second: &mut Direction,
+        rows: &mut [Rows; 2],
         merit: f64,
         promised: f64,
-    ) -> Result<Option<Tried>, Halt> {
-        let tried = self.try_step(oracle, &direction.step)?;
-        let Some((_, rows)) = &tried else { return Ok(tried) };
-        let reached = self.merit(rows);
-        if reached <= merit - 0.1 * promised {
+    ) -> Result<Option<Evaluation>, Halt> {
+        let tried = self.try_step(oracle, &direction.step, &mut rows[0])?;
+        if tried.is_none() {
+            return Ok(None);
+        }
+        let reached = self.merit(&rows[0]);
+        if reached <= merit - 0.1 * promised || self.correction(&rows[0], &direction.step, second).is_none() {
             return Ok(tried);
         }
-        let Some(second) = self.correction(rows, &direction.step) else { return Ok(tried) };
-        let again = self.try_step(oracle, &second.step)?;
-        Ok(if again.as_ref().is_some_and(|(_, again)| self.merit(again) < reached) { again } else { tried })
+        let again = self.try_step(oracle, &second.step, &mut rows[1])?;
+        if again.is_none() || self.merit(&rows[1]) >= reached {
+            return Ok(tried);
+        }
+        rows.swap(0, 1);
+        Ok(again)
     }
 
-    /// Accepts or rejects what was tried, and changes the trust region.
+    /// Accepts or rejects what was tried, and changes the trust region; `linear` is room for the rows of a linearisation.
     fn judge(
         &mut self,
         oracle: &mut dyn Oracle,
-        tried: Option<Tried>,
+        tried: Option<(&Evaluation, &Rows)>,
+        linear: &mut Rows,
         direction: &Direction,
         merit: f64,
         promised: f64,
     ) -> Result<(), Halt> {
         let length = direction.step.iter().fold(0.0_f64, |a, d| a.max(d.abs()));
-        let achieved = tried.as_ref().map_or(f64::NEG_INFINITY, |(_, rows)| merit - self.merit(rows));
+        let achieved = tried.map_or(f64::NEG_INFINITY, |(_, rows)| merit - self.merit(rows));
         // A step that is better in objective or violation may also be measured from the worst of the two iterates before:
         // the path along a curved constraint is not held up by a merit that rises a little.
         let before = self.reference() - merit;
-        let trades = tried.as_ref().is_some_and(|(_, rows)| {
+        let trades = tried.is_some_and(|(_, rows)| {
             rows.objective() < self.rows.objective() || rows.violation() < self.rows.violation()
         });
         let relaxed = if trades { (achieved + before) / (promised + before) } else { f64::NEG_INFINITY };
@@ -210,13 +233,13 @@ impl State {
             self.radius *= 0.25;
             return Ok(());
         };
-        let rows = self.rows_of(oracle.shape(), &at);
+        self.linearise(oracle.shape(), &at, linear);
         if improves {
-            self.move_to(at, rows, direction);
-        } else if length <= KINK && turns(&self.rows, &rows) {
-            self.bundle.remember(at.at.point.clone(), rows);
+            self.move_to(at, linear, direction);
+        } else if length <= KINK && turns(&self.rows, linear) {
+            self.bundle.remember(&at.at.point, linear);
         } else {
-            self.learn(&at.at.point.clone(), &rows, direction);
+            self.learn(&at.at.point, linear, direction);
         }
         Ok(())
     }

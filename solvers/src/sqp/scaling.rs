@@ -41,11 +41,10 @@ impl Scaling {
         rows.equalities.iter_mut().zip(&mut self.equalities).for_each(renew);
     }
 
-    pub fn apply(&self, mut rows: Rows) -> Rows {
+    pub fn apply(&self, rows: &mut Rows) {
         rows.objectives.iter_mut().for_each(|row| times(row, self.objective));
         rows.inequalities.iter_mut().zip(&self.inequalities).for_each(|(row, &factor)| times(row, factor));
         rows.equalities.iter_mut().zip(&self.equalities).for_each(|(row, &factor)| times(row, factor));
-        rows
     }
 }
 

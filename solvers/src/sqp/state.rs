@@ -1,7 +1,6 @@
 //! Where the iteration stands: the rows at the best point, their curvature, the trust region and the penalty.
 
 use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape};
-use nalgebra::DVector;
 
 use super::bundle::Bundle;
 use super::hessian::Hessian;
@@ -31,19 +30,33 @@ pub(super) struct State {
     /// Merit at which the memory was last thrown away.
     pub fresh_at: Option<f64>,
     subproblem: Subproblem,
+    room: Room,
 }
 
-/// A point that was tried, with its rows, which have no slopes.
-pub(super) type Tried = (Evaluation, Rows);
+/// Memory that is used again from step to step.
+#[derive(Default)]
+struct Room {
+    low: Vec<f64>,
+    high: Vec<f64>,
+    /// The rows here with the pieces of the bundle.
+    all: Rows,
+    corrected: Rows,
+    /// The point that is tried.
+    point: Vec<f64>,
+    step: Vec<f64>,
+    /// Slopes of the Lagrangian before and after a step.
+    slopes: [Vec<f64>; 2],
+}
 
 impl State {
     pub fn new(shape: &Shape, at: Linearisation, radius: f64) -> Self {
         let n = at.at.point.len();
-        let rows = Rows::of(shape, &at);
+        let mut rows = Rows::of(shape, &at);
         let scaling = Scaling::of(&rows);
         let hessian = Hessian::new(n, rows.objectives.len());
+        scaling.apply(&mut rows);
         Self {
-            rows: scaling.apply(rows),
+            rows,
             scaling,
             bundle: Bundle::default(),
             at,
@@ -56,6 +69,7 @@ impl State {
             before: [None; 2],
             fresh_at: None,
             subproblem: Subproblem::default(),
+            room: Room::default(),
         }
     }
 
@@ -75,85 +89,107 @@ impl State {
         before.fold(self.merit(&self.rows), f64::max)
     }
 
-    /// The step of the subproblem; the penalty grows until the violation falls as far as the trust region allows.
-    pub fn direction(&mut self) -> Option<Direction> {
+    /// Finds the step of the subproblem; the penalty grows until the violation falls as far as the trust region allows.
+    #[must_use]
+    pub fn direction(&mut self, into: &mut Direction) -> Option<()> {
         let violation = self.rows.violation();
-        let mut direction = self.solve(None, self.penalty)?;
-        if direction.violation > SATISFIED {
+        self.solve(self.penalty, into)?;
+        if into.violation > SATISFIED {
             // What can be reached if nothing but the constraints counts.
-            let least = self.solve(None, LARGEST_PENALTY)?.violation;
-            let wanted = least + 0.1 * (violation - least).max(0.0) + SATISFIED;
-            while direction.violation > wanted && self.penalty < LARGEST_PENALTY {
+            let mut most = Direction::default();
+            self.solve(LARGEST_PENALTY, &mut most)?;
+            let wanted = most.violation + 0.1 * (violation - most.violation).max(0.0) + SATISFIED;
+            while into.violation > wanted && self.penalty < LARGEST_PENALTY {
                 self.penalty *= 10.0;
-                direction = self.solve(None, self.penalty)?;
+                self.solve(self.penalty, into)?;
             }
         }
         // Exactness: the penalty must exceed the sum of the multipliers.
-        let sum = direction.multipliers.of_constraints();
-        if direction.violation <= SATISFIED && 1.5 * sum > self.penalty {
+        let sum = into.multipliers.of_constraints();
+        if into.violation <= SATISFIED && 1.5 * sum > self.penalty {
             self.penalty = 2.0 * sum;
         }
-        Some(direction)
+        Some(())
     }
 
-    /// The step to where the same slopes lead from the values at a point that was tried.
-    pub fn correction(&mut self, tried: &Rows, step: &[f64]) -> Option<Direction> {
-        let corrected = self.rows.corrected(tried, step);
-        self.solve(Some(&corrected), self.penalty)
+    /// Finds the step to where the same slopes lead from the values at a point that was tried.
+    #[must_use]
+    pub fn correction(&mut self, tried: &Rows, step: &[f64], into: &mut Direction) -> Option<()> {
+        let mut corrected = std::mem::take(&mut self.room.corrected);
+        corrected.correct(&self.rows, tried, step);
+        std::mem::swap(&mut corrected, &mut self.rows);
+        let found = self.solve(self.penalty, into);
+        std::mem::swap(&mut corrected, &mut self.rows);
+        self.room.corrected = corrected;
+        found
     }
 
-    /// The step for the rows here, or for others in their place.
-    fn solve(&mut self, others: Option<&Rows>, penalty: f64) -> Option<Direction> {
-        let Self { at, rows, bundle, hessian, subproblem, radius, .. } = self;
+    /// Finds the step for the rows.
+    fn solve(&mut self, penalty: f64, into: &mut Direction) -> Option<()> {
+        let Self { at, rows, bundle, hessian, subproblem, radius, room, .. } = self;
         let here = &at.at.point;
-        let low: Vec<f64> = here.iter().map(|u| (-u).max(-*radius)).collect();
-        let high: Vec<f64> = here.iter().map(|u| (1.0 - u).min(*radius)).collect();
-        let rows = others.unwrap_or(rows);
+        room.low.clear();
+        room.low.extend(here.iter().map(|u| (-u).max(-*radius)));
+        room.high.clear();
+        room.high.extend(here.iter().map(|u| (1.0 - u).min(*radius)));
         if bundle.is_empty() {
-            return subproblem.solve(rows, hessian.matrix(), &low, &high, penalty);
+            return subproblem.solve(rows, hessian.matrix(), &room.low, &room.high, penalty, into);
         }
-        let mut all = rows.clone();
-        bundle.add_to(&mut all, here);
-        subproblem.solve(&all, hessian.matrix(), &low, &high, penalty)
+        bundle.add_to(rows, here, &mut room.all);
+        subproblem.solve(&room.all, hessian.matrix(), &room.low, &room.high, penalty, into)
     }
 
-    pub fn rows_of(&self, shape: &Shape, at: &Linearisation) -> Rows {
-        self.scaling.apply(Rows::of(shape, at))
+    /// Reads the rows of a linearisation.
+    pub fn linearise(&self, shape: &Shape, at: &Linearisation, rows: &mut Rows) {
+        rows.linearise(shape, at);
+        self.scaling.apply(rows);
     }
 
-    /// The rows after a step, without slopes; `None` where the point fails.
-    pub fn try_step(&self, oracle: &mut dyn Oracle, step: &[f64]) -> Result<Option<Tried>, Halt> {
-        let point: Vec<f64> = self.at.at.point.iter().zip(step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
-        let evaluation = oracle.evaluate(&[point])?.pop().expect("one point, one answer");
-        let shape = oracle.shape();
-        let none = vec![Vec::new(); shape.rows.len()];
-        let rows = evaluation.scaled.as_ref().map(|scaled| self.scaling.apply(Rows::new(shape, scaled, &none)));
-        Ok(rows.map(|rows| (evaluation, rows)))
+    /// Evaluates the point after a step, and reads its rows, which have no slopes; `None` where the point fails.
+    pub fn try_step(
+        &mut self,
+        oracle: &mut dyn Oracle,
+        step: &[f64],
+        rows: &mut Rows,
+    ) -> Result<Option<Evaluation>, Halt> {
+        let point = &mut self.room.point;
+        point.clear();
+        point.extend(self.at.at.point.iter().zip(step).map(|(u, d)| (u + d).clamp(0.0, 1.0)));
+        let evaluation = oracle.evaluate(std::slice::from_ref(point))?.pop().expect("one point, one answer");
+        let Some(scaled) = &evaluation.scaled else { return Ok(None) };
+        rows.evaluate(oracle.shape(), scaled);
+        self.scaling.apply(rows);
+        Ok(Some(evaluation))
     }
 
     /// Takes in what the slopes at another point say of the curvature.
     pub fn learn(&mut self, point: &[f64], rows: &Rows, direction: &Direction) {
-        let s = DVector::from_fn(point.len(), |j, _| point[j] - self.at.at.point[j]);
-        let before = DVector::from_vec(self.rows.lagrangian_slope(&direction.multipliers));
-        let after = DVector::from_vec(rows.lagrangian_slope(&direction.multipliers));
-        self.hessian.learn(&s, &(after - before));
+        let Room { step, slopes: [before, after], .. } = &mut self.room;
+        step.clear();
+        step.extend(point.iter().zip(&self.at.at.point).map(|(there, here)| there - here));
+        self.rows.lagrangian_slope(&direction.multipliers, before);
+        rows.lagrangian_slope(&direction.multipliers, after);
+        after.iter_mut().zip(before).for_each(|(after, before)| *after -= *before);
+        self.hessian.learn(step, after);
     }
 
-    pub fn move_to(&mut self, at: Linearisation, rows: Rows, direction: &Direction) {
-        self.learn(&at.at.point, &rows, direction);
+    /// Moves to another point; its rows change places with those here.
+    pub fn move_to(&mut self, at: Linearisation, rows: &mut Rows, direction: &Direction) {
+        self.learn(&at.at.point, rows, direction);
         self.before = [Some([self.rows.objective(), self.rows.violation()]), self.before[0]];
         // What was here is a piece too as long as kinks are near.
         if !self.bundle.is_empty() {
-            self.bundle.remember(self.at.at.point.clone(), self.rows.clone());
+            self.bundle.remember(&self.at.at.point, &self.rows);
         }
         self.bundle.keep_near(&at.at.point, 10.0 * self.radius);
         self.at = at;
-        self.rows = rows;
+        std::mem::swap(&mut self.rows, rows);
     }
 
     /// How far the slope of the Lagrangian is from 0 where no bound is in the way.
     pub fn residual(&self, direction: &Direction) -> f64 {
-        let slope = self.rows.lagrangian_slope(&direction.multipliers);
+        let mut slope = Vec::new();
+        self.rows.lagrangian_slope(&direction.multipliers, &mut slope);
         let held = |(u, s): &(&f64, &f64)| (**u <= 0.0 && **s > 0.0) || (**u >= 1.0 && **s < 0.0);
         self.at.at.point.iter().zip(&slope).filter(|pair| !held(pair)).fold(0.0, |most, (_, s)| most.max(s.abs()))
     }
