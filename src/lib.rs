@@ -55,7 +55,7 @@ pub use mops_discrepancy as discrepancy;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
-pub use solve::{Keeping, Options, Solved, Unsuitable, solve};
+pub use solve::{Keeping, Options, Solved, Unsuitable, solve, suits};
 
 /// Everything that comes with mops: models, criteria, solvers and studies.
 pub fn catalogue() -> Catalogue {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use mops_core::{
     Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Problem, Record, Run,
-    SlopesReport, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
+    SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -89,12 +89,6 @@ pub struct Solved {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unsuitable(pub Mistake);
 
-impl From<String> for Unsuitable {
-    fn from(why: String) -> Self {
-        Self(Mistake::here(why))
-    }
-}
-
 impl std::fmt::Display for Unsuitable {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0.message)?;
@@ -116,6 +110,27 @@ pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solve
     threads.expect("threads can be started").install(|| tasks::perform(study, options, watch))
 }
 
+/// Whether a solver can do the task of a study, if that is to search.
+///
+/// # Errors
+/// The solver cannot treat the problem.
+pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), Unsuitable> {
+    match study.task {
+        Task::Design | Task::Calibration | Task::Pareto => {
+            accepted(solver, &Problem::new(Arc::new(study.clone()))).map(|_| ())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A solver that can treat the problem.
+fn accepted(choice: &SolverChoice, problem: &Problem) -> Result<Box<dyn Solver>, Unsuitable> {
+    let solver = choice.make();
+    let why = |why: String| Unsuitable(Mistake::new(choice.kind, why).within("solver"));
+    solver.accepts(problem.shape()).map_err(why)?;
+    Ok(solver)
+}
+
 /// Searches for the best point, and concludes.
 ///
 /// # Errors
@@ -123,8 +138,7 @@ pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solve
 pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
-    let mut solver = options.solver.make();
-    solver.accepts(problem.shape()).map_err(Unsuitable::from)?;
+    let mut solver = accepted(&options.solver, &problem)?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
     let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch).keeping(store);
     let stop = run.solve(solver.as_mut(), begin.unwrap_or(&problem.start()));

@@ -615,6 +615,9 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             ),
             called("an unknown solver", &["run", "study.toml", "--solver", "levenberg"]),
             called("a solver that cannot do it", &["run", "pid-design", "--quiet", "--solver", "levenberg-marquardt"]),
+            Case::new("a solver of the study that cannot do it", &broken(DESIGN, "[cases]", "[solver.nsga2]\n[cases]"))
+                .called(&["check", "study.toml"]),
+            called("no budget", &["bench", "minimax", "--budget", "0"]),
             called("no evaluation", &["run", "study.toml", "--max-evaluations", "0"]),
             called("an unknown tuner", &["simulate", "study.toml", "--at", "Tx=1"]),
             called("a tuner without a value", &["simulate", "study.toml", "--at", "Ti"]),

@@ -10,6 +10,7 @@ use super::places::places;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, print};
+use crate::solve::suits;
 
 /// What is checked.
 #[derive(Args)]
@@ -21,6 +22,7 @@ pub(super) struct Arguments {
 pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let file = open(catalogue, &arguments.study)?;
     let study = &file.study;
+    suits(study, &file.solver).map_err(|why| file.locate(&why.0))?;
     let mut text = format!("{}: ok\n\n", study.name);
     let start = study.start();
     let tuners = study.tuners.iter().zip(&start).map(|(t, &start)| {

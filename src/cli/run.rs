@@ -186,7 +186,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         Ok(solved) => solved,
         Err(why) => {
             opened.into_iter().for_each(Opened::withdraw);
-            return Err(refused(&why.0, &file).into());
+            return Err(refused(&why.0, &file, options.solver.kind).into());
         }
     };
     let told = opened.as_ref().map(|opened| keep::told(&start, known, opened)).unwrap_or_default();
@@ -241,9 +241,10 @@ fn watch(study: &Study, options: &Options) -> Result<Page, Trouble> {
     Ok(page)
 }
 
-/// A study that cannot be treated; the place is shown where there is one.
-fn refused(why: &Mistake, file: &StudyFile) -> Diagnostic {
-    if why.path.is_empty() {
+/// A study that cannot be treated; the place is shown where there is one: the file does not name a solver of the command line.
+fn refused(why: &Mistake, file: &StudyFile, solver: &str) -> Diagnostic {
+    let of_command_line = solver != file.solver.kind && why.path.first().is_some_and(|key| key == "solver");
+    if why.path.is_empty() || of_command_line {
         Diagnostic { help: why.help.clone(), ..Diagnostic::new(why.message.clone()) }
     } else {
         file.locate(why)

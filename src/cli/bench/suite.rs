@@ -16,8 +16,8 @@ use crate::bench::solvers::{self, Plan, Results, Row, Score, Suite, data_profile
 /// What can be said to the benchmark of a suite.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Solver to measure; may be given more than once.
-    #[arg(long = "solver", value_name = "SOLVER", default_value = "auto")]
+    /// Solvers to measure, separated by commas or given one by one.
+    #[arg(long = "solver", value_name = "SOLVER", default_value = "auto", value_delimiter = ',')]
     solvers: Vec<String>,
     /// Give solvers exact slopes instead of differences.
     #[arg(long)]
@@ -26,8 +26,8 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Evaluations a run may take, for every variable and one more; as is usual for the suite where absent.
-    #[arg(long, value_name = "NUMBER")]
-    budget: Option<usize>,
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
+    budget: Option<u32>,
     /// Relative noise that is added to all values; what is reached is judged without it.
     #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
     noise: f64,
@@ -92,7 +92,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         solvers: arguments.solvers.iter().map(|name| solver(catalogue, name)).collect::<Result<_, _>>()?,
         slope: if arguments.gradients { Slope::Exact } else { Slope::Differences },
         seeds: arguments.seeds,
-        budget: arguments.budget,
+        budget: arguments.budget.map(|budget| usize::try_from(budget).unwrap_or(usize::MAX)),
         noise: arguments.noise,
         only: problems(suite, &arguments.problems)?,
     };
@@ -130,8 +130,9 @@ fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic>
 
 fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> {
     let all: Vec<String> = suite.subjects().iter().map(|subject| subject.name().to_owned()).collect();
+    let asked: Vec<String> = asked.iter().map(|name| name.trim().to_owned()).collect();
     match asked.iter().find(|name| !all.contains(name)) {
-        None => Ok(asked.to_vec()),
+        None => Ok(asked),
         Some(unknown) => {
             let help = suggestion(unknown, all.iter().map(String::as_str));
             Err(Diagnostic::new(format!("`{}` has no problem `{unknown}`", suite.name)).with_help(help))
