@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Problem, Record, Run,
-    SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
+    Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Place, Problem, Record, Run,
+    Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -110,25 +110,28 @@ pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solve
     threads.expect("threads can be started").install(|| tasks::perform(study, options, watch))
 }
 
-/// Whether a solver can do the task of a study, if that is to search.
+/// Whether a solver can do the task of a study, as far as that is known without a simulation.
 ///
 /// # Errors
 /// The solver cannot treat the problem.
 pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), Unsuitable> {
-    match study.task {
-        Task::Design | Task::Calibration | Task::Pareto => {
-            accepted(solver, &Problem::new(Arc::new(study.clone()))).map(|_| ())
-        }
-        _ => Ok(()),
-    }
+    if solves(study) { accepts(solver, solver.make().as_ref(), &Problem::outline(study)) } else { Ok(()) }
 }
 
-/// A solver that can treat the problem.
-fn accepted(choice: &SolverChoice, problem: &Problem) -> Result<Box<dyn Solver>, Unsuitable> {
-    let solver = choice.make();
-    let why = |why: String| Unsuitable(Mistake::new(choice.kind, why).within("solver"));
-    solver.accepts(problem.shape()).map_err(why)?;
-    Ok(solver)
+fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<(), Unsuitable> {
+    solver.accepts(shape).map_err(|why| Unsuitable(Mistake::new(choice.kind, why).within("solver")))
+}
+
+/// Whether the task of a study needs a solver.
+pub(crate) fn solves(study: &Study) -> bool {
+    match study.task {
+        Task::Design | Task::Calibration | Task::Pareto => true,
+        Task::Excitation | Task::Diagnosis => false,
+        Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
+        Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
+        Task::WorstCase => study.tasks.worst_case.at == Place::Optimum,
+        Task::MonteCarlo => study.tasks.monte_carlo.at == Place::Optimum,
+    }
 }
 
 /// Searches for the best point, and concludes.
@@ -138,7 +141,8 @@ fn accepted(choice: &SolverChoice, problem: &Problem) -> Result<Box<dyn Solver>,
 pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
-    let mut solver = accepted(&options.solver, &problem)?;
+    let mut solver = options.solver.make();
+    accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
     let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch).keeping(store);
     let stop = run.solve(solver.as_mut(), begin.unwrap_or(&problem.start()));

@@ -106,12 +106,8 @@ impl Problem {
     /// The problem of the study itself: tuners of the study and of its calibration cases; the other cases are watched.
     pub fn new(study: Arc<Study>) -> Self {
         let base = study.start();
-        let counts = |case: Option<usize>| case.is_none_or(|c| study.cases[c].role() == Role::Calibration);
-        let active =
-            (0..study.tuners.len()).filter(|&i| study.tuners[i].active && counts(study.tuners[i].case)).collect();
-        Self::with(study, active, base, |row, study| {
-            if study.case_of(row).role() == Role::Calibration { row.usage } else { Usage::Monitor }
-        })
+        let active = active(&study);
+        Self::with(study, active, base, own_usage)
     }
 
     /// The problem of one case alone: its free start values are active, all else keeps the values in `tuners`. This is how
@@ -131,12 +127,16 @@ impl Problem {
         problem
     }
 
+    /// Sizes and kinds of the problem of a study, as far as they are known without a simulation: a sum is taken for one of
+    /// squares, of one residual.
+    pub fn outline(study: &Study) -> Shape {
+        let residuals = usize::from(study.objective == Objective::Sum);
+        Shape { residuals, ..shape(study, &active(study), own_usage) }
+    }
+
     fn with(study: Arc<Study>, active: Vec<usize>, base: Vec<f64>, usage: impl Fn(&Row, &Study) -> Usage) -> Self {
-        let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, &study), row.weight)).collect();
-        let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
+        let shape = shape(&study, &active, usage);
         let jobs: Vec<usize> = (0..study.jobs.len()).collect();
-        let points = if study.task == Task::Pareto { study.tasks.pareto.points } else { 0 };
-        let shape = Shape { spacing, rows, objective: study.objective, points, residuals: 0 };
         let counts = |job: &usize| {
             (study.rows.iter().zip(&shape.rows)).any(|(row, (usage, _))| row.job == *job && *usage != Usage::Monitor)
         };
@@ -459,6 +459,25 @@ impl Problem {
         }
         all
     }
+}
+
+/// The active tuners of a study and of its calibration cases, as indices.
+fn active(study: &Study) -> Vec<usize> {
+    let counts = |case: Option<usize>| case.is_none_or(|c| study.cases[c].role() == Role::Calibration);
+    (0..study.tuners.len()).filter(|&i| study.tuners[i].active && counts(study.tuners[i].case)).collect()
+}
+
+/// What a row of a study is for: in cases that are no calibration data it is watched.
+fn own_usage(row: &Row, study: &Study) -> Usage {
+    if study.case_of(row).role() == Role::Calibration { row.usage } else { Usage::Monitor }
+}
+
+/// Sizes and kinds, without residuals.
+fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage) -> Shape {
+    let rows = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
+    let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
+    let points = if study.task == Task::Pareto { study.tasks.pareto.points } else { 0 };
+    Shape { spacing, rows, objective: study.objective, points, residuals: 0 }
 }
 
 /// Values of a job as they are kept where nobody needs the terms of sums of squares.

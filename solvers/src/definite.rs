@@ -1,9 +1,10 @@
-//! Factors of positive definite matrices.
+//! Factors of positive definite matrices: nalgebra's for large systems, and one that keeps its memory where a matrix turns out
+//! not to be positive definite.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
 /// Factors a symmetric matrix of size `n`, of which `fill` gives the lower triangle over zeros, and hands the factor on; `None`
-/// where the matrix is not positive definite. The memory is used again.
+/// where the matrix is not positive definite. The memory is used again, unless that is so.
 pub fn factored<T>(
     memory: &mut Vec<f64>,
     n: usize,
@@ -35,4 +36,26 @@ pub fn cholesky(l: &mut [f64], n: usize, stride: usize) -> bool {
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_factors_are_the_same() {
+        let entries = [4.0, 2.0, 0.4, 2.0, 3.0, 1.0, 0.4, 1.0, 5.0];
+        let mut memory = Vec::new();
+        let matrix = DMatrix::from_row_slice(3, 3, &entries);
+        let l = factored(&mut memory, 3, |m| m.copy_from(&matrix), |factor| factor.l()).unwrap();
+        let mut own = entries;
+        assert!(cholesky(&mut own, 3, 3));
+        for k in 0..3 {
+            assert!((k..3).all(|i| (own[3 * k + i] - l[(i, k)]).abs() < 1e-15));
+        }
+        let small = factored(&mut memory, 1, |m| m[(0, 0)] = 9.0, |factor| factor.l()).unwrap();
+        assert_eq!(small[(0, 0)], 3.0);
+        assert!(factored(&mut memory, 2, |m| m[(0, 0)] = 1.0, |_| ()).is_none());
+        assert!(!cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2) && !cholesky(&mut [f64::NAN], 1, 1));
+    }
 }

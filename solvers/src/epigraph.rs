@@ -72,8 +72,7 @@ impl Subproblem {
         &mut self,
         rows: &Rows,
         hessian: &DMatrix<f64>,
-        low: &[f64],
-        high: &[f64],
+        [low, high]: [&[f64]; 2],
         penalty: f64,
         into: &mut Direction,
     ) -> Option<()> {
@@ -191,7 +190,7 @@ mod tests {
 
     fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
         let mut direction = Direction::default();
-        Subproblem::default().solve(rows, hessian, low, high, penalty, &mut direction).map(|()| direction)
+        Subproblem::default().solve(rows, hessian, [low, high], penalty, &mut direction).map(|()| direction)
     }
 
     fn linear(value: f64, slope: &[f64]) -> Linear {

@@ -181,7 +181,7 @@ impl Cone {
         // A penalty above every multiplier keeps the direction inside the cone.
         let mut direction = Direction::default();
         let hessian = DMatrix::identity(n, n) * 1e-6;
-        Subproblem::default().solve(&cone, &hessian, &low, &high, 1e4, &mut direction)?;
+        Subproblem::default().solve(&cone, &hessian, [&low, &high], 1e4, &mut direction)?;
         let promised = (0..self.objectives.len()).map(|k| self.fall(k, &direction.step)).sum();
         // The sum of the rows, and what keeps each of them from rising.
         let held = &direction.multipliers.inequalities;

@@ -14,6 +14,7 @@ pub struct Linear {
     pub slope: Vec<f64>,
 }
 
+// N.B.: a derived `clone_from` asks for memory anew.
 impl Clone for Linear {
     fn clone(&self) -> Self {
         Self { value: self.value, slope: self.slope.clone() }
@@ -153,24 +154,20 @@ impl Rows {
     }
 
     /// Becomes the rows of a point `here`, with those of other points as they extend to it; none above the row here, so that no
-    /// piece contradicts what is known.
-    pub fn gather(&mut self, rows: &Self, here: &[f64], pieces: &[(Vec<f64>, Self)]) {
-        let gather = |all: &mut Vec<Linear>, rows: &[Linear], of: fn(&Self) -> &[Linear]| {
+    /// piece contradicts what is known. `back` is room for the way from a point to here.
+    pub fn gather(&mut self, rows: &Self, here: &[f64], pieces: &[(Vec<f64>, Self)], back: &mut Vec<f64>) {
+        let groups = [(&mut self.objectives, &rows.objectives), (&mut self.inequalities, &rows.inequalities)];
+        for (all, rows) in groups {
             all.resize_with(rows.len() * (1 + pieces.len()), Linear::default);
-            let (first, others) = all.split_at_mut(rows.len());
-            first.clone_from_slice(rows);
-            let pieces =
-                pieces.iter().flat_map(|(there, piece)| of(piece).iter().zip(rows).map(move |pair| (there, pair)));
-            for (row, (there, (piece, highest))) in others.iter_mut().zip(pieces) {
-                row.clone_from(piece);
-                let back = here.iter().zip(there).map(|(here, there)| here - there);
-                row.value += piece.slope.iter().zip(back).map(|(slope, back)| slope * back).sum::<f64>();
-                row.value = row.value.min(highest.value);
-            }
-        };
-        gather(&mut self.objectives, &rows.objectives, |piece| &piece.objectives);
-        gather(&mut self.inequalities, &rows.inequalities, |piece| &piece.inequalities);
+            all[..rows.len()].clone_from_slice(rows);
+        }
         self.equalities.clone_from(&rows.equalities);
+        for (k, (there, piece)) in pieces.iter().enumerate() {
+            back.clear();
+            back.extend(here.iter().zip(there).map(|(here, there)| here - there));
+            extend(&mut self.objectives, &rows.objectives, &piece.objectives, (k, back));
+            extend(&mut self.inequalities, &rows.inequalities, &piece.inequalities, (k, back));
+        }
     }
 
     /// Becomes the rows of a second-order correction: the slopes of `here`, with the values of `there` minus those slopes along
@@ -188,6 +185,15 @@ impl Rows {
     }
 }
 
+/// Puts the pieces of one more point, the `k`-th, after the rows.
+fn extend(all: &mut [Linear], rows: &[Linear], pieces: &[Linear], (k, back): (usize, &[f64])) {
+    let begin = (k + 1) * rows.len();
+    for ((row, piece), highest) in all[begin..].iter_mut().zip(pieces).zip(rows) {
+        row.clone_from(piece);
+        row.value = (piece.value + dot(&piece.slope, back)).min(highest.value);
+    }
+}
+
 /// Makes the row at `index`, which may be the first beyond the last, a function that is 0.
 fn clear(rows: &mut Vec<Linear>, index: usize, n: usize) {
     if index == rows.len() {
@@ -197,4 +203,65 @@ fn clear(rows: &mut Vec<Linear>, index: usize, n: usize) {
     row.value = 0.0;
     row.slope.clear();
     row.slope.resize(n, 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(objective: Objective, usages: &[Usage]) -> Shape {
+        let rows = usages.iter().map(|usage| (*usage, 2.0)).collect();
+        Shape { spacing: vec![0.0; 4], rows, objective, ..Shape::default() }
+    }
+
+    fn filled(rows: &mut Rows, shape: &Shape) {
+        let scaled: Vec<f64> = (1_u8..).map(f64::from).take(shape.rows.len()).collect();
+        rows.fill(shape, &scaled, 4, |i, weight, sum| sum.iter_mut().for_each(|s| *s += weight * scaled[i]));
+    }
+
+    #[test]
+    fn a_second_filling_forgets_the_first() {
+        use Usage::{Equality, Inequality, Minimise, Monitor};
+        let shapes = [
+            shape(Objective::Max, &[Minimise, Inequality, Minimise, Equality, Inequality, Monitor]),
+            shape(Objective::Sum, &[Minimise, Minimise, Equality, Minimise]),
+            shape(Objective::Max, &[Monitor]),
+            shape(Objective::Max, &[Inequality, Inequality]),
+        ];
+        let mut rows = Rows::default();
+        for shape in &shapes {
+            filled(&mut rows, shape);
+            let mut fresh = Rows::default();
+            filled(&mut fresh, shape);
+            assert_eq!(format!("{rows:?}"), format!("{fresh:?}"));
+        }
+        filled(&mut rows, &shapes[1]);
+        assert_eq!(
+            (rows.objectives.len(), rows.objectives[0].value, &rows.objectives[0].slope),
+            (1, 14.0, &vec![14.0; 4])
+        );
+        assert_eq!((rows.inequalities.len(), rows.equalities.len(), rows.equalities[0].value), (0, 1, 2.0));
+        filled(&mut rows, &shapes[2]);
+        assert_eq!((rows.objectives.len(), rows.objectives[0].value), (1, 0.0));
+    }
+
+    #[test]
+    fn pieces_extend_to_here_and_stay_below_the_row() {
+        let line = |value: f64, slope: [f64; 4]| Rows {
+            objectives: vec![Linear { value, slope: slope.to_vec() }],
+            ..Rows::default()
+        };
+        let here = line(1.0, [0.0; 4]);
+        let steep = (vec![0.0; 4], line(0.0, [1.0, 2.0, 3.0, 4.0]));
+        let flat = (vec![1.0, 0.0, 0.0, 0.0], line(0.5, [0.0, 0.1, 0.1, 0.1]));
+        let (mut all, mut back) = (Rows::default(), Vec::new());
+        all.gather(&here, &[1.0; 4], &[steep.clone(), flat.clone()], &mut back);
+        let values: Vec<f64> = all.objectives.iter().map(|row| row.value).collect();
+        assert_eq!(values[..2], [1.0, 1.0]);
+        assert!((values[2] - 0.8).abs() < 1e-15);
+        all.gather(&here, &[1.0; 4], &[flat], &mut back);
+        assert_eq!((all.objectives.len(), all.objectives[1].value), (2, values[2]));
+        all.gather(&here, &[1.0; 4], &[], &mut back);
+        assert_eq!(all.objectives.len(), 1);
+    }
 }

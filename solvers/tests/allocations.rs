@@ -72,13 +72,15 @@ fn no_member_of_a_generation_asks_for_memory() {
     }
 }
 
-/// Steps of `sqp` and of `pattern-search` use the same memory again; what they ask for is room that grows with the pieces, the
-/// points and the directions that they keep.
+/// Steps of `sqp` and of `pattern-search` use the same memory again. What they ask for is room that grows with the pieces and the
+/// points that they keep, a few blocks where a pattern shrinks, and an `sqp` of its own where `pattern-search` meets a kink.
 #[test]
-fn no_step_asks_for_memory() {
+fn steps_ask_for_next_to_no_memory() {
     for (kind, suite, problem, most) in [
         ("sqp", "minimax", "Polak3", 0.05),
         ("sqp", "minimax", "EQUIL", 0.05),
+        ("sqp", "hock-schittkowski", "HS106", 0.5),
+        ("pattern-search", "hock-schittkowski", "HS106", 1.0),
         ("pattern-search", "minimax", "Polak3", 0.5),
         ("pattern-search", "minimax", "EQUIL", 1.0),
         ("pattern-search", "more-wild", "11 n6 m31", 0.5),

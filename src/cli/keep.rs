@@ -7,9 +7,8 @@ use mops_core::file::StudyFile;
 use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
 use super::Trouble;
-use super::run::solves;
 use super::study::{Home, StudyArguments};
-use crate::solve::{Keeping, Options, Solved, Unsuitable, solve};
+use crate::solve::{Keeping, Options, Solved, Unsuitable, solve, solves};
 use crate::store::{Identity, Keeper, Opened, Refusal, RunRow, RunState, Start, row};
 
 /// What a run begins with.

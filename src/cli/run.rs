@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Place, Study, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Study, Task, Watch, suggestion};
 
 use super::progress::Progress;
 use super::remains::{leave, leave_study};
@@ -14,7 +14,7 @@ use super::study::{StudyArguments, home, open_as, without_settings};
 use super::{Trouble, cannot_write, diagnosis, findings, keep, print, tables};
 use crate::diagnosis::Original;
 use crate::report::Report;
-use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved};
+use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solves};
 use crate::store::{Keeper, Opened, Start};
 use crate::watch::{Both, Page};
 
@@ -269,18 +269,6 @@ fn introduction(study: &Study, options: &Options) -> String {
         study.cases.len(),
         if solves(study) { options.solver.kind } else { "none (nothing is solved)" }
     )
-}
-
-/// Whether the task of a study needs a solver.
-pub(super) fn solves(study: &Study) -> bool {
-    match study.task {
-        Task::Design | Task::Calibration | Task::Pareto => true,
-        Task::Excitation | Task::Diagnosis => false,
-        Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
-        Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
-        Task::WorstCase => study.tasks.worst_case.at == Place::Optimum,
-        Task::MonteCarlo => study.tasks.monte_carlo.at == Place::Optimum,
-    }
 }
 
 /// Everything a run leaves behind; result.json comes first, so that it is there whatever happens to the rest.

@@ -60,14 +60,14 @@ pub struct StudyFile {
     pub content: serde_json::Value,
     /// The data files that were read, by the names the study has for them, with a digest of their bytes.
     pub data: Vec<(String, String)>,
+    text: Arc<Text>,
 }
 
 impl StudyFile {
     /// Leads a mistake that showed only when the study was run back to its place in the text.
     pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
-        let text = Text::new(&self.source.name, &self.source.text, &[]);
-        match text.parse() {
-            Ok(root) => root.locate(mistake),
+        match self.text.parse() {
+            Ok(root) => self.text.settle(root.locate(mistake)),
             Err(_) => Diagnostic { help: mistake.help.clone(), ..Diagnostic::new(mistake.message.clone()) },
         }
     }
@@ -84,11 +84,11 @@ pub fn read(
     settings: &[String],
     files: &dyn Files,
 ) -> Result<StudyFile, Diagnostic> {
-    let text = Text::new(name, text, settings);
+    let text = Arc::new(Text::new(name, text, settings));
     read_text(catalogue, &text, files).map_err(|mistake| text.settle(mistake))
 }
 
-fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
+fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
     let files = &content::Listed::new(files);
     let tables = ["study", "models", "tuners", "cases", "experiments", "criteria", "solver"];
@@ -128,7 +128,15 @@ fn read_text(catalogue: &Catalogue, text: &Text, files: &dyn Files) -> Result<St
     let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     study.notes.extend(tasks::unused(&root, study.task));
     let (content, data) = (content::of(root.value()), files.digests());
-    Ok(StudyFile { study, solver, max_evaluations, source: Arc::clone(text.source()), content, data })
+    Ok(StudyFile {
+        study,
+        solver,
+        max_evaluations,
+        source: Arc::clone(text.source()),
+        content,
+        data,
+        text: Arc::clone(text),
+    })
 }
 
 /// The one key of a table that is not among the common ones, as a kind of the catalogue.

@@ -71,3 +71,28 @@ impl Known {
         near.truncate((n + 1) * (n + 2) / 2);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_are_forgotten_and_the_nearest_found() {
+        let mut known = Known::new(1, 1);
+        let count = MEMORY + 13;
+        for i in (0..count).chain(0..3) {
+            #[allow(clippy::cast_precision_loss)]
+            let x = i as f64;
+            known.remember(&[x], &[10.0 * x]);
+        }
+        assert_eq!(known.len(), count);
+        assert!(known.forget() && !known.forget());
+        assert_eq!((known.len(), known.point(0)[0], known.values(12)[0]), (13, 200.0, 2120.0));
+        assert!(known.contains(&[212.0]) && !known.contains(&[199.0]));
+        let mut near = Vec::new();
+        known.near(&[205.2], 1.0, &mut near);
+        assert_eq!(near.iter().map(|(_, i)| *i).collect::<Vec<_>>(), [5, 6, 4]);
+        known.near(&[199.0], 1.0, &mut near);
+        assert_eq!(near, [(1.0, 0), (2.0, 1)]);
+    }
+}

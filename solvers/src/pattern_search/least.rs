@@ -9,7 +9,6 @@ use crate::definite::cholesky;
 use crate::epigraph::{Direction, Multipliers, Rows, Subproblem};
 
 /// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
-#[derive(Clone, Copy)]
 pub struct Aim<'a> {
     /// Sizes and kinds.
     pub shape: &'a Shape,
@@ -116,7 +115,7 @@ impl Least {
     ///
     /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
     pub fn find(&mut self, aim: &mut Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
-        let found = self.search(aim, models, low, high);
+        let mut found = self.search(aim, models, low, high);
         let mut left = self.violation(aim.shape);
         if left == 0.0 {
             return found;
@@ -130,7 +129,6 @@ impl Least {
             self.swap_first();
             return found;
         }
-        let mut found = found;
         while left > wanted && aim.penalty < LARGEST_PENALTY {
             aim.penalty *= 10.0;
             found = self.search(aim, models, low, high);
@@ -154,7 +152,7 @@ impl Least {
     fn search(&mut self, aim: &Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
         let n = low.len();
         let Self { y, values, there, values_there, rows, rows_there, corrected, hessian, factor, .. } = self;
-        let Self { multipliers, low: room_low, high: room_high, subproblem, .. } = self;
+        let Self { multipliers, low: inner_low, high: inner_high, subproblem, .. } = self;
         let [direction, again] = &mut self.directions;
         if hessian.nrows() != n {
             *hessian = DMatrix::zeros(n, n);
@@ -171,17 +169,17 @@ impl Least {
         for _ in 0..ITERATIONS {
             aim.curvature(models, multipliers, hessian);
             make_convex(hessian, factor);
-            room_low.clear();
-            room_low.extend(low.iter().zip(&*y).map(|(low, y)| (low - y).clamp(-reach, 0.0)));
-            room_high.clear();
-            room_high.extend(high.iter().zip(&*y).map(|(high, y)| (high - y).clamp(0.0, reach)));
+            inner_low.clear();
+            inner_low.extend(low.iter().zip(&*y).map(|(low, y)| (low - y).clamp(-reach, 0.0)));
+            inner_high.clear();
+            inner_high.extend(high.iter().zip(&*y).map(|(high, y)| (high - y).clamp(0.0, reach)));
             let mut try_step = |y: &[f64], step: &[f64], values: &mut Vec<f64>| {
                 there.clear();
                 there.extend(y.iter().zip(step).map(|(y, d)| y + d));
                 models.values(there, values);
                 aim.worth(values)
             };
-            if subproblem.solve(rows, hessian, room_low, room_high, aim.penalty, direction).is_none() {
+            if subproblem.solve(rows, hessian, [inner_low, inner_high], aim.penalty, direction).is_none() {
                 break;
             }
             let length = direction.step.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
@@ -193,7 +191,7 @@ impl Least {
                 rows_there.evaluate(aim.shape, values_there);
                 rows_there.multiply_objective(aim.unit);
                 corrected.correct(rows, rows_there, &direction.step);
-                if subproblem.solve(corrected, hessian, room_low, room_high, aim.penalty, again).is_some() {
+                if subproblem.solve(corrected, hessian, [inner_low, inner_high], aim.penalty, again).is_some() {
                     found = try_step(y, &again.step, values_there);
                 }
             }
@@ -247,12 +245,16 @@ fn on_top(rows: &Rows, multipliers: &mut Multipliers) {
 /// The first multiple of the identity that is added to a matrix that is not positive definite, relative to its norm.
 const ADDED: f64 = 1e-3;
 
-/// The smallest pivot relative to the largest entry that counts as positive.
+/// What the smallest eigenvalue is to exceed, relative to the largest entry.
 const POSITIVE: f64 = 1e-8;
 
-/// Makes a symmetric matrix positive definite, where it is not, by a multiple of the identity.
+/// Makes a symmetric matrix positive definite, where it is not, by a multiple of the identity; one that is 0 or not finite
+/// becomes a small multiple itself.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition (2006), algorithm 3.3.
+///
+/// N.B.: their first multiple is an absolute number, and they ask for no margin. A matrix with flat directions alone gets just
+/// the margin: flat directions are the rule where few points tell of the curvature.
 fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
     let n = matrix.nrows();
     let size = matrix.iter().fold(0.0_f64, |most, h| if h.is_finite() { most.max(h.abs()) } else { f64::INFINITY });
@@ -264,7 +266,7 @@ fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
     // In units of the largest entry, so that nothing overflows: no eigenvalue is below -n.
     let least = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
     let first = ADDED * matrix.iter().map(|h| (h / size).powi(2)).sum::<f64>().sqrt();
-    let mut added = if least > 0.0 { 0.0 } else { first - least };
+    let mut added = if least > -POSITIVE { 0.0 } else { first - least };
     loop {
         factor.clear();
         factor.extend(matrix.iter().map(|h| h / size));
@@ -273,7 +275,7 @@ fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
             (0..n).for_each(|i| matrix[(i, i)] += added * size);
             return;
         }
-        added = first.max(2.0 * added);
+        added = if added == 0.0 { 2.0 * POSITIVE } else { first.max(2.0 * added) };
     }
 }
 
@@ -325,6 +327,9 @@ mod tests {
             assert!(added[(0, 0)] > 1.0 && added[(0, 0)] <= 2.1, "{added}");
             assert!((&added - DMatrix::identity(2, 2) * added[(0, 0)]).amax() < 1e-12);
         }
+        let mut flat = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 0.0]);
+        make_convex(&mut flat, &mut factor);
+        assert!(flat[(1, 1)] > 1e-8 && flat[(1, 1)] < 1e-7, "{flat}");
         let mut matrix = DMatrix::from_element(2, 2, f64::NAN);
         make_convex(&mut matrix, &mut factor);
         assert_eq!(matrix, DMatrix::identity(2, 2) * 1e-9);

@@ -315,7 +315,7 @@ impl State {
         if self.promised <= floor || room.asked.as_slice()[0] == self.best.point {
             return self.mend(oracle, room);
         }
-        self.fill(shape, true, room);
+        self.fill(shape, room);
         let before = self.best.merit;
         let moved = self.visit(oracle, room.asked.as_slice(), Some(promise))?;
         let ratio = if moved { promise.kept(&before, &self.best.merit, weight) } else { 0.0 };
@@ -372,7 +372,7 @@ impl State {
             return Ok(false);
         }
         let count = self.known.len();
-        self.fill(oracle.shape(), true, room);
+        self.fill(oracle.shape(), room);
         self.visit(oracle, room.asked.as_slice(), None)?;
         Ok(self.known.len() > count)
     }
@@ -380,8 +380,8 @@ impl State {
     /// Polls the pattern, what looks best first; `true` when a point was better.
     fn poll(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
         self.failures = 0;
-        let fitted = self.fit(room);
-        self.lay_pattern(oracle.shape(), fitted, room);
+        self.fit(room);
+        self.lay_pattern(oracle.shape(), room);
         let count = room.order.len();
         // The first pattern is what the first models go through.
         let batch = if self.polled && self.batch > 0 { self.batch } else { count.max(1) };
@@ -400,9 +400,9 @@ impl State {
     }
 
     /// Adds as much of the pattern to what is asked as fills a batch, what looks best first.
-    fn fill(&self, shape: &Shape, fitted: bool, room: &mut Room) {
+    fn fill(&self, shape: &Shape, room: &mut Room) {
         if room.asked.len() < self.batch {
-            self.lay_pattern(shape, fitted, room);
+            self.lay_pattern(shape, room);
             for &(_, i) in room.order.iter().take(self.batch - room.asked.len()) {
                 room.asked.push(room.pattern.as_slice()[i].iter().copied());
             }
@@ -411,7 +411,7 @@ impl State {
 
     /// Collects the unknown points of the pattern around the best one, in the order in which they look best to the models, if
     /// these were fitted.
-    fn lay_pattern(&self, shape: &Shape, fitted: bool, room: &mut Room) {
+    fn lay_pattern(&self, shape: &Shape, room: &mut Room) {
         let Room { models, pattern, order, step, values, .. } = room;
         self.pattern.points(&self.best.point, self.radius, &self.spacing, pattern);
         let aim = self.aim(shape);
@@ -420,7 +420,7 @@ impl State {
             if self.known.contains(point) {
                 continue;
             }
-            if fitted {
+            if models.are_fitted() {
                 step.clear();
                 step.extend(point.iter().zip(&self.best.point).map(|(a, b)| (a - b) / self.radius));
                 models.values(step, values);
@@ -440,8 +440,10 @@ impl State {
             room.step.extend(here.iter().zip(&room.before).map(|(here, before)| 2.0 * (here - before) / self.radius));
             room.asked.clear();
             for _ in 0..self.batch.max(1) {
-                room.asked.push(self.at(&room.step));
-                room.asked.keep_last(|point, before| point != here && before.last().is_none_or(|last| point != last));
+                let is_new = |point: &[f64], before: &[Vec<f64>]| {
+                    point != here && before.last().is_none_or(|last| point != last)
+                };
+                room.asked.push_if(self.at(&room.step), is_new);
                 room.step.iter_mut().for_each(|step| *step *= 2.0);
             }
             if room.asked.len() == 0 {
@@ -449,8 +451,10 @@ impl State {
             }
             room.before.clone_from(here);
             // At the edge of the box few are left.
-            let fitted = room.asked.len() < self.batch && self.fit(room);
-            self.fill(oracle.shape(), fitted, room);
+            if room.asked.len() < self.batch {
+                self.fit(room);
+                self.fill(oracle.shape(), room);
+            }
             if !self.visit(oracle, room.asked.as_slice(), None)? {
                 return Ok(());
             }
@@ -523,10 +527,13 @@ impl State {
 }
 
 /// Finds the direction in which the points that the models go through are least spread, by inverse iteration; `false` where
-/// they are spread in all.
+/// they are spread in all. It begins along no coordinate, and where two directions are spread about as little finds one between
+/// them.
+///
+/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 7.6.1.
 fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mut Vec<f64>) -> bool {
     let spread = |spread: &mut DMatrix<f64>| {
-        spread.fill_diagonal(NO_SPREAD);
+        spread.fill_diagonal(REGULARISED);
         for y in models.steps() {
             let length = y.iter().fold(1.0_f64, |most, y| most.max(y.abs()));
             let y = DVectorView::from_slice(y, n);
@@ -538,7 +545,7 @@ fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mu
     let mut direction = DVectorViewMut::from_slice(direction, n);
     let least = factored(memory, n, spread, |factor| {
         let mut least = f64::INFINITY;
-        for _ in 0..ITERATIONS {
+        for _ in 0..INVERSE_ITERATIONS {
             factor.solve_mut(&mut direction);
             least = 1.0 / direction.norm();
             direction *= least;
@@ -548,11 +555,31 @@ fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mu
     least.is_some_and(|least| least < SPREAD)
 }
 
-/// Inverse iterations for an unknown direction.
-const ITERATIONS: usize = 20;
+/// Inverse iterations for an unknown direction: enough where the next spread is twice as large, for six figures.
+const INVERSE_ITERATIONS: usize = 20;
 
-/// What is added to sums of squared steps, so that none is 0.
-const NO_SPREAD: f64 = 1e-9;
+/// What is added to all sums of squared steps, so that their matrix has an inverse.
+const REGULARISED: f64 = 1e-9;
 
 /// A sum of squared steps along a direction below which that direction is unknown.
 const SPREAD: f64 = 0.3;
+
+#[cfg(test)]
+mod tests {
+    use super::models::tests::through;
+    use super::*;
+
+    #[test]
+    fn the_direction_across_points_near_a_line_is_unknown() {
+        let flat = |_: &[f64; 2]| vec![1.0];
+        let along = through(&[[0.0, 0.0], [1.0, 0.5], [-1.0, -0.5], [0.5, 0.3]], flat);
+        let (mut memory, mut direction) = (Vec::new(), Vec::new());
+        assert!(find_unknown(&along, 2, &mut memory, &mut direction));
+        assert!(
+            (2.0 * direction[0] + direction[1]).abs() < 0.1 && direction[0].hypot(direction[1]) > 0.999,
+            "{direction:?}"
+        );
+        let around = through(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], flat);
+        assert!(!find_unknown(&around, 2, &mut memory, &mut direction));
+    }
+}

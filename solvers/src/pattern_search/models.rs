@@ -15,6 +15,8 @@ const MISS: f64 = 1e-4;
 pub struct Models {
     n: usize,
     rows: usize,
+    /// Whether the last points determined them.
+    are_fitted: bool,
     /// The unit of steps.
     radius: f64,
     /// `c` of every row.
@@ -36,7 +38,7 @@ struct Room {
     /// `[X F]`, then `K^-1 [X F]`, by columns.
     solved: Vec<f64>,
     /// `[c; g]` of every row.
-    low: Vec<f64>,
+    planes: Vec<f64>,
     system: Vec<f64>,
     schur: Vec<f64>,
 }
@@ -47,6 +49,7 @@ impl Models {
         Self {
             n,
             rows,
+            are_fitted: false,
             radius: 1.0,
             constants: vec![0.0; rows],
             slopes: vec![0.0; rows * n],
@@ -70,6 +73,7 @@ impl Models {
         let unit = (radius / self.radius).powi(2);
         self.curvatures.iter_mut().for_each(|h| *h *= unit);
         self.radius = radius;
+        self.are_fitted = false;
         if count <= n {
             return false;
         }
@@ -77,7 +81,7 @@ impl Models {
         for (_, i) in near {
             self.room.steps.extend(known.point(*i).iter().zip(centre).map(|(a, b)| (a - b) / radius));
         }
-        let Room { steps, linear, solved, low, system, schur } = &mut self.room;
+        let Room { steps, linear, solved, planes, system, schur } = &mut self.room;
         let step = |i: usize| &steps[i * n..(i + 1) * n];
         linear.clear();
         linear.resize(count, 1.0);
@@ -109,9 +113,9 @@ impl Models {
         }
         let column = |k: usize| &linear[k * count..(k + 1) * count];
         let of_solved = |k: usize| &solved[k * count..(k + 1) * count];
-        low.clear();
+        planes.clear();
         for row in 0..rows {
-            low.extend((0..=n).map(|k| dot(column(k), of_solved(n + 1 + row))));
+            planes.extend((0..=n).map(|k| dot(column(k), of_solved(n + 1 + row))));
         }
         let fill = |matrix: &mut DMatrix<f64>| {
             for i in 0..=n {
@@ -121,7 +125,7 @@ impl Models {
             }
         };
         let factor = factored(schur, n + 1, fill, |factor| {
-            factor.solve_mut(&mut DMatrixViewMut::from_slice(low, n + 1, rows));
+            factor.solve_mut(&mut DMatrixViewMut::from_slice(planes, n + 1, rows));
         });
         if factor.is_none() {
             return false;
@@ -129,12 +133,12 @@ impl Models {
         let (of_linear, of_values) = solved.split_at_mut((n + 1) * count);
         let of_linear = DMatrixView::from_slice(of_linear, count, n + 1);
         let mut multipliers = DMatrixViewMut::from_slice(of_values, count, rows);
-        multipliers.gemm(-1.0, &of_linear, &DMatrixView::from_slice(low, n + 1, rows), 1.0);
-        if !low.iter().chain(multipliers.iter()).all(|v| v.is_finite()) {
+        multipliers.gemm(-1.0, &of_linear, &DMatrixView::from_slice(planes, n + 1, rows), 1.0);
+        if !planes.iter().chain(multipliers.iter()).all(|v| v.is_finite()) {
             return false;
         }
         for row in 0..rows {
-            let found = &low[row * (n + 1)..(row + 1) * (n + 1)];
+            let found = &planes[row * (n + 1)..(row + 1) * (n + 1)];
             self.constants[row] = first[row] + found[0];
             self.slopes[row * n..(row + 1) * n].copy_from_slice(&found[1..]);
             let h = &mut self.curvatures[row * n * n..(row + 1) * n * n];
@@ -145,7 +149,13 @@ impl Models {
                 }
             }
         }
+        self.are_fitted = true;
         true
+    }
+
+    /// Whether the last points determined them.
+    pub fn are_fitted(&self) -> bool {
+        self.are_fitted
     }
 
     /// The steps to the points that the models go through.

@@ -22,9 +22,8 @@ impl Pattern {
     pub fn turn(&mut self, random: &mut Stream) {
         let n = self.basis.nrows();
         let v = DVector::from_fn(n, |_, _| random.random_range(-1.0..1.0));
-        let norm = v.norm_squared();
-        if norm > 1e-6 {
-            self.reflect(&v, norm);
+        if v.norm_squared() > 1e-6 {
+            self.reflect(&v);
         }
     }
 
@@ -32,14 +31,13 @@ impl Pattern {
     pub fn align(&mut self, direction: &DVector<f64>) {
         let mut v = direction / direction.norm();
         v[0] += v[0].signum();
-        let norm = v.norm_squared();
-        self.reflect(&v, norm);
+        self.reflect(&v);
     }
 
-    /// Becomes `I - 2 v v' / norm`.
-    fn reflect(&mut self, v: &DVector<f64>, norm: f64) {
+    /// Becomes `I - 2 v v' / v'v`.
+    fn reflect(&mut self, v: &DVector<f64>) {
         self.basis.fill_with_identity();
-        self.basis.ger(-2.0 / norm, v, v, 1.0);
+        self.basis.ger(-2.0 / v.norm_squared(), v, v, 1.0);
     }
 
     /// Collects points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid
@@ -60,8 +58,7 @@ impl Pattern {
                     };
                     (centre[i] + by).clamp(0.0, 1.0)
                 };
-                points.push((0..n).map(at));
-                points.keep_last(|point, _| point != centre);
+                points.push_if((0..n).map(at), |point, _| point != centre);
             }
         }
     }

@@ -10,6 +10,8 @@ pub(super) struct Bundle {
     pieces: Vec<(Vec<f64>, Rows)>,
     /// Memory of those that are forgotten.
     spare: Vec<(Vec<f64>, Rows)>,
+    /// The way from a piece to here.
+    back: Vec<f64>,
 }
 
 impl Bundle {
@@ -42,7 +44,7 @@ impl Bundle {
     }
 
     /// Adds the pieces, as they extend to here, to the rows here.
-    pub fn add_to(&self, rows: &Rows, here: &[f64], all: &mut Rows) {
-        all.gather(rows, here, &self.pieces);
+    pub fn add_to(&mut self, rows: &Rows, here: &[f64], all: &mut Rows) {
+        all.gather(rows, here, &self.pieces, &mut self.back);
     }
 }

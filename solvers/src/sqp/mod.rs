@@ -66,8 +66,9 @@ struct Sqp {
 /// Memory that is used again from step to step.
 #[derive(Default)]
 struct Room {
-    /// The step and its second-order correction.
-    directions: [Direction; 2],
+    direction: Direction,
+    /// The second-order correction of the step.
+    second: Direction,
     /// The rows after them, without slopes.
     tried: [Rows; 2],
     /// The rows of a linearisation.
@@ -120,8 +121,7 @@ impl Solver for Sqp {
             return Ok(Progress::Stalled);
         }
         state.rescale();
-        let [direction, second] = &mut room.directions;
-        if state.direction(direction).is_none() {
+        if state.direction(&mut room.direction).is_none() {
             // The Hessian may be at fault: forget it, once.
             if !state.hessian.has_learned() {
                 return Ok(Progress::Stalled);
@@ -129,6 +129,7 @@ impl Solver for Sqp {
             state.hessian.forget();
             return Ok(Progress::Continue);
         }
+        let direction = &room.direction;
         let merit = state.merit(&state.rows);
         let promised =
             merit - (direction.level + state.penalty * direction.violation + state.hessian.half(&direction.step));
@@ -138,14 +139,14 @@ impl Solver for Sqp {
             return Ok(state.conclude(direction, merit, tolerance, options.radius, promised <= tolerance));
         }
         let before = [state.rows.objective(), state.rows.violation()];
-        let tried = state.try_corrected(oracle, direction, second, &mut room.tried, merit, promised)?;
-        let tried = tried.as_ref().map(|evaluation| (evaluation, &room.tried[0]));
-        state.judge(oracle, tried, &mut room.linear, direction, merit, promised)?;
+        let tried = state.try_corrected(oracle, room, merit, promised)?;
+        state.judge(oracle, tried.as_ref(), room, merit, promised)?;
         let change = (before[0] - state.rows.objective()).abs().max((before[1] - state.rows.violation()).abs());
         state.idle = if change <= IDLE * size { state.idle + 1 } else { 0 };
         if state.idle >= MOST_IDLE {
             state.idle = 0;
-            return Ok(state.conclude(direction, merit, tolerance, options.radius, promised <= 1e4 * tolerance));
+            let optimal = promised <= 1e4 * tolerance;
+            return Ok(state.conclude(&room.direction, merit, tolerance, options.radius, optimal));
         }
         Ok(Progress::Continue)
     }
@@ -167,16 +168,15 @@ impl State {
         if optimal && self.rows.violation() <= 10.0 * SATISFIED { Progress::Converged } else { Progress::Stalled }
     }
 
-    /// Tries the step, and its second-order correction where the step fails; the rows of what is better come first in `rows`.
+    /// Tries the step, and its second-order correction where the step fails; the rows of what is better come first.
     fn try_corrected(
         &mut self,
         oracle: &mut dyn Oracle,
-        direction: &Direction,
-        second: &mut Direction,
-        rows: &mut [Rows; 2],
+        room: &mut Room,
         merit: f64,
         promised: f64,
     ) -> Result<Option<Evaluation>, Halt> {
+        let Room { direction, second, tried: rows, .. } = room;
         let tried = self.try_step(oracle, &direction.step, &mut rows[0])?;
         if tried.is_none() {
             return Ok(None);
@@ -193,24 +193,23 @@ impl State {
         Ok(again)
     }
 
-    /// Accepts or rejects what was tried, and changes the trust region; `linear` is room for the rows of a linearisation.
+    /// Accepts or rejects what was tried, and changes the trust region.
     fn judge(
         &mut self,
         oracle: &mut dyn Oracle,
-        tried: Option<(&Evaluation, &Rows)>,
-        linear: &mut Rows,
-        direction: &Direction,
+        tried: Option<&Evaluation>,
+        room: &mut Room,
         merit: f64,
         promised: f64,
     ) -> Result<(), Halt> {
+        let Room { direction, tried: [rows, _], linear, .. } = room;
         let length = direction.step.iter().fold(0.0_f64, |a, d| a.max(d.abs()));
-        let achieved = tried.map_or(f64::NEG_INFINITY, |(_, rows)| merit - self.merit(rows));
+        let achieved = tried.map_or(f64::NEG_INFINITY, |_| merit - self.merit(rows));
         // A step that is better in objective or violation may also be measured from the worst of the two iterates before:
         // the path along a curved constraint is not held up by a merit that rises a little.
         let before = self.reference() - merit;
-        let trades = tried.is_some_and(|(_, rows)| {
-            rows.objective() < self.rows.objective() || rows.violation() < self.rows.violation()
-        });
+        let trades =
+            tried.is_some_and(|_| rows.objective() < self.rows.objective() || rows.violation() < self.rows.violation());
         let relaxed = if trades { (achieved + before) / (promised + before) } else { f64::NEG_INFINITY };
         let ratio = (achieved / promised).max(relaxed);
         if ratio < 0.25 {
@@ -222,7 +221,7 @@ impl State {
             let factor = if (ratio - 1.0).abs() < 0.1 { 4.0 } else { 2.0 };
             self.radius = (factor * self.radius).min(1.0);
         }
-        let Some((evaluation, _)) = tried else { return Ok(()) };
+        let Some(evaluation) = tried else { return Ok(()) };
         let improves = ratio > ENOUGH;
         self.rejected = if improves { 0 } else { self.rejected + 1 };
         // Slopes are worth their price where the point is better, or where it lies beyond a kink.

@@ -46,6 +46,8 @@ struct Room {
     step: Vec<f64>,
     /// Slopes of the Lagrangian before and after a step.
     slopes: [Vec<f64>; 2],
+    /// The step where nothing but the constraints counts.
+    most: Direction,
 }
 
 impl State {
@@ -96,9 +98,12 @@ impl State {
         self.solve(self.penalty, into)?;
         if into.violation > SATISFIED {
             // What can be reached if nothing but the constraints counts.
-            let mut most = Direction::default();
-            self.solve(LARGEST_PENALTY, &mut most)?;
-            let wanted = most.violation + 0.1 * (violation - most.violation).max(0.0) + SATISFIED;
+            let mut most = std::mem::take(&mut self.room.most);
+            let found = self.solve(LARGEST_PENALTY, &mut most);
+            let least = most.violation;
+            self.room.most = most;
+            found?;
+            let wanted = least + 0.1 * (violation - least).max(0.0) + SATISFIED;
             while into.violation > wanted && self.penalty < LARGEST_PENALTY {
                 self.penalty *= 10.0;
                 self.solve(self.penalty, into)?;
@@ -133,10 +138,10 @@ impl State {
         room.high.clear();
         room.high.extend(here.iter().map(|u| (1.0 - u).min(*radius)));
         if bundle.is_empty() {
-            return subproblem.solve(rows, hessian.matrix(), &room.low, &room.high, penalty, into);
+            return subproblem.solve(rows, hessian.matrix(), [&room.low, &room.high], penalty, into);
         }
         bundle.add_to(rows, here, &mut room.all);
-        subproblem.solve(&room.all, hessian.matrix(), &room.low, &room.high, penalty, into)
+        subproblem.solve(&room.all, hessian.matrix(), [&room.low, &room.high], penalty, into)
     }
 
     /// Reads the rows of a linearisation.
@@ -187,11 +192,11 @@ impl State {
     }
 
     /// How far the slope of the Lagrangian is from 0 where no bound is in the way.
-    pub fn residual(&self, direction: &Direction) -> f64 {
-        let mut slope = Vec::new();
-        self.rows.lagrangian_slope(&direction.multipliers, &mut slope);
+    pub fn residual(&mut self, direction: &Direction) -> f64 {
+        let slope = &mut self.room.slopes[0];
+        self.rows.lagrangian_slope(&direction.multipliers, slope);
         let held = |(u, s): &(&f64, &f64)| (**u <= 0.0 && **s > 0.0) || (**u >= 1.0 && **s < 0.0);
-        self.at.at.point.iter().zip(&slope).filter(|pair| !held(pair)).fold(0.0, |most, (_, s)| most.max(s.abs()))
+        self.at.at.point.iter().zip(&*slope).filter(|pair| !held(pair)).fold(0.0, |most, (_, s)| most.max(s.abs()))
     }
 }
 

@@ -77,7 +77,7 @@ fn cells(row: &Row) -> Vec<String> {
             judged.place.to_string(),
             a.probability.to_string(),
             a.found.first().map_or_else(String::new, |(_, p)| p.to_string()),
-            a.p_value.to_string(),
+            format!("{:e}", a.p_value),
             format!("{:.3}", a.seconds),
             a.simulations.to_string(),
             String::new(),

@@ -89,7 +89,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     posable(suite, arguments)?;
     let plan = Plan {
         suite: *suite,
-        solvers: arguments.solvers.iter().map(|name| solver(catalogue, name)).collect::<Result<_, _>>()?,
+        solvers: arguments.solvers.iter().map(|name| solver(catalogue, name.trim())).collect::<Result<_, _>>()?,
         slope: if arguments.gradients { Slope::Exact } else { Slope::Differences },
         seeds: arguments.seeds,
         budget: arguments.budget.map(|budget| usize::try_from(budget).unwrap_or(usize::MAX)),
