@@ -166,7 +166,7 @@ impl Least {
         aim.rows(models, y, values, rows);
         on_top(rows, multipliers);
         let (mut reach, mut failures) = (1.0_f64, 0);
-        for _ in 0..ITERATIONS {
+        for _ in 0..INNER_ITERATIONS {
             aim.curvature(models, multipliers, hessian);
             make_convex(hessian, factor);
             inner_low.clear();
@@ -200,7 +200,7 @@ impl Least {
             if found >= worth {
                 failures += 1;
                 reach = 0.3 * length.min(reach);
-                if failures > FAILURES {
+                if failures > INNER_FAILURES {
                     break;
                 }
                 continue;
@@ -223,10 +223,10 @@ impl Least {
 const LARGEST_PENALTY: f64 = 1e7;
 
 /// Quadratic programmes on the models for one step.
-const ITERATIONS: usize = 30;
+const INNER_ITERATIONS: usize = 30;
 
 /// Steps of these that may fail.
-const FAILURES: usize = 8;
+const INNER_FAILURES: usize = 8;
 
 /// At first the largest row has all the weight.
 fn on_top(rows: &Rows, multipliers: &mut Multipliers) {
