@@ -136,6 +136,15 @@ struct State {
     texture: Option<Texture>,
 }
 
+impl Room {
+    /// Adds up to `count` points of the pattern to what is asked, in their order, from the one at `first` on.
+    fn ask(&mut self, first: usize, count: usize) {
+        for &(_, i) in self.order.iter().skip(first).take(count) {
+            self.asked.push(self.pattern.as_slice()[i].iter().copied());
+        }
+    }
+}
+
 impl Solver for PatternSearch {
     fn accepts(&self, _: &Shape) -> Result<(), String> {
         Ok(())
@@ -387,9 +396,7 @@ impl State {
         let batch = if self.polled && self.batch > 0 { self.batch } else { count.max(1) };
         for first in (0..count).step_by(batch) {
             room.asked.clear();
-            for &(_, i) in &room.order[first..(first + batch).min(count)] {
-                room.asked.push(room.pattern.as_slice()[i].iter().copied());
-            }
+            room.ask(first, batch);
             room.before.clone_from(&self.best.point);
             if self.visit(oracle, room.asked.as_slice(), None)? {
                 self.run_on(oracle, room)?;
@@ -403,9 +410,7 @@ impl State {
     fn fill(&self, shape: &Shape, room: &mut Room) {
         if room.asked.len() < self.batch {
             self.lay_pattern(shape, room);
-            for &(_, i) in room.order.iter().take(self.batch - room.asked.len()) {
-                room.asked.push(room.pattern.as_slice()[i].iter().copied());
-            }
+            room.ask(0, self.batch - room.asked.len());
         }
     }
 
