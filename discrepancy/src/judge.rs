@@ -11,8 +11,7 @@ use crate::locate::{Located, locate};
 use crate::repaired::Calibrated;
 use crate::screen::Scene;
 use crate::search::{Search, Trial};
-use crate::stopgap::{is_table, stopgap, unexplained};
-use crate::subject::Measurement;
+use crate::stopgap::{stopgap, unexplained};
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
 const CONTRADICTED: f64 = 1e-4;
@@ -68,9 +67,6 @@ pub fn judge<'a>(
         judgement.unexplained = located.first().and_then(Located::unexplained);
         for place in located.iter().take(2) {
             judgement.stand_in(search, base, place);
-        }
-        if judgement.last.added.iter().any(is_table) {
-            judgement.note = judgement.note.map(|note| format!("without the table, {note}"));
         }
     }
     judgement
@@ -139,15 +135,10 @@ fn left(last: &Trial<'_>) -> (f64, Option<String>) {
     let Some(place) = locate(&last.fit, model, &scene).into_iter().next() else { return (0.0, None) };
     let gain = predictive_gain(&place, &last.fit, model, &scene);
     let (error, at, share) = (last.fitted.normalised(), &place.evidence.place, 100.0 * gain);
-    let is_selection = |m: &Measurement| m.role == Role::Selection;
-    let data = if last.fit.subject.measurements.iter().any(is_selection) { " and selection" } else { "" };
-    let what = if gain > 0.0 {
-        format!("a free signal at `{at}` would lower the error on samples left out by {share:.0} %")
-    } else {
-        "no free signal at one place foretells it: so would noise look that is larger than supposed".to_owned()
-    };
-    let note = format!("{error:.2} times the noise is left on calibration{data} data; {what}");
-    (gain, Some(note))
+    let note = format!(
+        "{error:.2} times the noise is left; a free signal at {at} would lower the error on samples left out by {share:.0} %"
+    );
+    (gain, (gain > 0.0).then_some(note))
 }
 
 #[cfg(test)]
