@@ -12,6 +12,7 @@ use crate::repaired::Calibrated;
 use crate::screen::Scene;
 use crate::search::{Search, Trial};
 use crate::stopgap::{stopgap, unexplained};
+use crate::subject::Subject;
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
 const CONTRADICTED: f64 = 1e-4;
@@ -55,7 +56,7 @@ pub fn judge<'a>(
     // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
     // little they determine.
     let mistaken = !last.added.is_empty()
-        && after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
+        && forecast(&after, search.subject) > MISTAKEN
         && contradicts(contradiction(&last, &after), after.unknowns());
     let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
         (_, true) => Verdict::Unexplained,
@@ -79,11 +80,11 @@ impl<'a> Judgement<'a> {
         let trial = search.over_whole(&trial)?;
         let calibrated = search.calibrate(&trial, &[])?;
         let found = unexplained(place, &table, &calibrated.added.last()?.strengths);
-        let now = self.after.error_on(Role::Selection, search.subject);
+        let now = forecast(&self.after, search.subject);
         let better = if self.last.added.is_empty() {
             trial.fitted.chi2 < self.last.fitted.chi2
         } else {
-            now > Some(MISTAKEN) && calibrated.error_on(Role::Selection, search.subject) < now
+            now > MISTAKEN && forecast(&calibrated, search.subject) < now
         };
         if better {
             (self.after, self.last, self.unexplained) = (calibrated, trial, Some(found));
@@ -139,6 +140,14 @@ fn left(last: &Trial<'_>) -> (f64, Option<String>) {
         "{error:.2} times the noise is left; a free signal at {at} would lower the error on samples left out by {share:.0} %"
     );
     (gain, (gain > 0.0).then_some(note))
+}
+
+/// Root mean square of the normalised errors on selection data; 0 without such data.
+#[allow(clippy::cast_precision_loss)]
+fn forecast(after: &Calibrated<'_>, subject: &Subject) -> f64 {
+    let errors = after.errors(&subject.measurements);
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -1,8 +1,5 @@
 //! What can be left out of a model: effects that others make superfluous, declared terms that effects do.
 
-use mops_core::Role;
-use rayon::prelude::*;
-
 use crate::search::{Search, Trial};
 use crate::variant::problem;
 use crate::weigh::{Dispersion, by_chance};
@@ -35,24 +32,6 @@ impl<'a> Search<'a> {
                 None => index += 1,
             }
         }
-    }
-
-    /// The trial without the effect without which the model, fitted to calibration data alone, forecasts selection data best;
-    /// `None` where each of them makes the forecast better, and without selection data. What helps the fit may hurt that.
-    pub fn foreseeing(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
-        if trial.added.len() < 2 || trial.windows > 1 {
-            return None;
-        }
-        let error = |trial: &Trial<'a>| self.calibrate(trial, &[])?.error_on(Role::Selection, self.subject);
-        let least = error(trial)?;
-        let indices: Vec<usize> = (0..trial.added.len()).collect();
-        let tried = indices.into_par_iter().filter_map(|index| {
-            let without = self.without(trial, index)?;
-            Some((error(&without)?, without))
-        });
-        let tried: Vec<(f64, Trial<'a>)> = tried.collect();
-        let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best.0 < least).then_some(best.1)
     }
 
     /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that

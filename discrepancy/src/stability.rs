@@ -40,12 +40,11 @@ pub struct HangsOn {
     pub place: String,
 }
 
-/// The stability of the effect of one of the models of a round; `None` where it has no rival over the same data.
-pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {
-    let best = &round.trials[own];
+/// The stability of the best effect of a round; `None` where it has no rival over the same data.
+pub fn stability(round: &Round<'_>) -> Option<Stability> {
+    let best = round.trials.first()?;
     let of = Dispersion::of(best);
-    let others = round.trials.iter().enumerate().filter(|(k, t)| *k != own && t.windows == best.windows);
-    let rivals: Vec<&Trial<'_>> = std::iter::once(best).chain(others.map(|(_, t)| t)).collect();
+    let rivals: Vec<&Trial<'_>> = round.trials.iter().filter(|t| t.windows == best.windows).collect();
     if rivals.len() < 2 {
         return None;
     }

@@ -124,7 +124,6 @@ pub(crate) fn coulomb() -> Diagnosis {
                     place: "joint:phi".into(),
                 }],
             }),
-            held_back: Vec::new(),
         }],
         removed: Vec::new(),
         steps: vec![Step {

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
 
+use super::figures::role_name;
 use super::numbers::{number, percent, significant};
 use super::page::scrolling;
 use super::sensitivity;
@@ -90,7 +91,7 @@ fn experiments(calibration: &CalibrationReport) -> Markup {
                     @for channel in &experiment.channels {
                         tr {
                             th scope="row" { (experiment.name) }
-                            td { (experiment.role.name()) }
+                            td { (role_name(experiment.role)) }
                             (channel_cells(channel))
                         }
                     }

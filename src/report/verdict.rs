@@ -123,7 +123,7 @@ fn calibration(outcome: &Outcome, archive: &[Record]) -> (Tone, String) {
         if let Some((experiment, channel)) = worst {
             text.push_str(&format!(
                 " On {} data the worst fit is {:.1} % (`{}` in `{}`).",
-                role.name(),
+                super::figures::role_name(role),
                 channel.fit_percent,
                 channel.name,
                 experiment.name
