@@ -1,120 +1,93 @@
 //! The account of a diagnosis: candidates by probability, what is said of each effect found, how the parameters moved.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::candidate::Candidate;
-use crate::diagnosis::{Found, Noticeable, ParameterMove, Prediction, Ranked, Rival, StrengthValue};
-use crate::fit::dot;
+use mops_core::Role;
+
+use crate::diagnosis::{Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked, StrengthValue};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
-use crate::round::{Round, best_in};
+use crate::round::Round;
 use crate::screen::Screened;
-use crate::search::Trial;
+use crate::search::{Search, Trial};
 use crate::stability::stability;
+use crate::standing::{Standing, gained};
 use crate::subject::Subject;
-use crate::weigh::{CLEARLY, Dispersion, criterion, needed_gain, probabilities, weighed};
+use crate::weigh::{Dispersion, criterion, needed_gain, probabilities};
 
-/// Candidates by probability: those found first, then what else was fitted in each round.
-pub fn ranking(rounds: &[Arc<Round<'_>>], last: &Trial<'_>) -> Vec<Ranked> {
-    let mut ranked: Vec<Ranked> = Vec::new();
-    let mut seen: Vec<(String, String)> = Vec::new();
-    let is_added = |t: &Trial<'_>| t.newest().is_some_and(|own| last.added.iter().any(|a| own.is(&a.candidate)));
-    for round in rounds {
-        let Some(best) = round.trials.first() else { continue };
-        // What was tried after the last effect is told by chance, and says nothing.
-        let accepted = round.trials.iter().any(is_added);
-        if !accepted && !last.added.is_empty() {
-            continue;
-        }
-        let dispersion = Dispersion::of(best);
-        let mut criteria = if accepted {
-            weighed(&round.trials, &dispersion)
-        } else {
-            // What the data tell of effects that were not added was not the question.
-            round.trials.iter().map(|t| criterion(t, &dispersion)).collect()
+/// Candidates by probability: those found first, in their order, then what else was tried in their places; where nothing was
+/// found, what was tried first.
+pub fn ranking<'a>(
+    search: &Search<'a>,
+    standings: &[Option<Standing<'_, 'a>>],
+    rounds: &[Arc<Round<'a>>],
+) -> Vec<Ranked> {
+    if !standings.is_empty() {
+        let standings = || standings.iter().flatten();
+        let found: Vec<Ranked> =
+            standings().filter_map(|s| ranked(s.round, s.own, s.probability(), s.gains[s.own])).collect();
+        let tried = |s: &Standing<'_, '_>| {
+            let one = |k: usize| ranked(s.round, k, s.probabilities[k], s.gains[k]);
+            (0..s.round.trials.len()).filter_map(one).collect::<Vec<_>>()
         };
-        if !accepted {
-            // Nothing at all is a rival too, beforehand as likely as all candidates together.
-            #[allow(clippy::cast_precision_loss)]
-            let candidates = round.screened.len().max(1) as f64;
-            criteria.push(criterion(&round.from, &dispersion) - 2.0 * candidates.ln());
-        }
-        let probabilities = probabilities(&criteria);
-        for (trial, probability) in round.trials.iter().zip(probabilities) {
-            let Some(a) = trial.added.last() else { continue };
-            let key = (a.candidate.effect.name().to_owned(), a.candidate.place());
-            if seen.contains(&key) {
-                continue;
-            }
-            seen.push(key.clone());
-            let screened = round.screened.iter().find(|s| s.added.candidate.is(&a.candidate));
-            let parameters = &mops_core::Model::interface(trial.variant.model.as_ref()).parameters;
-            let first = trial.variant.first[trial.added.len() - 1];
-            let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
-                name: s.name.to_owned(),
-                value: a.strengths[k],
-                unit: a.candidate.unit(s, &parameters[first + k].variable.unit),
-                std_error: None,
-                interval95: None,
-            });
-            ranked.push(Ranked {
-                effect: key.0,
-                place: key.1,
-                class: a.candidate.effect.class().name().to_owned(),
-                probability,
-                bic_gain: criterion(&round.from, &dispersion) - criterion(trial, &dispersion),
-                strengths: strengths.collect(),
-                absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
-                normalised: trial.fitted.normalised(),
-            });
-        }
+        let mut others: Vec<Ranked> = standings().flat_map(tried).collect();
+        others.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        return once_each(found.into_iter().chain(others));
     }
-    let is_found = |r: &Ranked| last.added.iter().any(|a| a.candidate.is_named(&r.effect, &r.place));
-    let (mut found, mut others): (Vec<Ranked>, Vec<Ranked>) = ranked.into_iter().partition(is_found);
-    others.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    found.append(&mut others);
-    found
+    let Some(round) = rounds.first() else { return Vec::new() };
+    let Some(best) = round.trials.first() else { return Vec::new() };
+    let dispersion = Dispersion::of(best);
+    // What the data tell of effects that were not added was not the question.
+    let mut criteria: Vec<f64> = round.trials.iter().map(|t| criterion(t, &dispersion)).collect();
+    // Nothing at all is a rival too, beforehand as likely as all candidates together.
+    #[allow(clippy::cast_precision_loss)]
+    let candidates = round.screened.len().max(1) as f64;
+    let nothing = criteria[0] + gained(search, &round.from, best);
+    criteria.push(nothing - 2.0 * candidates.ln());
+    let probabilities = probabilities(&criteria);
+    let one = |k: usize| ranked(round, k, probabilities[k], nothing - criteria[k]);
+    let mut all: Vec<Ranked> = (0..round.trials.len()).filter_map(one).collect();
+    all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    once_each(all.into_iter())
+}
+
+/// Of every effect at a place the first.
+fn once_each(all: impl Iterator<Item = Ranked>) -> Vec<Ranked> {
+    let mut seen: HashSet<(String, String)> = HashSet::new();
+    all.filter(|r| seen.insert((r.effect.clone(), r.place.clone()))).collect()
+}
+
+/// What is said of one of the models of a round.
+fn ranked(round: &Round<'_>, index: usize, probability: f64, bic_gain: f64) -> Option<Ranked> {
+    let trial = &round.trials[index];
+    let a = trial.added.last()?;
+    let screened = round.screened.iter().find(|s| s.added.candidate.is(&a.candidate));
+    let parameters = &mops_core::Model::interface(trial.variant.model.as_ref()).parameters;
+    let first = trial.variant.first[trial.added.len() - 1];
+    let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
+        name: s.name.to_owned(),
+        value: a.strengths[k],
+        unit: a.candidate.unit(s, &parameters[first + k].variable.unit),
+        std_error: None,
+        interval95: None,
+    });
+    Some(Ranked {
+        effect: a.candidate.effect.name().to_owned(),
+        place: a.candidate.place(),
+        class: a.candidate.effect.class().name().to_owned(),
+        probability,
+        bic_gain,
+        strengths: strengths.collect(),
+        absorbed: screened.map_or(f64::NAN, |s| s.absorbed),
+        normalised: trial.fitted.normalised(),
+    })
 }
 
 /// What is said of an effect that was added.
-pub fn found(
-    index: usize,
-    last: &Trial<'_>,
-    after: &Calibrated<'_>,
-    rounds: &[Arc<Round<'_>>],
-    ranking: &[Ranked],
-) -> Found {
+pub fn found(index: usize, last: &Trial<'_>, after: &Calibrated<'_>, standing: Option<&Standing<'_, '_>>) -> Found {
     let a = &last.added[index];
     let (effect, place) = (a.candidate.effect.as_ref(), a.candidate.place());
-    let own = ranking.iter().find(|r| r.effect == effect.name() && r.place == place);
-    let round = round_of(rounds, |newest| newest.is(&a.candidate));
-    let mut rivals = Vec::new();
-    if let Some(round) = round {
-        let best = &round.trials[0];
-        let of = Dispersion::of(best);
-        let screened = |t: &Trial<'_>| -> Option<&Screened> {
-            let newest = t.newest()?;
-            round.screened.iter().find(|s| s.added.candidate.is(newest))
-        };
-        let criteria = weighed(&round.trials, &of);
-        let least = criteria[0];
-        let shares = probabilities(&criteria);
-        for ((trial, &value), &probability) in round.trials.iter().zip(&criteria).zip(&shares).skip(1) {
-            let Some(newest) = trial.newest().filter(|_| value - least < CLEARLY) else { continue };
-            let likeness = match (screened(best), screened(trial)) {
-                (Some(x), Some(y)) => dot(&x.direction, &y.direction).abs(),
-                _ => f64::NAN,
-            };
-            rivals.push(Rival {
-                effect: newest.effect.name().to_owned(),
-                place: newest.place(),
-                probability,
-                bic_behind: value - least,
-                likeness,
-            });
-        }
-        rivals.sort_by(|a, b| a.bic_behind.total_cmp(&b.bic_behind));
-    }
     let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
     // A gust in another experiment, say.
     let namesakes = last.added[..index].iter().filter(|b| b.candidate.is_named(effect.name(), &place));
@@ -130,12 +103,25 @@ pub fn found(
         class: effect.class().name().to_owned(),
         formula: effect.formula().to_owned(),
         strengths: after.strengths(index, &last.variant),
-        probability: own.map_or(1.0, |r| r.probability),
-        bic_gain: own.map_or(f64::NAN, |r| r.bic_gain),
-        indistinguishable: rivals,
-        stability: round.and_then(stability),
+        probability: standing.map_or(1.0, Standing::probability),
+        bic_gain: standing.map_or(f64::NAN, |s| s.gains[s.own]),
+        indistinguishable: standing.map_or_else(Vec::new, Standing::rivals),
+        stability: standing.and_then(|s| stability(s.round, s.own)),
+        held_back: Vec::new(),
         place,
     }
+}
+
+/// What an effect does for data that were held back, beside the others of the model that `after` is; empty where the model
+/// without it cannot be followed over whole records.
+pub fn held_back<'a>(search: &Search<'a>, after: &Calibrated<'a>, standing: &Standing<'_, 'a>) -> Vec<HeldBack> {
+    let from = Some(&standing.round.from).filter(|from| from.windows == 1);
+    let Some(without) = from.and_then(|from| search.calibrate(from, &[])) else { return Vec::new() };
+    let told = |role| {
+        let [without, with] = [&without, after].map(|model| model.error_on(role, search.subject));
+        Some(HeldBack { role, without: without?, with: with? })
+    };
+    [Role::Selection, Role::Validation].into_iter().filter_map(told).collect()
 }
 
 /// Widens the intervals of strengths to those of another model with the same effects that the data allow as well.
@@ -153,20 +139,19 @@ pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>) {
     }
 }
 
-/// The round in which such an effect did best.
-fn round_of<'r, 'a>(rounds: &'r [Arc<Round<'a>>], is: impl Fn(&Candidate) -> bool) -> Option<&'r Round<'a>> {
-    best_in(rounds, is).map(|index| rounds[index].as_ref())
-}
-
 /// The experiment that would best tell an effect found from the first rival that the data cannot tell from it.
-pub fn next_experiment(rounds: &[Arc<Round<'_>>], found: &[Found]) -> Option<String> {
-    found.iter().find_map(|found| {
-        let rival = found.indistinguishable.first()?;
-        let round = round_of(rounds, |newest| newest.is_named(&found.effect, &found.place))?;
-        let trial = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.is_named(&rival.effect, &rival.place));
-        let names =
-            [format!("`{}` at {}", found.effect, found.place), format!("`{}` at {}", rival.effect, rival.place)];
-        separating(round.trials.first()?, round.trials.iter().find(trial)?, [&names[0], &names[1]])
+pub fn next_experiment(standings: &[Option<Standing<'_, '_>>]) -> Option<String> {
+    standings.iter().flatten().find_map(|standing| {
+        let rival = standing.rivals().into_iter().next()?;
+        let trials = &standing.round.trials;
+        let is_rival = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.is_named(&rival.effect, &rival.place));
+        let own = &trials[standing.own];
+        let newest = own.newest()?;
+        let names = [
+            format!("`{}` at {}", newest.effect.name(), newest.place()),
+            format!("`{}` at {}", rival.effect, rival.place),
+        ];
+        separating(own, trials.iter().find(is_rival)?, [&names[0], &names[1]])
     })
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mops_core::{Effect, Mistake, Study, Watch};
 use rayon::prelude::*;
 
-use crate::account::{found, moves, next_experiment, noticeable, predictions, ranking, starts, widen};
+use crate::account::{found, held_back, moves, next_experiment, noticeable, predictions, ranking, starts, widen};
 use crate::base;
 use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
@@ -14,6 +14,7 @@ use crate::locate::locate;
 use crate::meter::Meter;
 use crate::screen::Scene;
 use crate::search::{Limits, Search};
+use crate::standing::Standing;
 use crate::stopgap::is_table;
 use crate::subject::Subject;
 
@@ -91,18 +92,25 @@ fn explain(
     let (last, after, rounds, allowed) = match led {
         // Other shapes were allowed beside what it was before.
         Some((last, after)) => {
-            let rounds = rounds.into_iter().map(|round| round.with(&last)).collect();
+            let rounds = search.held_against_rivals(&last);
             (last, after, rounds, Vec::new())
         }
         None => (last, after, rounds, allowed),
     };
-    let ranked = ranking(&rounds, &last);
+    let standings: Vec<_> = (0..last.added.len()).map(|index| Standing::of(&search, &rounds, &last, index)).collect();
+    let ranked = ranking(&search, &standings, &rounds);
     let Judgement { verdict, last, held, after, unexplained, note } =
         judge(&search, &base, &located, last, held, after);
 
     draw(&mut located, &last);
     let named = (0..last.added.len()).filter(|&index| !is_table(&last.added[index]));
-    let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, &rounds, &ranked)).collect();
+    let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, standings[index].as_ref())).collect();
+    if found.len() > 1 {
+        let told = |(found, standing): (&mut Found, &Option<_>)| {
+            found.held_back = standing.as_ref().map_or_else(Vec::new, |standing| held_back(&search, &after, standing));
+        };
+        found.par_iter_mut().zip(&standings).for_each(told);
+    }
     if verdict == Verdict::Effect {
         // Without the declared terms that went.
         let allowed = allowed.into_par_iter().filter_map(|mut trial| {
@@ -125,7 +133,7 @@ fn explain(
         verdict,
         probability,
         p_value: growth.p_value,
-        next_experiment: next_experiment(&rounds, &found),
+        next_experiment: if found.is_empty() { None } else { next_experiment(&standings) },
         found,
         removed: search.removed(&base, &held),
         steps,

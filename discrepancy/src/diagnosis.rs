@@ -76,6 +76,20 @@ pub struct Found {
     pub indistinguishable: Vec<Rival>,
     /// How its choice holds where the data change; `None` where nothing was tried beside it.
     pub stability: Option<Stability>,
+    /// What it does for data that no parameter was fitted to; empty where it is the only effect, as the errors before and after
+    /// tell that.
+    pub held_back: Vec<HeldBack>,
+}
+
+/// Error on data that were held back from the fit, with an effect and without it: all else is fitted anew to calibration data.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldBack {
+    /// Whose data: selection or validation.
+    pub role: Role,
+    /// Without the effect, in units of the noise.
+    pub without: f64,
+    /// With it.
+    pub with: f64,
 }
 
 /// A declared term that was found to be the wrong one.

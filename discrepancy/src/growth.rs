@@ -7,7 +7,6 @@ use std::sync::Arc;
 use mops_core::Watch;
 use rayon::prelude::*;
 
-use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
 use crate::round::{Round, best_first, best_in};
@@ -39,6 +38,14 @@ pub struct Growth<'a> {
 impl<'a> Growth<'a> {
     fn begun(last: Trial<'a>) -> Self {
         Self { last, rounds: Vec::new(), steps: Vec::new(), allowed: Vec::new(), p_value: 1.0 }
+    }
+
+    /// What is done next, and what was found so far.
+    fn stage(&self, next: &str) -> String {
+        let names: Vec<&str> = self.last.added.iter().map(|a| a.candidate.effect.name()).collect();
+        let left = self.last.fitted.normalised();
+        let found = if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
+        format!("{next}; so far {found} ({left:.2} times the noise left)")
     }
 
     /// Goes on to another model.
@@ -110,7 +117,10 @@ impl<'a> Search<'a> {
         let most = options.max_effects;
         while growth.last.added.len() < most {
             let count = growth.last.added.len();
-            watch.stage(&format!("search for effect {}", count + 1), 0.1 + 0.7 * count as f64 / most as f64);
+            watch.stage(
+                &growth.stage(&format!("search for effect {}", count + 1)),
+                0.1 + 0.7 * count as f64 / most as f64,
+            );
             let Some(round) = self.round(&growth.last) else { break };
             if count == 0 {
                 // Of the screening itself: its gains are those of single directions.
@@ -169,9 +179,12 @@ impl<'a> Search<'a> {
         let whole = self.over_whole(&growth.last);
         growth.last = whole.map_or(growth.last, |whole| if was_whole { whole } else { self.unstuck(whole) });
         for settling in 0..=SETTLINGS {
-            watch.stage("what can be left out", 0.8 + 0.03 * f64::from(settling));
+            watch.stage(&growth.stage("what can be left out"), 0.8 + 0.03 * f64::from(settling));
             if let Some(pruned) = self.pruned(&growth.last, self.limits.level) {
                 growth.step("left out", pruned);
+            }
+            while let Some(foreseeing) = self.foreseeing(&growth.last) {
+                growth.step("left out", foreseeing);
             }
             while growth.last.added.len() > 1 && growth.last.windows == 1 {
                 let Some((one, round)) = self.merged(&growth.last) else { break };
@@ -187,7 +200,7 @@ impl<'a> Search<'a> {
             if is_settled || growth.last.windows > 1 {
                 break;
             }
-            watch.stage("each effect against its rivals", 0.81 + 0.03 * f64::from(settling));
+            watch.stage(&growth.stage("each effect against its rivals"), 0.81 + 0.03 * f64::from(settling));
             let exchanged;
             (exchanged, growth.rounds) = self.exchanged(&growth.last);
             // The last look is for the rivals of what is there.
@@ -204,6 +217,7 @@ impl<'a> Search<'a> {
         let reshaped;
         (reshaped, growth.allowed) = self.shapes(growth.last.clone());
         if reshaped.fitted.chi2 < growth.last.fitted.chi2 {
+            growth.rounds = self.held_against_rivals(&reshaped);
             growth.step("reshaped", reshaped);
         }
         growth
@@ -293,12 +307,18 @@ impl<'a> Search<'a> {
     /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
     /// held against its rivals.
     fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Arc<Round<'a>>>) {
-        let rounds: Vec<Arc<Round<'a>>> =
-            (0..last.added.len()).filter_map(|index| self.rivals(last, index).map(Arc::new)).collect();
+        let rounds = self.held_against_rivals(last);
         let of = Dispersion::of(last);
         let better = least(rounds.iter().filter_map(|round| round.trials.first()), &of);
-        let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - margin(b, last)).cloned();
+        // The same once more, as another fit of it ended, is not another.
+        let margin = |b: &Trial<'_>| if b.has_the_effects_of(last) { CLEARLY } else { 0.0 };
+        let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - margin(b)).cloned();
         (exchanged, rounds)
+    }
+
+    /// For each effect of a model the round in which it is held against its rivals, with the others in.
+    pub fn held_against_rivals(&self, last: &Trial<'a>) -> Vec<Arc<Round<'a>>> {
+        (0..last.added.len()).filter_map(|index| self.rivals(last, index).map(Arc::new)).collect()
     }
 
     /// The round for one of the effects with the others in.
@@ -333,12 +353,6 @@ impl<'a> Search<'a> {
         }
         Some(round)
     }
-}
-
-/// How much better a model must be to take the place of another: what is simpler need not be better clearly.
-fn margin(trial: &Trial<'_>, than: &Trial<'_>) -> f64 {
-    let is_simpler = |newest: &Candidate| than.added.iter().any(|b| newest.is_simpler_than(&b.candidate));
-    if trial.newest().is_some_and(is_simpler) { 0.0 } else { CLEARLY }
 }
 
 /// The model of the least criterion.

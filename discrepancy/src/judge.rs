@@ -11,8 +11,8 @@ use crate::locate::{Located, locate};
 use crate::repaired::Calibrated;
 use crate::screen::Scene;
 use crate::search::{Search, Trial};
-use crate::stopgap::{stopgap, unexplained};
-use crate::subject::Subject;
+use crate::stopgap::{is_table, stopgap, unexplained};
+use crate::subject::Measurement;
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
 const CONTRADICTED: f64 = 1e-4;
@@ -56,7 +56,7 @@ pub fn judge<'a>(
     // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
     // little they determine.
     let mistaken = !last.added.is_empty()
-        && forecast(&after, search.subject) > MISTAKEN
+        && after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
         && contradicts(contradiction(&last, &after), after.unknowns());
     let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
         (_, true) => Verdict::Unexplained,
@@ -69,6 +69,9 @@ pub fn judge<'a>(
         for place in located.iter().take(2) {
             judgement.stand_in(search, base, place);
         }
+        if judgement.last.added.iter().any(is_table) {
+            judgement.note = judgement.note.map(|note| format!("without the table, {note}"));
+        }
     }
     judgement
 }
@@ -80,11 +83,11 @@ impl<'a> Judgement<'a> {
         let trial = search.over_whole(&trial)?;
         let calibrated = search.calibrate(&trial, &[])?;
         let found = unexplained(place, &table, &calibrated.added.last()?.strengths);
-        let now = forecast(&self.after, search.subject);
+        let now = self.after.error_on(Role::Selection, search.subject);
         let better = if self.last.added.is_empty() {
             trial.fitted.chi2 < self.last.fitted.chi2
         } else {
-            now > MISTAKEN && forecast(&calibrated, search.subject) < now
+            now > Some(MISTAKEN) && calibrated.error_on(Role::Selection, search.subject) < now
         };
         if better {
             (self.after, self.last, self.unexplained) = (calibrated, trial, Some(found));
@@ -136,18 +139,15 @@ fn left(last: &Trial<'_>) -> (f64, Option<String>) {
     let Some(place) = locate(&last.fit, model, &scene).into_iter().next() else { return (0.0, None) };
     let gain = predictive_gain(&place, &last.fit, model, &scene);
     let (error, at, share) = (last.fitted.normalised(), &place.evidence.place, 100.0 * gain);
-    let note = format!(
-        "{error:.2} times the noise is left; a free signal at {at} would lower the error on samples left out by {share:.0} %"
-    );
-    (gain, (gain > 0.0).then_some(note))
-}
-
-/// Root mean square of the normalised errors on selection data; 0 without such data.
-#[allow(clippy::cast_precision_loss)]
-fn forecast(after: &Calibrated<'_>, subject: &Subject) -> f64 {
-    let errors = after.errors(&subject.measurements);
-    let squares: Vec<f64> = errors.iter().filter(|e| e.role == Role::Selection).map(|e| e.normalised.powi(2)).collect();
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    let is_selection = |m: &Measurement| m.role == Role::Selection;
+    let data = if last.fit.subject.measurements.iter().any(is_selection) { " and selection" } else { "" };
+    let what = if gain > 0.0 {
+        format!("a free signal at `{at}` would lower the error on samples left out by {share:.0} %")
+    } else {
+        "no free signal at one place foretells it; the noise may be larger than supposed".to_owned()
+    };
+    let note = format!("{error:.2} times the noise is left on calibration{data} data; {what}");
+    (gain, Some(note))
 }
 
 #[cfg(test)]

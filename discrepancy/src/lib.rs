@@ -33,6 +33,7 @@ mod search;
 mod shapes;
 mod short_term;
 mod stability;
+mod standing;
 mod start_search;
 mod step_search;
 mod stopgap;
@@ -51,7 +52,7 @@ mod windows;
 pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
-    Curve, Diagnosis, Evidence, ExperimentError, Found, Noticeable, ParameterMove, Prediction, Ranked, Removed, Rival,
-    Step, StrengthValue, Unexplained, Verdict, WindowErrors,
+    Curve, Diagnosis, Evidence, ExperimentError, Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked,
+    Removed, Rival, Step, StrengthValue, Unexplained, Verdict, WindowErrors,
 };
 pub use stability::{HangsOn, Stability};

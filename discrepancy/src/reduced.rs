@@ -1,5 +1,9 @@
 //! What can be left out of a model: effects that others make superfluous, declared terms that effects do.
 
+use mops_core::Role;
+use rayon::prelude::*;
+
+use crate::diagnose::UNEXPLAINED;
 use crate::search::{Search, Trial};
 use crate::variant::problem;
 use crate::weigh::{Dispersion, by_chance};
@@ -32,6 +36,25 @@ impl<'a> Search<'a> {
                 None => index += 1,
             }
         }
+    }
+
+    /// The trial without the effect without which the model, fitted to calibration data alone, forecasts selection data best;
+    /// `None` where each of them makes the forecast better or is needed to explain the data, and without selection data. What
+    /// helps the fit may hurt that; a model that misses something forecasts badly whatever it has, and tells nothing of it.
+    pub fn foreseeing(&self, trial: &Trial<'a>) -> Option<Trial<'a>> {
+        if trial.added.len() < 2 || trial.windows > 1 {
+            return None;
+        }
+        let error = |trial: &Trial<'a>| self.calibrate(trial, &[])?.error_on(Role::Selection, self.subject);
+        let least = error(trial)?;
+        let indices: Vec<usize> = (0..trial.added.len()).collect();
+        let tried = indices.into_par_iter().filter_map(|index| {
+            let without = self.without(trial, index).filter(|without| without.fitted.normalised() <= UNEXPLAINED)?;
+            Some((error(&without)?, without))
+        });
+        let tried: Vec<(f64, Trial<'a>)> = tried.collect();
+        let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best.0 < least).then_some(best.1)
     }
 
     /// The trial with declared terms at zero that the effects make superfluous, and which tuners those are: factors that

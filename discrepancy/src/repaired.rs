@@ -8,7 +8,7 @@ use crate::diagnosis::{ExperimentError, StrengthValue};
 use crate::fit::{Fit, Fitted, Point};
 use crate::profile::{QUANTILE, interval95};
 use crate::search::{ASTRAY, Search, Trial};
-use crate::subject::Measurement;
+use crate::subject::{Measurement, Subject};
 use crate::variant::{Added, Variant, problem};
 use crate::weigh::Dispersion;
 use crate::windows::whole;
@@ -143,6 +143,14 @@ impl Calibrated<'_> {
             }
         };
         measurements.iter().zip(&self.experiments).map(error).collect()
+    }
+
+    /// Root mean square of the normalised errors on the experiments of a role; `None` where there are none.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn error_on(&self, role: Role, subject: &Subject) -> Option<f64> {
+        let errors = self.errors(&subject.measurements);
+        let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     }
 
     /// The strengths of an effect, with what the data say of them.

@@ -366,6 +366,12 @@ impl<'a> Trial<'a> {
         self.added.len() == other.added.len() && pairs.all(|(a, b)| a.candidate.is(&b.candidate))
     }
 
+    /// Whether it has the same effects, in any order.
+    pub(crate) fn has_the_effects_of(&self, other: &Self) -> bool {
+        let has = |b: &Added| self.added.iter().any(|a| a.candidate.is(&b.candidate));
+        self.added.len() == other.added.len() && other.added.iter().all(has)
+    }
+
     /// The effect that was added last; `None` in the declared model.
     pub fn newest(&self) -> Option<&Candidate> {
         self.added.last().map(|added| &added.candidate)

@@ -40,11 +40,12 @@ pub struct HangsOn {
     pub place: String,
 }
 
-/// The stability of the best effect of a round; `None` where it has no rival over the same data.
-pub fn stability(round: &Round<'_>) -> Option<Stability> {
-    let best = round.trials.first()?;
+/// The stability of the effect of one of the models of a round; `None` where it has no rival over the same data.
+pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {
+    let best = &round.trials[own];
     let of = Dispersion::of(best);
-    let rivals: Vec<&Trial<'_>> = round.trials.iter().filter(|t| t.windows == best.windows).collect();
+    let others = round.trials.iter().enumerate().filter(|(k, t)| *k != own && t.windows == best.windows);
+    let rivals: Vec<&Trial<'_>> = std::iter::once(best).chain(others.map(|(_, t)| t)).collect();
     if rivals.len() < 2 {
         return None;
     }

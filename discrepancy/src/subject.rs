@@ -1,5 +1,6 @@
 //! What is diagnosed: the model, its unknowns, and the experiments, taken from a study.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{Case, Dual, Effect, Job, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
@@ -106,6 +107,8 @@ impl Subject {
             .filter(|&i| study.tuners[i].case.is_none() && study.tuners[i].active && study.tuners[i].tie.is_none())
             .collect();
         let mut notes = Vec::new();
+        // By signal and unit, one for every experiment that gives none.
+        let mut estimated: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
         let mut measurements = Vec::new();
         for job in jobs {
             let plan = &study.jobs[job];
@@ -129,13 +132,10 @@ impl Subject {
                         channel.signal, case.name
                     ));
                 }
-                if channel.noise.is_none() {
-                    notes.push(format!(
-                        "the noise of `{}` in `{}` was estimated from neighbouring samples: {noise:.3e} {}",
-                        channel.signal, case.name, signals[signal].unit
-                    ));
-                }
                 let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
+                if channel.noise.is_none() {
+                    estimated.entry((name.clone(), unit.clone())).or_default().push(noise);
+                }
                 series.push(Series { signal, name, unit, times, values, noise });
             }
             let horizon = series.iter().filter_map(|s| s.times.last().copied()).fold(0.0, f64::max);
@@ -163,6 +163,16 @@ impl Subject {
                 series,
                 horizon,
             });
+        }
+        for ((signal, unit), sizes) in estimated {
+            let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = sizes.iter().copied().fold(0.0, f64::max);
+            let size = if least < most { format!("{least:.3e} to {most:.3e}") } else { format!("{least:.3e}") };
+            let count = sizes.len();
+            let experiments = if count == 1 { String::new() } else { format!(" in each of {count} experiments") };
+            notes.push(format!(
+                "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {size} {unit}"
+            ));
         }
         if !measurements.iter().any(|m| m.role == Role::Calibration) {
             return Err(Mistake::new("experiments", "no experiment is for calibration")

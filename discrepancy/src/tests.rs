@@ -16,6 +16,7 @@ mod sessions;
 mod shapes;
 mod signs;
 mod stability;
+mod standing;
 mod starts;
 mod steps;
 mod switched_on;

@@ -19,6 +19,17 @@ pub enum Role {
     Validation,
 }
 
+impl Role {
+    /// Its name, as studies write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibration => "calibration",
+            Self::Selection => "selection",
+            Self::Validation => "validation",
+        }
+    }
+}
+
 /// How a sampled input acts between its samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

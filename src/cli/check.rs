@@ -3,7 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Demand, Grid, ParameterSource, Scale, uncertain_reports};
+use mops_core::{
+    Case, Catalogue, Channel, Demand, Experiment, Grid, JobPlan, Parameter, ParameterSource, Scale, Study,
+    uncertain_reports,
+};
 
 use super::families::folded;
 use super::places::places;
@@ -45,28 +48,18 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         let usage = format!("{:?}", row.usage).to_lowercase();
         vec![study.key(row), study.models[plan.model].0.clone(), usage, demand(row.demand), row.unit.to_string()]
     });
-    text += &format!("\n{}", table(&["criterion", "model", "usage", "demand", "unit"], &[3], rows.collect()));
-    let fixed = study.jobs.iter().flat_map(|job| {
-        let names = &study.models[job.model].1.interface().parameters;
-        names.iter().zip(&job.parameters).filter_map(move |(p, source)| match source {
-            ParameterSource::Constant(value) => Some(vec![
-                study.cases[job.case].name.clone(),
-                p.variable.name.clone(),
-                number(*value),
-                p.variable.unit.to_string(),
-            ]),
-            ParameterSource::Tuner { .. } => None,
-        })
-    });
-    text += &format!("\n{}", table(&["case", "fixed parameter", "value", "unit"], &[2], folded(fixed.collect(), 1)));
+    text += &section(&["criterion", "model", "usage", "demand", "unit"], &[3], rows.collect());
+    text += &section(
+        &["experiment", "role", "channel", "samples", "until", "noise", "unit"],
+        &[3, 4, 5],
+        study.cases.iter().flat_map(|case| channels(study, case)).collect(),
+    );
+    text += &section(&["case", "fixed parameter", "value", "unit"], &[2], fixed(study));
     if !study.tasks.uncertain.is_empty() {
         text += &super::robustness::parameters(&uncertain_reports(&study.over_uncertain(&start)));
     }
     let models = study.models.iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
-    let models: Vec<_> = models.filter(|row| !row[1].is_empty()).collect();
-    if !models.is_empty() {
-        text += &format!("\n{}", table(&["model", "places for effects"], &[], models));
-    }
+    text += &section(&["model", "places for effects"], &[], models.filter(|row| !row[1].is_empty()).collect());
     for warning in &study.warnings {
         text += &format!("\nwarning: {warning}\n");
     }
@@ -75,6 +68,58 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     }
     print(&text);
     Ok(ExitCode::SUCCESS)
+}
+
+/// A table after an empty line; nothing where it has no rows.
+fn section(header: &[&str], right: &[usize], rows: Vec<Vec<String>>) -> String {
+    if rows.is_empty() { String::new() } else { format!("\n{}", table(header, right, rows)) }
+}
+
+/// What an experiment measures.
+fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
+    let signals = || study.models.iter().flat_map(|(_, model)| &model.interface().signals);
+    let of = |experiment: &Experiment| {
+        let one = |(k, channel): (usize, &Channel)| {
+            let once = |text: &str| if k == 0 { text.to_owned() } else { String::new() };
+            let until = channel.times.last().map_or_else(String::new, |end| format!("{} s", number(*end)));
+            vec![
+                once(&case.name),
+                once(experiment.role.name()),
+                channel.signal.clone(),
+                channel.values.len().to_string(),
+                until,
+                channel.noise.map_or_else(|| "not given".to_owned(), number),
+                signals().find(|s| s.name == channel.signal).map_or_else(String::new, |s| s.unit.to_string()),
+            ]
+        };
+        experiment.channels.iter().enumerate().map(one).collect()
+    };
+    case.experiment.as_ref().map_or_else(Vec::new, of)
+}
+
+/// Parameters that no tuner moves; what is the same in all cases is one row.
+fn fixed(study: &Study) -> Vec<Vec<String>> {
+    let of_job = |job: &JobPlan| {
+        let names = &study.models[job.model].1.interface().parameters;
+        let one = |(p, source): (&Parameter, &ParameterSource)| match source {
+            ParameterSource::Constant(value) => {
+                Some(vec![String::new(), p.variable.name.clone(), number(*value), p.variable.unit.to_string()])
+            }
+            ParameterSource::Tuner { .. } => None,
+        };
+        names.iter().zip(&job.parameters).filter_map(one).collect::<Vec<_>>()
+    };
+    let of_jobs: Vec<Vec<Vec<String>>> = study.jobs.iter().map(of_job).collect();
+    let is_alike = of_jobs.len() > 1 && of_jobs.windows(2).all(|pair| pair[0] == pair[1]);
+    let named = |(job, rows): (&JobPlan, Vec<Vec<String>>)| {
+        let case = if is_alike { "all".to_owned() } else { study.cases[job.case].name.clone() };
+        rows.into_iter().map(move |mut row| {
+            row[0].clone_from(&case);
+            row
+        })
+    };
+    let kept = if is_alike { 1 } else { of_jobs.len() };
+    folded(study.jobs.iter().zip(of_jobs).take(kept).flat_map(named).collect(), 1)
 }
 
 fn demand(demand: Demand) -> String {

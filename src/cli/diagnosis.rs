@@ -1,6 +1,5 @@
 //! A diagnosis on the terminal: the verdict, what was found, errors before and after, what cannot be told apart.
 
-use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Verdict};
 
 use super::tables::{number, table};
@@ -17,7 +16,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
         text += &format!("\n{}", found(diagnosis));
     }
     for removed in &diagnosis.removed {
-        text += &plain(&format!("\ndeclared term taken away: `{}` {}\n", removed.term, words::at(&removed.place)));
+        text += &plain(&format!("\ndeclared term taken away: {}\n", words::term(removed)));
     }
     if !diagnosis.before.is_empty() {
         text += &format!("\n{}", errors_table(diagnosis));
@@ -84,14 +83,10 @@ fn found(diagnosis: &Diagnosis) -> String {
     table(&header, &[3, 4, 5, 7, 8], rows)
 }
 
-fn role(role: Role) -> String {
-    format!("{role:?}").to_lowercase()
-}
-
 fn errors_table(diagnosis: &Diagnosis) -> String {
     let mut rows = Vec::new();
     for line in errors::lines(diagnosis) {
-        let mut row = vec![line.experiment.name.clone(), role(line.experiment.role), line.label()];
+        let mut row = vec![line.experiment.name.clone(), line.experiment.role.name().to_owned(), line.label()];
         if line.channel.is_some() {
             row.extend(line.raw.map(|value| significant(value, 4)));
             row.extend([significant(line.noise, 4), line.unit.to_owned()]);

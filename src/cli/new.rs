@@ -60,5 +60,8 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     }
     let study = folder.join("study.toml");
     print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()));
+    if from.is_none() && catalogue.studies.iter().any(|study| study.name == called) {
+        print(&format!("it is the commented template; `--from {called}` copies the shipped study of that name\n"));
+    }
     Ok(ExitCode::SUCCESS)
 }

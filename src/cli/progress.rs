@@ -1,6 +1,7 @@
 //! Shows how a run goes, and hears Ctrl-C.
 
 use std::fmt::Write;
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,6 +17,8 @@ pub(super) struct Progress {
     interrupted: Arc<AtomicBool>,
     /// Whether the bar shows stages instead of points.
     staged: AtomicBool,
+    /// When a stage was last said in a line of its own, in seconds; `None` where a bar says it.
+    said: Option<Mutex<f64>>,
     /// The study whose criteria are shown below the bar, where they are.
     study: Option<Study>,
     /// What stands below the bar.
@@ -57,17 +60,17 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);
         let style = "{bar:30} {pos}/{len} evaluations, at most {eta} left, {msg}";
         bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
-        Self::with(bar, "interrupted: writing the best point so far; again to end at once")
+        Self::with(bar, shown, "interrupted: writing the best point so far; again to end at once")
     }
 
     /// The same for a benchmark, which keeps the cases that are done.
     pub fn of_cases(shown: bool) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(None, target);
-        Self::with(bar, "interrupted: the cases so far count; again to end at once")
+        Self::with(bar, shown, "interrupted: the cases so far count; again to end at once")
     }
 
-    fn with(bar: ProgressBar, heard: &'static str) -> Self {
+    fn with(bar: ProgressBar, shown: bool, heard: &'static str) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
         // Where a handler cannot be set, Ctrl-C ends the program as usual.
@@ -77,7 +80,8 @@ impl Progress {
             }
             eprintln!("{heard}");
         });
-        Self { bar, interrupted, staged: AtomicBool::new(false), study: None, below: Mutex::default() }
+        let said = (shown && !std::io::stderr().is_terminal()).then(Mutex::default);
+        Self { bar, interrupted, staged: AtomicBool::new(false), said, study: None, below: Mutex::default() }
     }
 
     /// Shows the convergence, and the criteria of the best point, below the bar.
@@ -131,6 +135,15 @@ impl Watch for Progress {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
         self.bar.set_message(what.to_owned());
+        if let Some(said) = &self.said {
+            // A log has no bar to overwrite: the longer a run, the rarer the lines.
+            let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
+            let now = self.bar.elapsed().as_secs_f64();
+            if now - *said >= (0.05 * now).max(1.0) {
+                eprintln!("{now:>7.1} s  {what}");
+                *said = now;
+            }
+        }
     }
 }
 

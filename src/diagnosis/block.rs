@@ -53,6 +53,7 @@ fn found(found: &Found) -> Value {
         "bic_gain": found.bic_gain,
         "indistinguishable": found.indistinguishable,
         "stability": found.stability,
+        "held_back": found.held_back,
     });
     if let Some(companion) = &found.companion {
         value["companion"] = json!(companion);

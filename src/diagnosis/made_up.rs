@@ -124,6 +124,7 @@ pub(crate) fn coulomb() -> Diagnosis {
                     place: "joint:phi".into(),
                 }],
             }),
+            held_back: Vec::new(),
         }],
         removed: Vec::new(),
         steps: vec![Step {

@@ -1,7 +1,9 @@
 //! A diagnosis in sentences, for the terminal and for the report; names stand between backticks.
 
 use mops_core::Role;
-use mops_discrepancy::{Diagnosis, ExperimentError, Found, Rival, StrengthValue, Unexplained, Verdict};
+use mops_discrepancy::{
+    Diagnosis, ExperimentError, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict,
+};
 
 use crate::report::significant;
 
@@ -85,17 +87,16 @@ fn left(diagnosis: &Diagnosis) -> String {
 /// What there is to say of each role, with the unit after the first.
 fn by_role(mut say: impl FnMut(Role) -> Option<String>) -> String {
     let mut parts = Vec::new();
-    for (role, name) in ROLES {
+    for role in ROLES {
         if let Some(text) = say(role) {
             let unit = if parts.is_empty() { " times the noise" } else { "" };
-            parts.push(format!("{text}{unit} on {name} data"));
+            parts.push(format!("{text}{unit} on {} data", role.name()));
         }
     }
     if parts.is_empty() { "is not known".to_owned() } else { list(&parts) }
 }
 
-const ROLES: [(Role, &str); 3] =
-    [(Role::Calibration, "calibration"), (Role::Selection, "selection"), (Role::Validation, "validation")];
+const ROLES: [Role; 3] = [Role::Calibration, Role::Selection, Role::Validation];
 
 /// Normalised error of the experiments of a role together: the root of their mean square.
 pub(crate) fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
@@ -116,9 +117,14 @@ pub(crate) fn at(place: &str) -> String {
         Some(("extra_state", name)) => format!("in a further state at `{name}`"),
         Some(("actuator", name)) => format!("at the actuator `{name}`"),
         Some(("sensor", name)) => format!("at the sensor of `{name}`"),
-        _ if place.is_empty() => "somewhere".to_owned(),
         _ => format!("at `{place}`"),
     }
+}
+
+/// A declared term, and where it acts as far as that is known.
+pub(crate) fn term(removed: &Removed) -> String {
+    let at = if removed.place.is_empty() { String::new() } else { format!(" {}", at(&removed.place)) };
+    format!("`{}`{at}", removed.term)
 }
 
 /// `torque = 0.0124 (0.0118 to 0.0130) N m`.
@@ -134,7 +140,25 @@ pub(crate) fn strength(strength: &StrengthValue) -> String {
 /// When an effect acted, and why it may be another, in sentences.
 pub(crate) fn remarks(found: &Found) -> Vec<String> {
     let once = |only: &String| format!("`{}` {} acted once, in `{only}` alone.", found.effect, at(&found.place));
-    found.only.iter().map(once).chain(confusable(found)).chain(unstable(found)).collect()
+    found.only.iter().map(once).chain(forecasts(found)).chain(confusable(found)).chain(unstable(found)).collect()
+}
+
+/// What an effect does for data that were held back, in sentences.
+fn forecasts(found: &Found) -> Vec<String> {
+    let about = format!("`{}` {}", found.effect, at(&found.place));
+    let told = |is: fn(f64, f64) -> bool| {
+        let those = found.held_back.iter().filter(|h| times(h.with) != times(h.without) && is(h.with, h.without));
+        let error =
+            |h: &HeldBack| format!("{} instead of {} on {} data", times(h.without), times(h.with), h.role.name());
+        those.map(error).collect::<Vec<String>>()
+    };
+    let (better, worse) = (told(|with, without| with < without), told(|with, without| with > without));
+    let said = |sentence: &str, errors: &[String]| {
+        let text = || format!("{sentence} the error is {} (times the noise).", list(errors));
+        (!errors.is_empty()).then(text)
+    };
+    let borne_out = said(&format!("Data held back bear out {about}: without it"), &better);
+    borne_out.into_iter().chain(said(&format!("The model forecasts better without {about}:"), &worse)).collect()
 }
 
 /// That the choice of an effect hangs on parts of the data; `None` where it holds in 95 % of those drawn anew.
@@ -155,19 +179,29 @@ fn confusable(found: &Found) -> Option<String> {
     let close = |rivals: &mut dyn Iterator<Item = &Rival>| -> Vec<String> {
         rivals.map(|r| format!("`{}` {} ({})", r.effect, at(&r.place), probability(r.probability))).collect()
     };
-    let equal = close(&mut found.indistinguishable.iter().filter(|r| r.bic_behind < BARE_MENTION));
-    let behind = close(&mut found.indistinguishable.iter().filter(|r| r.bic_behind >= BARE_MENTION));
+    let told = |is: fn(f64) -> bool| close(&mut found.indistinguishable.iter().filter(|r| is(r.bic_behind)));
+    let likelier = told(|behind| behind <= -BARE_MENTION);
+    let equal = told(|behind| behind.abs() < BARE_MENTION);
+    let behind = told(|behind| behind >= BARE_MENTION);
     let about = format!("`{}` {}", found.effect, at(&found.place));
-    match (equal.is_empty(), behind.is_empty()) {
-        (true, true) => None,
-        (false, true) => Some(format!("The data cannot tell {about} from {}.", list(&equal))),
-        (true, false) => Some(format!("Less likely than {about}, but not excluded: {}.", list(&behind))),
-        (false, false) => Some(format!(
-            "The data cannot tell {about} from {}; less likely, but not excluded: {}.",
-            list(&equal),
-            list(&behind)
-        )),
+    let mut said = Vec::new();
+    if !likelier.is_empty() {
+        said.push(format!("likelier than {about}, beside what else was found: {}", list(&likelier)));
     }
+    if !equal.is_empty() {
+        said.push(format!("the data cannot tell {about} from {}", list(&equal)));
+    }
+    match (said.is_empty(), behind.is_empty()) {
+        (_, true) => {}
+        (true, false) => said.push(format!("less likely than {about}, but not excluded: {}", list(&behind))),
+        (false, false) => said.push(format!("less likely, but not excluded: {}", list(&behind))),
+    }
+    (!said.is_empty()).then(|| capitalised(&format!("{}.", said.join("; "))))
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// A probability in percent, honest at both ends.
@@ -222,6 +256,37 @@ mod tests {
         assert!(text.contains("not excluded: `quadratic-drag`"), "{text}");
         let text = &remarks(&made_up::coulomb().found[0])[1];
         assert!(text.contains("does best in 83 % of data sets") && text.contains("without `swing` it is"), "{text}");
+    }
+
+    #[test]
+    fn what_an_effect_does_for_data_held_back_is_told_with_both_errors() {
+        let mut found = made_up::coulomb().found.remove(0);
+        assert!(forecasts(&found).is_empty());
+        let held_back = |role, without, with| HeldBack { role, without, with };
+        found.held_back = vec![held_back(Role::Selection, 1.27, 1.0), held_back(Role::Validation, 0.99, 1.03)];
+        assert_eq!(
+            forecasts(&found),
+            [
+                "Data held back bear out `coulomb-friction` in the joint `phi`: without it the error is 1.27 instead of 1.00 on selection data (times the noise).",
+                "The model forecasts better without `coulomb-friction` in the joint `phi`: the error is 0.99 instead of 1.03 on validation data (times the noise).",
+            ]
+        );
+        found.held_back = vec![held_back(Role::Validation, 1.001, 1.004)];
+        assert!(forecasts(&found).is_empty());
+    }
+
+    #[test]
+    fn a_rival_that_is_likelier_is_told_first() {
+        let mut found = made_up::coulomb().found.remove(0);
+        found.indistinguishable[0].bic_behind = -3.0;
+        let text = confusable(&found).unwrap();
+        assert!(
+            text.starts_with(
+                "Likelier than `coulomb-friction` in the joint `phi`, beside what else was found: `stribeck-friction`"
+            ),
+            "{text}"
+        );
+        assert!(text.contains("; less likely, but not excluded: `quadratic-drag`"), "{text}");
     }
 
     #[test]

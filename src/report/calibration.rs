@@ -3,7 +3,6 @@
 use maud::{Markup, html};
 use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
 
-use super::figures::role_name;
 use super::numbers::{number, percent, significant};
 use super::page::scrolling;
 use super::sensitivity;
@@ -91,7 +90,7 @@ fn experiments(calibration: &CalibrationReport) -> Markup {
                     @for channel in &experiment.channels {
                         tr {
                             th scope="row" { (experiment.name) }
-                            td { (role_name(experiment.role)) }
+                            td { (experiment.role.name()) }
                             (channel_cells(channel))
                         }
                     }

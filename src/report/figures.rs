@@ -1,6 +1,6 @@
 //! The pictures of a run: every job's signals at the start and at the reported point, and measurements beside them.
 
-use mops_core::{AnalysisKind, Role, Row, Variable};
+use mops_core::{AnalysisKind, Row, Variable};
 
 use super::Report;
 use super::bode;
@@ -29,15 +29,6 @@ pub(super) struct Figure {
     pub(super) caption: Vec<String>,
 }
 
-/// The role of an experiment in words.
-pub(super) fn role_name(role: Role) -> &'static str {
-    match role {
-        Role::Calibration => "calibration",
-        Role::Selection => "selection",
-        Role::Validation => "validation",
-    }
-}
-
 /// A group for every job, or for the most interesting ones where there are many; and a sentence if some are left out.
 pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
     let study = report.problem.study();
@@ -63,7 +54,7 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     let plan = &study.jobs[job];
     let (case, (model_name, model)) = (&study.cases[plan.case], &study.models[plan.model]);
     let mut title = match &case.experiment {
-        Some(experiment) => format!("Experiment `{}` ({})", case.name, role_name(experiment.role)),
+        Some(experiment) => format!("Experiment `{}` ({})", case.name, experiment.role.name()),
         None => format!("Case `{}`", case.name),
     };
     // Names of models are told apart only where there is more than one.

@@ -123,7 +123,7 @@ fn calibration(outcome: &Outcome, archive: &[Record]) -> (Tone, String) {
         if let Some((experiment, channel)) = worst {
             text.push_str(&format!(
                 " On {} data the worst fit is {:.1} % (`{}` in `{}`).",
-                super::figures::role_name(role),
+                role.name(),
                 channel.fit_percent,
                 channel.name,
                 experiment.name

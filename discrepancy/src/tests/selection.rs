@@ -7,7 +7,7 @@ use mops_core::{Effect, Role};
 use crate::base;
 use crate::diagnosis::StrengthValue;
 use crate::meter::Meter;
-use crate::search::{Limits, Search};
+use crate::search::{Limits, Search, Trial};
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::weigh::{Dispersion, criterion, probabilities};
@@ -82,4 +82,54 @@ fn validation_data_change_no_bit_of_what_is_found() {
     assert_eq!(one.parameters, other.parameters);
     assert_eq!(one.ranked, other.ranked);
     assert_ne!(one.after[2], other.after[2]);
+}
+
+/// A pendulum: `w' = -g sin(th) - b w`.
+const PENDULUM: &str = r#"
+states     = { th = "rad", w = "rad/s" }
+parameters = { g = "1/s^2", b = "1/s" }
+der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
+"#;
+
+/// Swings with dry friction, and with a bias of the sensor in each session: two to calibrate with, then one to select with.
+fn sessions(biases: [f64; 3]) -> Subject {
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.5 * (x[1] / 1e-3).tanh()];
+    let record = |(k, bias): (usize, f64)| {
+        let states = integrated(rates, [0.8 + 0.1 * k as f64, 0.0], 0.01, 300);
+        let mut record = Record::of_first("th", &states, 0.01, NOISE, &format!("session {k}"));
+        record.signals[0].1.iter_mut().for_each(|th| *th += bias);
+        record
+    };
+    let mut subject =
+        subject(PENDULUM, &[17.0, 0.2, 0.8, 0.0], 2, biases.into_iter().enumerate().map(record).collect());
+    subject.measurements[2].role = Role::Selection;
+    subject
+}
+
+fn with<'a>(search: &Search<'a>, from: &Trial<'a>, name: &str) -> Trial<'a> {
+    let round = search.round(from).expect("it simulates");
+    let is = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.effect.name() == name);
+    round.trials.iter().find(is).expect("it was tried").clone()
+}
+
+#[test]
+fn what_helps_the_fit_and_hurts_the_forecast_is_left_out() {
+    let left_out = |biases: [f64; 3]| {
+        let subject = sessions(biases);
+        let simulations = Meter::new(&());
+        let some = catalogue(&["coulomb-friction", "sensor-bias"]);
+        let search = Search::new(&subject, &some, Limits::at(0.01), &simulations);
+        let calibrated = base::fit(&subject, 1, &simulations).expect("it simulates");
+        let declared = search.declared(&calibrated).expect("it simulates");
+        let with_friction = with(&search, &declared, "coulomb-friction");
+        let with_bias = with(&search, &with_friction, "sensor-bias");
+        let of = Dispersion::of(&with_bias);
+        assert!(criterion(&with_bias, &of) < criterion(&with_friction, &of) - 10.0, "it helps the fit");
+        let left = search.foreseeing(&with_bias)?;
+        Some(left.added.iter().map(|a| a.candidate.effect.name()).collect::<Vec<_>>())
+    };
+    assert_eq!(left_out([0.004, 0.004, 0.004]), None);
+    assert_eq!(left_out([0.004, 0.004, -0.002]), Some(vec!["coulomb-friction"]));
+    // Where the data are not explained without, the forecast of a model that misses something tells nothing.
+    assert_eq!(left_out([0.02, 0.02, -0.01]), None);
 }

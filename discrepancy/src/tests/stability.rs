@@ -34,7 +34,7 @@ fn chosen(named: &[&str], records: Vec<Record>) -> (String, Stability) {
     let declared = search.trial(&[], &subject.start(), vec![vec![1.0, 0.0]; count], 1, 60).expect("it simulates");
     let round = search.round(&declared).expect("it simulates");
     let best = round.trials[0].added[0].candidate.effect.name().to_owned();
-    (best, stability(&round).expect("there are rivals"))
+    (best, stability(&round, 0).expect("there are rivals"))
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use maud::{Markup, html};
 use mops_discrepancy::Diagnosis;
 
-use super::super::figures::role_name;
 use super::super::numbers::{number, significant};
 use super::super::page::scrolling;
 use crate::diagnosis::errors::lines;
@@ -38,7 +37,7 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
             tbody {
                 @for line in &lines {
                     tr {
-                        th scope="row" { (line.experiment.name) small { (role_name(line.experiment.role)) } }
+                        th scope="row" { (line.experiment.name) small { (line.experiment.role.name()) } }
                         td { @if line.channel.is_some() { (line.label()) } @else { strong { (line.label()) } } }
                         @if !same { td class="number" { (times(line.scaled[0])) } }
                         td class="number" { strong { (times(line.scaled[1])) } }

@@ -96,7 +96,7 @@ fn missing(diagnosis: &Diagnosis) -> Markup {
     html! {
         @for found in &diagnosis.found { (effect(found)) }
         @for removed in &diagnosis.removed {
-            p { "The declared term " code { (removed.term) } " " (rich(&words::at(&removed.place))) " is not needed, and was taken away." }
+            p { "The declared term " (rich(&words::term(removed))) " is not needed, and was taken away." }
         }
         p { "The repaired study stands in " code { "repaired.toml" } " beside this page and runs by itself; what it predicts, in " code { "predictions" } "." }
     }

@@ -76,7 +76,12 @@ fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
 
 /// The models that the search passed through.
 pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
+    let mut windows: Vec<usize> = diagnosis.steps.iter().map(|step| step.windows).collect();
+    windows.dedup();
     html! {
+        @if windows.len() > 1 {
+            p class="quiet" { "Windows have start values of their own: errors in more of them are smaller, and not to be compared with those of whole records." }
+        }
         table {
             thead { tr { th scope="col" { "step" } th scope="col" { "effects in the model" } th scope="col" class="number" { "error, times the noise" } } }
             tbody {

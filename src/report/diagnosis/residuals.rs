@@ -3,7 +3,7 @@
 use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Prediction};
 
-use super::super::figures::{Figure, Group, role_name};
+use super::super::figures::{Figure, Group};
 use super::super::numbers::{labelled, with_unit};
 use super::super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
 use super::super::sampling::thinned;
@@ -28,7 +28,7 @@ fn drawn(diagnosis: &Diagnosis) -> Vec<&[Prediction]> {
 }
 
 fn title(channels: &[Prediction]) -> String {
-    format!("Experiment `{}` ({})", channels[0].experiment, role_name(channels[0].role))
+    format!("Experiment `{}` ({})", channels[0].experiment, channels[0].role.name())
 }
 
 /// A group for every experiment: a column of plots for every channel, with spectrum and autocorrelation in the first.

@@ -72,20 +72,33 @@ fn build_input(
     Ok((name.clone(), input))
 }
 
-/// Recordings without a unit where the model has one.
-pub(super) fn assumed_units(draft: &CaseDraft, models: &Models) -> Vec<String> {
+/// Recordings without a unit where the model has one, each signal or input with the experiments in which it is so.
+pub(super) fn assumed_units(drafts: &[CaseDraft], models: &Models) -> Vec<String> {
     let interfaces = || models.iter().map(|(_, model)| model.interface());
     let signals: Vec<&Variable> = interfaces().flat_map(|interface| &interface.signals).collect();
     let inputs: Vec<&Variable> = interfaces().flat_map(|interface| &interface.inputs).collect();
-    let note = |name: &str, known: &[&Variable]| {
-        let unit = known.iter().find(|v| v.name == name).map(|v| v.unit.to_string()).filter(|unit| unit != "1")?;
-        Some(format!("`{name}` in `{}` has no unit in the file: taken as {unit}", draft.name))
+    let unit = |name: &str, known: &[&Variable]| {
+        known.iter().find(|v| v.name == name).map(|v| v.unit.to_string()).filter(|unit| unit != "1")
     };
-    let channels = draft.measured.iter().flat_map(|m| &m.channels).filter(|channel| channel.unit.is_none());
-    let recorded =
-        draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && matches!(input, Input::Sampled { .. }));
-    let channels = channels.filter_map(|channel| note(&channel.signal, &signals));
-    channels.chain(recorded.filter_map(|(name, ..)| note(name, &inputs))).collect()
+    let mut assumed: Vec<(&str, String, Vec<String>)> = Vec::new();
+    for draft in drafts {
+        let channels = draft.measured.iter().flat_map(|m| &m.channels).filter(|channel| channel.unit.is_none());
+        let channels = channels.map(|channel| (channel.signal.as_str(), &signals));
+        let sampled = |input: &Input| matches!(input, Input::Sampled { .. });
+        let recorded = draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && sampled(input));
+        for (name, known) in channels.chain(recorded.map(|(name, ..)| (name.as_str(), &inputs))) {
+            let Some(unit) = unit(name, known) else { continue };
+            let own = format!("`{}`", draft.name);
+            match assumed.iter_mut().find(|(other, ..)| *other == name) {
+                Some((.., experiments)) => experiments.push(own),
+                None => assumed.push((name, unit, vec![own])),
+            }
+        }
+    }
+    let note = |(name, unit, experiments): (&str, String, Vec<String>)| {
+        format!("`{name}` has no unit in the file of {}: taken as {unit}", experiments.join(", "))
+    };
+    assumed.into_iter().map(note).collect()
 }
 
 fn build_experiment(

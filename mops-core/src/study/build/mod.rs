@@ -69,7 +69,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
             if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
         }
     });
-    let notes = drafts.iter().flat_map(|case| assumed_units(case, &models)).collect();
+    let notes = assumed_units(&drafts, &models);
     let mut study = Study {
         name: draft.name,
         task: draft.task,

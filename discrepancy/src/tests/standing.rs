@@ -1,0 +1,72 @@
+//! What is said of an effect beside its rivals, wherever the search ended.
+
+use std::sync::Arc;
+
+use crate::base;
+use crate::meter::Meter;
+use crate::round::Round;
+use crate::search::{Limits, Search};
+use crate::standing::Standing;
+use crate::testing::{Record, catalogue, integrated, subject};
+use crate::weigh::{Dispersion, criterion};
+
+/// A pendulum: `w' = -g sin(th) - b w`.
+const PENDULUM: &str = r#"
+states     = { th = "rad", w = "rad/s" }
+parameters = { g = "1/s^2", b = "1/s" }
+der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
+"#;
+const NOISE: f64 = 0.01;
+
+fn swing() -> Record {
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.5 * (x[1] / 1e-3).tanh()];
+    Record::of_first("th", &integrated(rates, [0.9, 0.0], 0.01, 400), 0.01, NOISE, "swing")
+}
+
+#[test]
+fn a_likelier_rival_of_what_was_chosen_is_told_first() {
+    let subject = subject(PENDULUM, &[17.0, 0.2, 0.9, 0.0], 2, vec![swing()]);
+    let simulations = Meter::new(&());
+    let some = catalogue(&["coulomb-friction", "asymmetric-friction", "linear-stiffness"]);
+    let search = Search::new(&subject, &some, Limits::at(0.01), &simulations);
+    let declared = search.declared(&base::fit(&subject, 1, &simulations).expect("it simulates")).expect("it simulates");
+    let rounds = [search.round(&declared).expect("it simulates")];
+    let names: Vec<_> = rounds[0].trials.iter().map(|t| t.added[0].candidate.effect.name()).collect();
+    assert_eq!(names[..2], ["coulomb-friction", "asymmetric-friction"]);
+
+    let first = Standing::of(&search, &rounds, &rounds[0].trials[0], 0).expect("it was tried");
+    let second = Standing::of(&search, &rounds, &rounds[0].trials[1], 0).expect("it was tried");
+    assert!(
+        first.probability() > 0.5 && second.probability() < 0.5,
+        "{} {}",
+        first.probability(),
+        second.probability()
+    );
+    assert!((first.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    let (behind, ahead) = (first.rivals(), second.rivals());
+    assert!(behind.iter().all(|rival| rival.bic_behind > 0.0), "{behind:?}");
+    assert!(ahead[0].effect == "coulomb-friction" && ahead[0].bic_behind < 0.0, "{ahead:?}");
+}
+
+#[test]
+fn what_an_effect_gains_is_told_over_the_windows_of_the_model_without_it() {
+    let subject = subject(PENDULUM, &[17.0, 0.2, 0.9, 0.0], 2, vec![swing()]);
+    let simulations = Meter::new(&());
+    let some = catalogue(&["coulomb-friction"]);
+    let search = Search::new(&subject, &some, Limits::at(0.01), &simulations);
+    let declared = search.declared(&base::fit(&subject, 1, &simulations).expect("it simulates")).expect("it simulates");
+    let round = search.round(&declared).expect("it simulates");
+    let tuners = &declared.fitted.point.globals;
+    let locals = base::first_locals(&search.pieces(4));
+    let windows = search.trial(&[], tuners, locals, 4, 40).expect("it simulates");
+    let own = &round.trials[0];
+    let of = Dispersion::of(own);
+    // Windows forgive much of what whole records show.
+    let mixed = criterion(&windows, &of) - criterion(own, &of);
+    let whole = criterion(&declared, &of) - criterion(own, &of);
+    let mut apart = Round::clone(&round);
+    apart.from = windows;
+    let rounds = [Arc::new(apart)];
+    let told = Standing::of(&search, &rounds, own, 0).expect("it was tried").gains[0];
+    assert!(mixed < told && told < whole, "{mixed} {told} {whole}");
+}
