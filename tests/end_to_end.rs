@@ -249,6 +249,24 @@ fn check_list_and_describe_tell_what_is_there() {
 }
 
 #[test]
+fn check_tells_what_the_experiments_measure_and_what_is_fixed() {
+    let shown = |arguments: &[&str]| {
+        let output = mops(&[&["check", "furuta-discrepancy"], arguments].concat()).output().unwrap();
+        let lines = String::from_utf8(output.stdout).unwrap();
+        lines.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect::<Vec<String>>()
+    };
+    let has = |lines: &[String], row: &str| lines.iter().any(|line| line == row);
+    let alike = shown(&[]);
+    for row in ["pushed selection phi 401 4 s 0.003 rad", "theta 401 4 s 0.003 rad", "all a 0.0009035 kg m2"] {
+        assert!(has(&alike, row), "{row}: {alike:?}");
+    }
+    let apart = shown(&["--set", "experiments.pushed.parameters.cp=1e-5"]);
+    for row in ["all a 0.0009035 kg m2", "horizontal cp 0 N m", "pushed cp 1e-5 N m", "upright cp 0 N m"] {
+        assert!(has(&apart, row), "{row}: {apart:?}");
+    }
+}
+
+#[test]
 fn every_effect_is_listed_and_has_a_page_with_its_strengths() {
     let list = String::from_utf8(mops(&["list", "effects"]).output().unwrap().stdout).unwrap();
     assert!(!list.contains("settling-time"), "{list}");

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use mops_core::Role;
 
+use crate::candidate::Candidate;
 use crate::diagnosis::{Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked, StrengthValue};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
@@ -112,11 +113,20 @@ pub fn found(index: usize, last: &Trial<'_>, after: &Calibrated<'_>, standing: O
     }
 }
 
-/// What an effect does for data that were held back, beside the others of the model that `after` is; empty where the model
-/// without it cannot be followed over whole records.
-pub fn held_back<'a>(search: &Search<'a>, after: &Calibrated<'a>, standing: &Standing<'_, 'a>) -> Vec<HeldBack> {
-    let from = Some(&standing.round.from).filter(|from| from.windows == 1);
-    let Some(without) = from.and_then(|from| search.calibrate(from, &[])) else { return Vec::new() };
+/// What an effect does for data that were held back, beside the others of the model that `after` is, without the declared terms
+/// `held`; empty where the model without it cannot be followed over whole records.
+pub fn held_back<'a>(
+    search: &Search<'a>,
+    after: &Calibrated<'a>,
+    standing: &Standing<'_, 'a>,
+    held: &[usize],
+) -> Vec<HeldBack> {
+    let mut from = standing.round.from.clone();
+    if from.windows > 1 || from.added.len() + 1 != after.added.len() {
+        return Vec::new();
+    }
+    held.iter().for_each(|&k| from.fitted.point.globals[k] = after.fitted.point.globals[k]);
+    let Some(without) = search.calibrate(&from, held) else { return Vec::new() };
     let told = |role| {
         let [without, with] = [&without, after].map(|model| model.error_on(role, search.subject));
         Some(HeldBack { role, without: without?, with: with? })
@@ -142,16 +152,9 @@ pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>) {
 /// The experiment that would best tell an effect found from the first rival that the data cannot tell from it.
 pub fn next_experiment(standings: &[Option<Standing<'_, '_>>]) -> Option<String> {
     standings.iter().flatten().find_map(|standing| {
-        let rival = standing.rivals().into_iter().next()?;
-        let trials = &standing.round.trials;
-        let is_rival = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.is_named(&rival.effect, &rival.place));
-        let own = &trials[standing.own];
-        let newest = own.newest()?;
-        let names = [
-            format!("`{}` at {}", newest.effect.name(), newest.place()),
-            format!("`{}` at {}", rival.effect, rival.place),
-        ];
-        separating(own, trials.iter().find(is_rival)?, [&names[0], &names[1]])
+        let (own, rival) = (&standing.round.trials[standing.own], standing.rival()?);
+        let name = |newest: &Candidate| format!("`{}` at {}", newest.effect.name(), newest.place());
+        separating(own, rival, [&name(own.newest()?), &name(rival.newest()?)])
     })
 }
 
@@ -194,6 +197,23 @@ pub fn moves(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>)
         }
     };
     subject.globals.iter().enumerate().map(one).collect()
+}
+
+/// Tuners at a bound, but for those of declared terms that went: a bound may be what is missing.
+pub fn at_bounds(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>, held: &[usize]) -> Vec<String> {
+    let one = |k: usize| {
+        let tuner = &subject.study.tuners[subject.globals[k]];
+        let [declared, repaired] = [before, after].map(|model| tuner.at_bound(model.tuners[k]));
+        let (side, of) = match (declared, repaired) {
+            (Some(side), Some(_)) => (side, "of the declared and of the repaired model"),
+            (Some(side), None) => (side, "of the declared model"),
+            (None, Some(side)) => (side, "of the repaired model"),
+            (None, None) => return None,
+        };
+        let bound = tuner.unit.amount(tuner.bounds[usize::from(side == "upper")]);
+        Some(format!("`{}` {of} sits at its {side} bound {bound}: is the range wide enough?", tuner.name))
+    };
+    (0..subject.globals.len()).filter(|k| !held.contains(k)).filter_map(one).collect()
 }
 
 pub fn predictions(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>) -> Vec<Prediction> {

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use mops_core::{Effect, Mistake, Study, Watch};
 use rayon::prelude::*;
 
-use crate::account::{found, held_back, moves, next_experiment, noticeable, predictions, ranking, starts, widen};
+use crate::account::{
+    at_bounds, found, held_back, moves, next_experiment, noticeable, predictions, ranking, starts, widen,
+};
 use crate::base;
 use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
@@ -107,7 +109,8 @@ fn explain(
     let mut found: Vec<Found> = named.map(|index| found(index, &last, &after, standings[index].as_ref())).collect();
     if found.len() > 1 {
         let told = |(found, standing): (&mut Found, &Option<_>)| {
-            found.held_back = standing.as_ref().map_or_else(Vec::new, |standing| held_back(&search, &after, standing));
+            found.held_back =
+                standing.as_ref().map_or_else(Vec::new, |standing| held_back(&search, &after, standing, &held));
         };
         found.par_iter_mut().zip(&standings).for_each(told);
     }
@@ -126,6 +129,7 @@ fn explain(
         Verdict::Unexplained => TRULY_UNEXPLAINED,
     };
     let starts = starts(&subject, &after, &found);
+    let at_bounds = at_bounds(&subject, &before, &after, &held);
     let full =
         format!("the search ended at {} effects, `max-effects`; more may explain what is left", options.max_effects);
     let full = (is_full && verdict == Verdict::Unexplained).then_some(full);
@@ -145,7 +149,7 @@ fn explain(
         noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject, options.level) } else { Vec::new() },
         evidence: located.into_iter().map(|l| l.evidence).collect(),
         predictions: predictions(&subject, &before, &after),
-        notes: subject.notes.iter().cloned().chain(note).chain(full).collect(),
+        notes: subject.notes.iter().cloned().chain(at_bounds).chain(note).chain(full).collect(),
         starts,
         simulations: simulations.count(),
     })

@@ -33,7 +33,7 @@ pub struct StrengthValue {
     pub interval95: Option<[f64; 2]>,
 }
 
-/// Another effect that explains the data about as well.
+/// Another effect that explains the data about as well, or better.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {
     /// The effect.
@@ -42,8 +42,8 @@ pub struct Rival {
     pub place: String,
     /// Its probability.
     pub probability: f64,
-    /// How far its BIC, without the price of strengths that the data tell nothing of, lies above that of the effect found;
-    /// under 2 the data cannot tell them apart.
+    /// How far its BIC, without the price of strengths that the data tell nothing of, lies above that of the effect found: within
+    /// 2 the data cannot tell them apart, below -2 they prefer it.
     pub bic_behind: f64,
     /// Cosine between the traces of the two in the outputs, what the parameters absorb taken out; 1: the same.
     pub likeness: f64,
@@ -72,12 +72,12 @@ pub struct Found {
     pub probability: f64,
     /// How much the BIC falls by adding it.
     pub bic_gain: f64,
-    /// Effects within 6 of its BIC.
+    /// Other effects in its place whose BIC is less than 6 above its own, or below it.
     pub indistinguishable: Vec<Rival>,
     /// How its choice holds where the data change; `None` where nothing was tried beside it.
     pub stability: Option<Stability>,
-    /// What it does for data that no parameter was fitted to; empty where it is the only effect, as the errors before and after
-    /// tell that.
+    /// What it does for data that no parameter was fitted to, only start values. Empty where it is the only effect, as the errors
+    /// before and after tell that, and where the model without it cannot be followed over whole records.
     pub held_back: Vec<HeldBack>,
 }
 
@@ -149,6 +149,13 @@ pub struct ExperimentError {
     pub normalised: f64,
     /// The same in windows of a few periods; `None` where the record is too short for two.
     pub in_windows: Option<WindowErrors>,
+}
+
+/// Error on the experiments of a role together, the root of their mean square, in units of the noise; `None` where there are none.
+#[allow(clippy::cast_precision_loss)]
+pub fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
 /// Errors over windows of a record, each with start values of its own and the parameters held.

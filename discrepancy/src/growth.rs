@@ -48,6 +48,12 @@ impl<'a> Growth<'a> {
         format!("{next}; so far {found} ({left:.2} times the noise left)")
     }
 
+    /// Whether the first round ended at the model that there is now.
+    fn begins_with_last(&self) -> bool {
+        let best = self.rounds.first().and_then(|round| round.trials.first());
+        best.is_some_and(|best| best.has_same_set(&self.last))
+    }
+
     /// Goes on to another model.
     fn step(&mut self, did: &'static str, to: Trial<'a>) {
         let name = |a: &Added| format!("{} at {}", a.candidate.effect.name(), a.candidate.place());
@@ -183,8 +189,8 @@ impl<'a> Search<'a> {
             if let Some(pruned) = self.pruned(&growth.last, self.limits.level) {
                 growth.step("left out", pruned);
             }
-            while let Some(foreseeing) = self.foreseeing(&growth.last) {
-                growth.step("left out", foreseeing);
+            while let Some(better) = self.forecasting_better(&growth.last) {
+                growth.step("left out", better);
             }
             while growth.last.added.len() > 1 && growth.last.windows == 1 {
                 let Some((one, round)) = self.merged(&growth.last) else { break };
@@ -193,8 +199,8 @@ impl<'a> Search<'a> {
             }
             let is_settled = match growth.last.added.len() {
                 0 => true,
-                // The round weighed it as white residuals do.
-                1 => Dispersion::of(&growth.last).repeats == 1.0,
+                // Its own round weighed it as white residuals do.
+                1 => Dispersion::of(&growth.last).repeats == 1.0 && growth.begins_with_last(),
                 _ => false,
             };
             if is_settled || growth.last.windows > 1 {
@@ -248,8 +254,8 @@ impl<'a> Search<'a> {
     /// The growth with what declared terms its effects make superfluous, at zero; beside it the model without them.
     pub fn reduce(&self, mut growth: Growth<'a>) -> (Growth<'a>, Trial<'a>, Vec<usize>) {
         let (reduced, held) = self.without_declared(growth.last.clone());
-        let Some((simpler, index)) = self.restated(&growth, &reduced, &held) else { return (growth, reduced, held) };
-        growth.rounds[index] = Arc::clone(&growth.rounds[index]).led(&simpler);
+        let Some(simpler) = self.restated(&growth, &reduced, &held) else { return (growth, reduced, held) };
+        growth.rounds = self.held_against_rivals(&simpler);
         growth.step("exchanged", simpler);
         growth = self.reshape(growth);
         let (reduced, held) = self.without_declared(growth.last.clone());
@@ -257,9 +263,8 @@ impl<'a> Search<'a> {
     }
 
     /// The model with declared terms back in that an effect made superfluous, and with a simpler one in the place of that, where
-    /// it is not clearly worse; and the index of its round. Else a constant beside a declared loss is told as a loss towards
-    /// elsewhere.
-    fn restated(&self, growth: &Growth<'a>, reduced: &Trial<'a>, held: &[usize]) -> Option<(Trial<'a>, usize)> {
+    /// it is not clearly worse. Else a constant beside a declared loss is told as a loss towards elsewhere.
+    fn restated(&self, growth: &Growth<'a>, reduced: &Trial<'a>, held: &[usize]) -> Option<Trial<'a>> {
         if held.is_empty() {
             return None;
         }
@@ -269,7 +274,7 @@ impl<'a> Search<'a> {
         let terms = held.len() as f64 * of.worth(reduced.fitted.count);
         let mut tuners = reduced.fitted.point.globals[..self.subject.globals.len()].to_vec();
         held.iter().for_each(|&k| tuners[k] = self.subject.start()[k]);
-        let mut trials: Vec<(Trial<'a>, usize)> = Vec::new();
+        let mut trials: Vec<Trial<'a>> = Vec::new();
         for (index, own) in reduced.added.iter().enumerate() {
             let Some(round) = best_in(&growth.rounds, |newest| newest.is(&own.candidate)) else { continue };
             let others = [&reduced.added[..index], &reduced.added[index + 1..]].concat();
@@ -287,11 +292,10 @@ impl<'a> Search<'a> {
                 Some(known.cloned().unwrap_or(anew))
             };
             let screened: Vec<&Screened> = growth.rounds[round].screened.iter().filter(simpler).collect();
-            let fitted: Vec<Trial<'a>> = screened.into_par_iter().filter_map(fit).collect();
-            trials.extend(fitted.into_iter().map(|trial| (trial, round)));
+            trials.par_extend(screened.into_par_iter().filter_map(fit));
         }
-        trials.retain(|(trial, _)| criterion(trial, &of) + terms < criterion(reduced, &of) + CLEARLY);
-        trials.into_iter().min_by(|a, b| criterion(&a.0, &of).total_cmp(&criterion(&b.0, &of)))
+        trials.retain(|trial| criterion(trial, &of) + terms < criterion(reduced, &of) + CLEARLY);
+        least(&trials, &of).cloned()
     }
 
     /// The model with one of its effects exchanged, as long as something is left and not too many were.
@@ -304,14 +308,13 @@ impl<'a> Search<'a> {
         self.exchanged(last).0
     }
 
-    /// The model with another in place of one of its effects, where that is clearly better; and the rounds in which each was
-    /// held against its rivals.
+    /// The model with another in place of one of its effects, where that is better, or clearly better where it is another fit of
+    /// the same effects; and the rounds in which each was held against its rivals.
     fn exchanged(&self, last: &Trial<'a>) -> (Option<Trial<'a>>, Vec<Arc<Round<'a>>>) {
         let rounds = self.held_against_rivals(last);
         let of = Dispersion::of(last);
         let better = least(rounds.iter().filter_map(|round| round.trials.first()), &of);
-        // The same once more, as another fit of it ended, is not another.
-        let margin = |b: &Trial<'_>| if b.has_the_effects_of(last) { CLEARLY } else { 0.0 };
+        let margin = |b: &Trial<'_>| if b.has_same_set(last) { CLEARLY } else { 0.0 };
         let exchanged = better.filter(|b| criterion(b, &of) < criterion(last, &of) - margin(b)).cloned();
         (exchanged, rounds)
     }

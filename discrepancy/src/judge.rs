@@ -144,7 +144,9 @@ fn left(last: &Trial<'_>) -> (f64, Option<String>) {
     let what = if gain > 0.0 {
         format!("a free signal at `{at}` would lower the error on samples left out by {share:.0} %")
     } else {
-        "no free signal at one place foretells it; the noise may be larger than supposed".to_owned()
+        format!(
+            "a free signal at `{at}`, the likeliest place, does not foretell it; the noise may be larger than supposed"
+        )
     };
     let note = format!("{error:.2} times the noise is left on calibration{data} data; {what}");
     (gain, Some(note))

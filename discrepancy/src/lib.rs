@@ -53,6 +53,6 @@ pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked,
-    Removed, Rival, Step, StrengthValue, Unexplained, Verdict, WindowErrors,
+    Removed, Rival, Step, StrengthValue, Unexplained, Verdict, WindowErrors, together,
 };
 pub use stability::{HangsOn, Stability};

@@ -4,7 +4,7 @@ use mops_core::{Port, Role};
 use nalgebra::DMatrix;
 
 use crate::base;
-use crate::diagnosis::{ExperimentError, StrengthValue};
+use crate::diagnosis::{ExperimentError, StrengthValue, together};
 use crate::fit::{Fit, Fitted, Point};
 use crate::profile::{QUANTILE, interval95};
 use crate::search::{ASTRAY, Search, Trial};
@@ -45,15 +45,32 @@ impl<'a> Search<'a> {
     /// Fits the effects and the tuners to calibration data, from where a trial over all data ended, and the start values of
     /// the other experiments with these.
     pub fn calibrate(&self, trial: &Trial<'a>, held: &[usize]) -> Option<Calibrated<'a>> {
+        let mut calibrated = self.fitted_to_calibration_data(trial, held)?;
+        let all = (0..self.subject.measurements.len()).map(|index| self.said(trial, &calibrated, index));
+        calibrated.experiments = all.collect::<Option<_>>()?;
+        Some(calibrated)
+    }
+
+    /// What the trial, fitted to calibration data alone, leaves on the samples of selection data, in units of the noise.
+    pub fn left_on_selection_data(&self, trial: &Trial<'a>) -> Option<Vec<f64>> {
+        let calibrated = self.fitted_to_calibration_data(trial, &[])?;
+        let mut left = Vec::new();
+        for (index, m) in self.subject.measurements.iter().enumerate().filter(|(_, m)| m.role == Role::Selection) {
+            let said = self.said(trial, &calibrated, index)?;
+            for (s, predicted) in m.series.iter().zip(&said.predicted) {
+                left.extend(predicted.iter().zip(&s.values).map(|(p, y)| (p - y) / s.noise));
+            }
+        }
+        Some(left)
+    }
+
+    /// Fits the effects and the tuners to calibration data; nothing is said of any experiment.
+    fn fitted_to_calibration_data(&self, trial: &Trial<'a>, held: &[usize]) -> Option<Calibrated<'a>> {
         let subject = self.subject;
         let pieces = base::pieces(subject, |role| role == Role::Calibration);
-        let of_trial = |measurement: usize, count: usize| {
-            let piece = trial.fit.pieces.iter().position(|p| p.measurement == measurement && trial.windows == 1)?;
-            Some(trial.fitted.point.locals[piece][..count].to_vec())
-        };
         let mut locals = base::first_locals(&pieces);
         for (piece, locals) in pieces.iter().zip(&mut locals) {
-            if let Some(known) = of_trial(piece.measurement, piece.locals.len()) {
+            if let Some(known) = locals_of(trial, piece.measurement, piece.locals.len()) {
                 *locals = known;
             }
         }
@@ -70,17 +87,20 @@ impl<'a> Search<'a> {
         }
         let tuners = fitted.point.globals[..subject.globals.len()].to_vec();
         let dispersion = Dispersion::left(&fit, &fitted);
-        let enough = ASTRAY * dispersion.square.sqrt();
-        let mut experiments = Vec::new();
-        for (index, measurement) in subject.measurements.iter().enumerate() {
-            let known = fit.pieces.iter().position(|p| p.measurement == index);
-            experiments.push(match known {
-                Some(piece) => prognosis(&fit, &fitted.point, piece, measurement)?,
-                None => self.forecast(&added, &tuners, index, of_trial(index, measurement.locals.len()), enough)?,
-            });
-        }
         let covariance = fit.covariance(&fitted, dispersion.weight());
+        let experiments = Vec::new();
         Some(Calibrated { added, tuners, covariance, fit, fitted, dispersion, free, experiments })
+    }
+
+    /// What a model fitted to calibration data says of an experiment; start values of the others begin where a trial has them.
+    fn said(&self, trial: &Trial<'a>, calibrated: &Calibrated<'a>, index: usize) -> Option<Prognosis> {
+        let measurement = &self.subject.measurements[index];
+        let Calibrated { fit, fitted, added, tuners, .. } = calibrated;
+        if let Some(piece) = fit.pieces.iter().position(|p| p.measurement == index) {
+            return prognosis(fit, &fitted.point, piece, measurement);
+        }
+        let enough = ASTRAY * calibrated.dispersion.square.sqrt();
+        self.forecast(added, tuners, index, locals_of(trial, index, measurement.locals.len()), enough)
     }
 
     /// Start values of an experiment with everything else held, and what the model then says; `enough` is what it may leave.
@@ -99,6 +119,12 @@ impl<'a> Search<'a> {
         let (fit, fitted) = self.begun(added, tuners, &piece, beginnings, enough)?;
         prognosis(&fit, &fitted.point, 0, measurement)
     }
+}
+
+/// The first so many start values of an experiment in a trial over whole records.
+fn locals_of(trial: &Trial<'_>, measurement: usize, count: usize) -> Option<Vec<f64>> {
+    let piece = trial.fit.pieces.iter().position(|p| p.measurement == measurement && trial.windows == 1)?;
+    Some(trial.fitted.point.locals[piece][..count].to_vec())
 }
 
 fn prognosis(fit: &Fit<'_>, point: &Point, piece: usize, measurement: &Measurement) -> Option<Prognosis> {
@@ -145,12 +171,9 @@ impl Calibrated<'_> {
         measurements.iter().zip(&self.experiments).map(error).collect()
     }
 
-    /// Root mean square of the normalised errors on the experiments of a role; `None` where there are none.
-    #[allow(clippy::cast_precision_loss)]
+    /// Its error on the experiments of a role together; `None` where there are none.
     pub fn error_on(&self, role: Role, subject: &Subject) -> Option<f64> {
-        let errors = self.errors(&subject.measurements);
-        let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
-        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+        together(&self.errors(&subject.measurements), role)
     }
 
     /// The strengths of an effect, with what the data say of them.

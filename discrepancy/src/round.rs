@@ -65,14 +65,6 @@ impl<'a> Round<'a> {
         best_first(&mut round.trials);
         Arc::new(round)
     }
-
-    /// The round with a model that was chosen, as the first.
-    pub fn led(self: Arc<Self>, chosen: &Trial<'a>) -> Arc<Self> {
-        let mut round = Self::clone(&self);
-        round.trials.retain(|known| !known.has_effects_of(chosen));
-        round.trials.insert(0, chosen.clone());
-        Arc::new(round)
-    }
 }
 
 /// The index of the round in which such an effect did best.

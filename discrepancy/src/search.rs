@@ -360,14 +360,14 @@ impl<'a> Trial<'a> {
             && (self.fitted.chi2 - other.fitted.chi2).abs() <= SHARE * self.fitted.chi2
     }
 
-    /// Whether it has the same effects.
+    /// Whether it has the same effects in the same order.
     pub(crate) fn has_effects_of(&self, other: &Self) -> bool {
         let mut pairs = self.added.iter().zip(&other.added);
         self.added.len() == other.added.len() && pairs.all(|(a, b)| a.candidate.is(&b.candidate))
     }
 
     /// Whether it has the same effects, in any order.
-    pub(crate) fn has_the_effects_of(&self, other: &Self) -> bool {
+    pub(crate) fn has_same_set(&self, other: &Self) -> bool {
         let has = |b: &Added| self.added.iter().any(|a| a.candidate.is(&b.candidate));
         self.added.len() == other.added.len() && other.added.iter().all(has)
     }

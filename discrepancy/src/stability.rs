@@ -42,10 +42,10 @@ pub struct HangsOn {
 
 /// The stability of the effect of one of the models of a round; `None` where it has no rival over the same data.
 pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {
-    let best = &round.trials[own];
-    let of = Dispersion::of(best);
-    let others = round.trials.iter().enumerate().filter(|(k, t)| *k != own && t.windows == best.windows);
-    let rivals: Vec<&Trial<'_>> = std::iter::once(best).chain(others.map(|(_, t)| t)).collect();
+    let own = &round.trials[own];
+    let of = Dispersion::of(own);
+    let others = round.trials.iter().enumerate().filter(|(_, t)| !std::ptr::eq(*t, own) && t.windows == own.windows);
+    let rivals: Vec<&Trial<'_>> = std::iter::once(own).chain(others.map(|(_, t)| t)).collect();
     if rivals.len() < 2 {
         return None;
     }
@@ -60,7 +60,7 @@ pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {
         };
         (0..rivals.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))).expect("there are two")
     };
-    let owner = owners(best, &of);
+    let owner = owners(own, &of);
     let mut random = stream(0, "stability");
     let mut same = 0;
     for _ in 0..DRAWS {
@@ -74,12 +74,15 @@ pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {
     let without = |&left_out: &usize| {
         let trials: Vec<Trial<'_>> = few.par_iter().filter_map(|t| refitted_without(t, left_out)).collect();
         let of = Dispersion::of(trials.iter().min_by(|a, b| a.fitted.chi2.total_cmp(&b.fitted.chi2))?);
-        let (own, other) = (best.newest()?, least(&trials, &of)?.newest()?);
-        let experiment = best.fit.subject.measurements[left_out].name.clone();
+        let (own_effect, other) = (own.newest()?, least(&trials, &of)?.newest()?);
+        let experiment = own.fit.subject.measurements[left_out].name.clone();
         let (effect, place) = (other.effect.name().to_owned(), other.place());
-        (!own.is(other)).then_some(HangsOn { experiment, effect, place })
+        (!own_effect.is(other)).then_some(HangsOn { experiment, effect, place })
     };
-    let hangs_on = if measurements.len() > 1 { measurements.iter().filter_map(without).collect() } else { Vec::new() };
+    // What all data prefer to it is told as its rival.
+    let leads = leader(&vec![1.0; owner.len()]) == 0;
+    let hangs_on =
+        if leads && measurements.len() > 1 { measurements.iter().filter_map(without).collect() } else { Vec::new() };
     #[allow(clippy::cast_precision_loss)]
     Some(Stability { share: same as f64 / DRAWS as f64, hangs_on })
 }

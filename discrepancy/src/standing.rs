@@ -3,14 +3,11 @@
 use std::sync::Arc;
 
 use crate::base;
-use crate::candidate::Candidate;
 use crate::diagnosis::Rival;
 use crate::fit::dot;
 use crate::round::{Round, best_in};
 use crate::screen::Screened;
 use crate::search::{Search, Trial};
-use crate::stopgap::is_table;
-use crate::variant::Added;
 use crate::weigh::{CLEARLY, Dispersion, criterion, probabilities, weighed};
 
 /// An effect found beside what was tried in its place.
@@ -52,21 +49,36 @@ impl<'r, 'a> Standing<'r, 'a> {
             self.round.screened.iter().find(|s| s.added.candidate.is(newest))
         };
         let own = screened(&self.round.trials[self.own]);
-        let rival = |(index, trial): (usize, &Trial<'_>)| {
-            let behind = self.criteria[index] - self.criteria[self.own];
-            let newest = trial.newest().filter(|_| index != self.own && behind < CLEARLY)?;
+        let rival = |index: usize| {
+            let trial = &self.round.trials[index];
+            let newest = trial.newest()?;
             let likeness = own.zip(screened(trial)).map_or(f64::NAN, |(x, y)| dot(&x.direction, &y.direction).abs());
             Some(Rival {
                 effect: newest.effect.name().to_owned(),
                 place: newest.place(),
                 probability: self.probabilities[index],
-                bic_behind: behind,
+                bic_behind: self.behind(index),
                 likeness,
             })
         };
-        let mut rivals: Vec<Rival> = self.round.trials.iter().enumerate().filter_map(rival).collect();
-        rivals.sort_by(|a, b| a.bic_behind.total_cmp(&b.bic_behind));
-        rivals
+        self.close().into_iter().filter_map(rival).collect()
+    }
+
+    /// The model with the first of the rivals in its place.
+    pub fn rival(&self) -> Option<&Trial<'a>> {
+        Some(&self.round.trials[*self.close().first()?])
+    }
+
+    /// Indices of the models of rivals, the best first.
+    fn close(&self) -> Vec<usize> {
+        let is_close = |&index: &usize| index != self.own && self.behind(index) < CLEARLY;
+        let mut close: Vec<usize> = (0..self.criteria.len()).filter(is_close).collect();
+        close.sort_by(|&a, &b| self.behind(a).total_cmp(&self.behind(b)));
+        close
+    }
+
+    fn behind(&self, index: usize) -> f64 {
+        self.criteria[index] - self.criteria[self.own]
     }
 }
 
@@ -74,24 +86,15 @@ impl<'r, 'a> Standing<'r, 'a> {
 /// best.
 fn place_in<'r, 'a>(rounds: &'r [Arc<Round<'a>>], last: &Trial<'a>, index: usize) -> Option<(&'r Round<'a>, usize)> {
     let own = &last.added[index].candidate;
-    let is_other = |k: usize| k != index && !is_table(&last.added[k]);
-    let others: Vec<&Candidate> =
-        (0..last.added.len()).filter(|&k| is_other(k)).map(|k| &last.added[k].candidate).collect();
-    let is_among = |added: &Added| others.iter().any(|other| other.is(&added.candidate));
-    let beside =
-        |round: &&Arc<Round<'a>>| round.from.added.len() == others.len() && round.from.added.iter().all(is_among);
-    let place = |round: &'r Arc<Round<'a>>| {
-        let own = round.trials.iter().position(|trial| trial.newest().is_some_and(|newest| newest.is(own)))?;
-        Some((round.as_ref(), own))
-    };
-    let held = rounds.iter().filter(beside).find_map(place);
+    let is_own = |trial: &Trial<'_>| trial.newest().is_some_and(|newest| newest.is(own)) && trial.has_same_set(last);
+    let held = rounds.iter().find_map(|round| Some((round.as_ref(), round.trials.iter().position(is_own)?)));
     held.or_else(|| best_in(rounds, |newest| newest.is(own)).map(|index| (rounds[index].as_ref(), 0)))
 }
 
 /// By how much the criterion of a model falls by what was added to another; over the windows of that, where it cannot be
 /// followed over whole records.
 pub fn gained<'a>(search: &Search<'a>, from: &Trial<'a>, with: &Trial<'a>) -> f64 {
-    let gain = |with: &Trial<'a>| {
+    let gain = |with: &Trial<'_>| {
         let of = Dispersion::of(with);
         criterion(from, &of) - criterion(with, &of)
     };
@@ -100,5 +103,6 @@ pub fn gained<'a>(search: &Search<'a>, from: &Trial<'a>, with: &Trial<'a>) -> f6
     }
     let tuners = &with.fitted.point.globals[..search.subject.globals.len()];
     let locals = base::first_locals(&search.pieces(from.windows));
-    search.trial(&with.added, tuners, locals, from.windows, 40).map_or(f64::NAN, |with| gain(&with))
+    let in_windows = search.trial(&with.added, tuners, locals, from.windows, 40);
+    gain(in_windows.as_ref().unwrap_or(with))
 }

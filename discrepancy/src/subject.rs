@@ -107,8 +107,8 @@ impl Subject {
             .filter(|&i| study.tuners[i].case.is_none() && study.tuners[i].active && study.tuners[i].tie.is_none())
             .collect();
         let mut notes = Vec::new();
-        // By signal and unit, one for every experiment that gives none.
-        let mut estimated: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+        // By signal and unit, of every experiment that gives none.
+        let mut estimated: BTreeMap<(String, String), Vec<(String, f64)>> = BTreeMap::new();
         let mut measurements = Vec::new();
         for job in jobs {
             let plan = &study.jobs[job];
@@ -134,7 +134,7 @@ impl Subject {
                 }
                 let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
                 if channel.noise.is_none() {
-                    estimated.entry((name.clone(), unit.clone())).or_default().push(noise);
+                    estimated.entry((name.clone(), unit.clone())).or_default().push((case.name.clone(), noise));
                 }
                 series.push(Series { signal, name, unit, times, values, noise });
             }
@@ -165,11 +165,16 @@ impl Subject {
             });
         }
         for ((signal, unit), sizes) in estimated {
-            let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = sizes.iter().copied().fold(0.0, f64::max);
+            let least = sizes.iter().map(|(_, size)| *size).fold(f64::INFINITY, f64::min);
+            let most = sizes.iter().map(|(_, size)| *size).fold(0.0, f64::max);
             let size = if least < most { format!("{least:.3e} to {most:.3e}") } else { format!("{least:.3e}") };
-            let count = sizes.len();
-            let experiments = if count == 1 { String::new() } else { format!(" in each of {count} experiments") };
+            let experiments = match (sizes.len(), measurements.len()) {
+                (1, 1) => String::new(),
+                (count, all) if count == all => format!(" in each of {count} experiments"),
+                _ => {
+                    format!(" in {}", sizes.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", "))
+                }
+            };
             notes.push(format!(
                 "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {size} {unit}"
             ));

@@ -77,7 +77,7 @@ pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
     trial.fitted.chi2 / dispersion.weight() + unknowns + 2.0 * rarity
 }
 
-/// The criteria of models of which the first was chosen. What the newest effect of a rival brings in and the data hardly tell
+/// The criteria of models of which the first does best. What the newest effect of a rival brings in and the data hardly tell
 /// costs accordingly less, down to where the rival is as good as the first: a break-away force is as likely as before where
 /// nothing breaks away.
 pub fn weighed(trials: &[Trial<'_>], dispersion: &Dispersion) -> Vec<f64> {

@@ -97,29 +97,27 @@ fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
     case.experiment.as_ref().map_or_else(Vec::new, of)
 }
 
-/// Parameters that no tuner moves; what is the same in all cases is one row.
+/// Parameters that no tuner moves; one that is the same in all cases is one row.
 fn fixed(study: &Study) -> Vec<Vec<String>> {
     let of_job = |job: &JobPlan| {
         let names = &study.models[job.model].1.interface().parameters;
         let one = |(p, source): (&Parameter, &ParameterSource)| match source {
             ParameterSource::Constant(value) => {
-                Some(vec![String::new(), p.variable.name.clone(), number(*value), p.variable.unit.to_string()])
+                Some(vec![p.variable.name.clone(), number(*value), p.variable.unit.to_string()])
             }
             ParameterSource::Tuner { .. } => None,
         };
         names.iter().zip(&job.parameters).filter_map(one).collect::<Vec<_>>()
     };
     let of_jobs: Vec<Vec<Vec<String>>> = study.jobs.iter().map(of_job).collect();
-    let is_alike = of_jobs.len() > 1 && of_jobs.windows(2).all(|pair| pair[0] == pair[1]);
-    let named = |(job, rows): (&JobPlan, Vec<Vec<String>>)| {
-        let case = if is_alike { "all".to_owned() } else { study.cases[job.case].name.clone() };
-        rows.into_iter().map(move |mut row| {
-            row[0].clone_from(&case);
-            row
-        })
-    };
-    let kept = if is_alike { 1 } else { of_jobs.len() };
-    folded(study.jobs.iter().zip(of_jobs).take(kept).flat_map(named).collect(), 1)
+    let everywhere = |row: &&Vec<String>| of_jobs.len() > 1 && of_jobs.iter().all(|rows| rows.contains(row));
+    let row = |case: &str, row: &Vec<String>| [&[case.to_owned()], row.as_slice()].concat();
+    let alike = of_jobs.first().into_iter().flatten().filter(everywhere).map(|r| row("all", r));
+    let own =
+        study.jobs.iter().zip(&of_jobs).flat_map(|(job, rows)| {
+            rows.iter().filter(|r| !everywhere(r)).map(|r| row(&study.cases[job.case].name, r))
+        });
+    folded(alike.chain(own).collect(), 1)
 }
 
 fn demand(demand: Demand) -> String {

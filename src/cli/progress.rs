@@ -1,7 +1,7 @@
 //! Shows how a run goes, and hears Ctrl-C.
 
-use std::fmt::Write;
-use std::io::IsTerminal;
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,8 +17,8 @@ pub(super) struct Progress {
     interrupted: Arc<AtomicBool>,
     /// Whether the bar shows stages instead of points.
     staged: AtomicBool,
-    /// When a stage was last said in a line of its own, in seconds; `None` where a bar says it.
-    said: Option<Mutex<f64>>,
+    /// The stage that was last said in a line of its own, and when, in seconds; `None` where a bar says it.
+    said: Option<Mutex<(String, f64)>>,
     /// The study whose criteria are shown below the bar, where they are.
     study: Option<Study>,
     /// What stands below the bar.
@@ -54,7 +54,7 @@ impl Below {
 const SPARKS: usize = 40;
 
 impl Progress {
-    /// Begins to listen, and to show the bar where `shown` and standard error is a terminal.
+    /// Begins to listen, and, where `shown`, to show the bar; stages in lines where standard error is no terminal.
     pub fn new(shown: bool, budget: usize) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);
@@ -78,7 +78,7 @@ impl Progress {
             if flag.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("{heard}");
+            let _ = writeln!(std::io::stderr(), "{heard}");
         });
         let said = (shown && !std::io::stderr().is_terminal()).then(Mutex::default);
         Self { bar, interrupted, staged: AtomicBool::new(false), said, study: None, below: Mutex::default() }
@@ -136,12 +136,13 @@ impl Watch for Progress {
         self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
         self.bar.set_message(what.to_owned());
         if let Some(said) = &self.said {
-            // A log has no bar to overwrite: the longer a run, the rarer the lines.
+            // A log has no bar to overwrite: the longer a run, the rarer the lines, but for stages of another kind.
             let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
             let now = self.bar.elapsed().as_secs_f64();
-            if now - *said >= (0.05 * now).max(1.0) {
-                eprintln!("{now:>7.1} s  {what}");
-                *said = now;
+            let kind = what.split([';', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']).next().unwrap_or(what);
+            if said.0 != kind || now - said.1 >= (0.05 * now).max(1.0) {
+                let _ = writeln!(std::io::stderr(), "{now:>7.1} s  {what}");
+                *said = (kind.to_owned(), now);
             }
         }
     }

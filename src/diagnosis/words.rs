@@ -1,9 +1,7 @@
 //! A diagnosis in sentences, for the terminal and for the report; names stand between backticks.
 
 use mops_core::Role;
-use mops_discrepancy::{
-    Diagnosis, ExperimentError, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict,
-};
+use mops_discrepancy::{Diagnosis, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict, together};
 
 use crate::report::significant;
 
@@ -98,12 +96,6 @@ fn by_role(mut say: impl FnMut(Role) -> Option<String>) -> String {
 
 const ROLES: [Role; 3] = [Role::Calibration, Role::Selection, Role::Validation];
 
-/// Normalised error of the experiments of a role together: the root of their mean square.
-pub(crate) fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
-    let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
-}
-
 /// An error in units of the noise.
 pub(crate) fn times(error: f64) -> String {
     if error.is_finite() && error < 100.0 { format!("{error:.2}") } else { significant(error, 3) }
@@ -148,16 +140,19 @@ fn forecasts(found: &Found) -> Vec<String> {
     let about = format!("`{}` {}", found.effect, at(&found.place));
     let told = |is: fn(f64, f64) -> bool| {
         let those = found.held_back.iter().filter(|h| times(h.with) != times(h.without) && is(h.with, h.without));
-        let error =
-            |h: &HeldBack| format!("{} instead of {} on {} data", times(h.without), times(h.with), h.role.name());
-        those.map(error).collect::<Vec<String>>()
+        let error = |(k, h): (usize, &HeldBack)| {
+            let unit = if k == 0 { " times the noise" } else { "" };
+            let had_a_say = if h.role == Role::Selection { " (which had a say)" } else { "" };
+            format!("{} instead of {}{unit} on {} data{had_a_say}", times(h.without), times(h.with), h.role.name())
+        };
+        those.enumerate().map(error).collect::<Vec<String>>()
     };
     let (better, worse) = (told(|with, without| with < without), told(|with, without| with > without));
     let said = |sentence: &str, errors: &[String]| {
-        let text = || format!("{sentence} the error is {} (times the noise).", list(errors));
+        let text = || format!("{sentence} the error is {}.", list(errors));
         (!errors.is_empty()).then(text)
     };
-    let borne_out = said(&format!("Data held back bear out {about}: without it"), &better);
+    let borne_out = said(&format!("The model forecasts better with {about}: without it"), &better);
     borne_out.into_iter().chain(said(&format!("The model forecasts better without {about}:"), &worse)).collect()
 }
 
@@ -186,7 +181,7 @@ fn confusable(found: &Found) -> Option<String> {
     let about = format!("`{}` {}", found.effect, at(&found.place));
     let mut said = Vec::new();
     if !likelier.is_empty() {
-        said.push(format!("likelier than {about}, beside what else was found: {}", list(&likelier)));
+        said.push(format!("in the place of {about} the data prefer {}", list(&likelier)));
     }
     if !equal.is_empty() {
         said.push(format!("the data cannot tell {about} from {}", list(&equal)));
@@ -267,8 +262,8 @@ mod tests {
         assert_eq!(
             forecasts(&found),
             [
-                "Data held back bear out `coulomb-friction` in the joint `phi`: without it the error is 1.27 instead of 1.00 on selection data (times the noise).",
-                "The model forecasts better without `coulomb-friction` in the joint `phi`: the error is 0.99 instead of 1.03 on validation data (times the noise).",
+                "The model forecasts better with `coulomb-friction` in the joint `phi`: without it the error is 1.27 instead of 1.00 times the noise on selection data (which had a say).",
+                "The model forecasts better without `coulomb-friction` in the joint `phi`: the error is 0.99 instead of 1.03 times the noise on validation data.",
             ]
         );
         found.held_back = vec![held_back(Role::Validation, 1.001, 1.004)];

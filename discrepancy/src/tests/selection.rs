@@ -6,8 +6,11 @@ use mops_core::{Effect, Role};
 
 use crate::base;
 use crate::diagnosis::StrengthValue;
+use crate::growth::Growth;
 use crate::meter::Meter;
+use crate::round::Round;
 use crate::search::{Limits, Search, Trial};
+use crate::standing::Standing;
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::weigh::{Dispersion, criterion, probabilities};
@@ -106,30 +109,61 @@ fn sessions(biases: [f64; 3]) -> Subject {
     subject
 }
 
-fn with<'a>(search: &Search<'a>, from: &Trial<'a>, name: &str) -> Trial<'a> {
+fn with<'a>(search: &Search<'a>, from: &Trial<'a>, name: &str) -> (Trial<'a>, Arc<Round<'a>>) {
     let round = search.round(from).expect("it simulates");
     let is = |t: &&Trial<'_>| t.newest().is_some_and(|newest| newest.effect.name() == name);
-    round.trials.iter().find(is).expect("it was tried").clone()
+    (round.trials.iter().find(is).expect("it was tried").clone(), round)
+}
+
+/// A search over sessions with such biases of the sensor, so many samples for selection, a model with Coulomb friction and a bias, and the round that added the
+/// bias.
+fn with_friction_and_bias<T>(
+    biases: [f64; 3],
+    selection: usize,
+    look: impl for<'a> FnOnce(&Search<'a>, Trial<'a>, Arc<Round<'a>>) -> T,
+) -> T {
+    let mut subject = sessions(biases);
+    let last = &mut subject.measurements[2];
+    last.series[0].times.truncate(selection);
+    last.series[0].values.truncate(selection);
+    let simulations = Meter::new(&());
+    let some = catalogue(&["coulomb-friction", "sensor-bias"]);
+    let search = Search::new(&subject, &some, Limits::at(0.01), &simulations);
+    let calibrated = base::fit(&subject, 1, &simulations).expect("it simulates");
+    let declared = search.declared(&calibrated).expect("it simulates");
+    let (with_friction, _) = with(&search, &declared, "coulomb-friction");
+    let (with_bias, round) = with(&search, &with_friction, "sensor-bias");
+    let of = Dispersion::of(&with_bias);
+    assert!(criterion(&with_bias, &of) < criterion(&with_friction, &of) - 10.0, "it helps the fit");
+    look(&search, with_bias, round)
 }
 
 #[test]
 fn what_helps_the_fit_and_hurts_the_forecast_is_left_out() {
-    let left_out = |biases: [f64; 3]| {
-        let subject = sessions(biases);
-        let simulations = Meter::new(&());
-        let some = catalogue(&["coulomb-friction", "sensor-bias"]);
-        let search = Search::new(&subject, &some, Limits::at(0.01), &simulations);
-        let calibrated = base::fit(&subject, 1, &simulations).expect("it simulates");
-        let declared = search.declared(&calibrated).expect("it simulates");
-        let with_friction = with(&search, &declared, "coulomb-friction");
-        let with_bias = with(&search, &with_friction, "sensor-bias");
-        let of = Dispersion::of(&with_bias);
-        assert!(criterion(&with_bias, &of) < criterion(&with_friction, &of) - 10.0, "it helps the fit");
-        let left = search.foreseeing(&with_bias)?;
-        Some(left.added.iter().map(|a| a.candidate.effect.name()).collect::<Vec<_>>())
+    let left_out_of = |biases: [f64; 3], selection: usize| {
+        with_friction_and_bias(biases, selection, |search, with_bias, _| {
+            let left = search.forecasting_better(&with_bias)?;
+            Some(left.added.iter().map(|a| a.candidate.effect.name()).collect::<Vec<_>>())
+        })
     };
+    let left_out = |biases: [f64; 3]| left_out_of(biases, 300);
     assert_eq!(left_out([0.004, 0.004, 0.004]), None);
     assert_eq!(left_out([0.004, 0.004, -0.002]), Some(vec!["coulomb-friction"]));
+    // Too few samples to see the bias in.
+    assert_eq!(left_out_of([0.004, 0.004, -0.002], 20), None);
     // Where the data are not explained without, the forecast of a model that misses something tells nothing.
     assert_eq!(left_out([0.02, 0.02, -0.01]), None);
+}
+
+#[test]
+fn what_is_left_of_two_effects_stands_in_a_round_without_the_other() {
+    with_friction_and_bias([0.004, 0.004, -0.002], 300, |search, last, round| {
+        // As if the bias had been found first: no round has the friction alone.
+        let (steps, allowed) = (Vec::new(), Vec::new());
+        let growth = search.settle(Growth { last, rounds: vec![round], steps, allowed, p_value: 0.0 }, &());
+        assert_eq!(growth.last.added.len(), 1, "the bias is left out");
+        let standing = Standing::of(search, &growth.rounds, &growth.last, 0).expect("it was tried");
+        assert_eq!(standing.round.from.added.len(), 0);
+        assert!(standing.probability() > 0.9 && standing.gains[standing.own] > 100.0, "{:?}", standing.gains);
+    });
 }

@@ -71,7 +71,11 @@ fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
     }
     let mut rivals = diagnosis.found.iter().flat_map(|found| &found.indistinguishable);
     let rival = rivals.find(|rival| is(&rival.effect, &rival.place))?;
-    Some(if rival.bic_behind < words::BARE_MENTION { "cannot be told apart" } else { "not excluded" })
+    Some(match rival.bic_behind {
+        behind if behind <= -words::BARE_MENTION => "likelier",
+        behind if behind < words::BARE_MENTION => "cannot be told apart",
+        _ => "not excluded",
+    })
 }
 
 /// The models that the search passed through.
