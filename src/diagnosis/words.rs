@@ -277,7 +277,7 @@ mod tests {
         let text = confusable(&found).unwrap();
         assert!(
             text.starts_with(
-                "Likelier than `coulomb-friction` in the joint `phi`, beside what else was found: `stribeck-friction`"
+                "In the place of `coulomb-friction` in the joint `phi` the data prefer `stribeck-friction` in the joint `phi`"
             ),
             "{text}"
         );
