@@ -195,7 +195,7 @@ impl Sizes {
     pub fn values(&self, dimension: Dimension, trials: Trials, bounds: [f64; 2]) -> Vec<f64> {
         let scaled = |multiples: &'static [f64]| multiples.iter().map(|m| m * self.of(dimension));
         let values: Vec<f64> = match trials {
-            Trials::Linear => vec![self.of(dimension)],
+            Trials::Linear => vec![self.of(dimension).clamp(bounds[0], bounds[1])],
             Trials::Scaled(multiples) => scaled(multiples).collect(),
             Trials::PlainAndScaled(values, multiples) => values.iter().copied().chain(scaled(multiples)).collect(),
             Trials::Within(shares) => {

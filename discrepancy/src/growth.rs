@@ -234,6 +234,9 @@ impl<'a> Search<'a> {
     fn merged(&self, last: &Trial<'a>) -> Option<(Trial<'a>, Arc<Round<'a>>)> {
         let of = Dispersion::of(last);
         let most = criterion(last, &of) + CLEARLY;
+        if most.is_infinite() {
+            return None;
+        }
         for i in 0..last.added.len() {
             for j in i + 1..last.added.len() {
                 if last.added[i].candidate.port != last.added[j].candidate.port {
@@ -348,7 +351,7 @@ impl<'a> Search<'a> {
         }
         let of = Dispersion::of(last);
         trials.sort_by(|a, b| criterion(a, &of).total_cmp(&criterion(b, &of)));
-        for trial in trials {
+        for trial in trials.into_iter().filter(|trial| trial.is_physical() || trial.has_same_set(last)) {
             let newest = trial.newest();
             if !round.trials.iter().filter_map(Trial::newest).any(|known| newest.is_some_and(|n| n.is(known))) {
                 round.trials.push(trial);

@@ -58,7 +58,7 @@ pub fn judge<'a>(
     let mistaken = !last.added.is_empty()
         && after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
         && contradicts(contradiction(&last, &after), after.unknowns());
-    let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
+    let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken || !last.is_physical()) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,

@@ -18,7 +18,7 @@ impl<'a> Search<'a> {
         self.from(trial, &added, 40)
     }
 
-    /// The trial without effects that the others make superfluous; `None` where each is needed.
+    /// The trial without effects that the others make superfluous, or that are at their limits; `None` where each is needed.
     pub fn pruned(&self, trial: &Trial<'a>, level: f64) -> Option<Trial<'a>> {
         /// Directions that chance is allowed. An assumption: the rounds that found the effects looked in other numbers of them.
         const DIRECTIONS: f64 = 30.0;
@@ -31,7 +31,7 @@ impl<'a> Search<'a> {
             }
             let superfluous = |without: &Trial<'a>| {
                 let loss = (without.fitted.chi2 - last.fitted.chi2) / Dispersion::of(last).weight();
-                by_chance(loss, DIRECTIONS) > level
+                last.added[index].is_at_limit() || by_chance(loss, DIRECTIONS) > level
             };
             match self.without(last, index).filter(superfluous) {
                 Some(without) => (pruned, index) = (Some(without), 0),

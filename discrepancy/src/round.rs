@@ -154,6 +154,7 @@ impl<'a> Search<'a> {
             best_first(&mut trials);
         }
         self.simplify(&mut trials, &screened);
+        trials.retain(Trial::is_physical);
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
         Some(Round { screened, trials, directions, independent, from: from.clone(), known })

@@ -224,15 +224,13 @@ impl Left {
     /// How the residuals pull, by which factor that wants the strengths, and what the sum of squares falls by.
     fn against(&self, residuals: &[f64], first: &Strength, strength: f64) -> (f64, f64, f64) {
         let along = -dot(&self.trace, residuals);
-        let mut factor = along / self.rest;
-        if is_linear(first) {
-            let value = factor * strength;
-            if value < first.bounds[0] || value > first.bounds[1] {
-                factor = 0.0;
-            }
+        let wanted = along / self.rest;
+        let factor = if is_linear(first) {
+            // As far as physics allows: none of the wrong sign.
+            (wanted * strength).clamp(first.bounds[0], first.bounds[1]) / strength
         } else {
-            factor = factor.clamp(0.0, 1.5);
-        }
+            wanted.clamp(0.0, 1.5)
+        };
         (along, factor, 2.0 * factor * along - factor * factor * self.rest)
     }
 }

@@ -382,6 +382,11 @@ impl<'a> Trial<'a> {
         self.newest().zip(than.newest()).is_some_and(|(own, other)| own.is_simpler_than(other))
     }
 
+    /// Whether none of its effects is at its limit: where the data want more than physics allows, it is not what they lack.
+    pub fn is_physical(&self) -> bool {
+        !self.added.iter().any(Added::is_at_limit)
+    }
+
     /// Number of unknowns that its effects bring in for each experiment anew: phases, say, and where their states begin.
     pub fn own_unknowns(&self) -> usize {
         let free = |s: &&Strength| s.scope == Scope::Experiment && !s.fixed;

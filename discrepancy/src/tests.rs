@@ -10,6 +10,7 @@ mod drawn;
 mod holds;
 mod interrupted;
 mod intervals;
+mod limits;
 mod namesakes;
 mod pairs;
 mod selection;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Model, Scope, Strength, Trials};
+use mops_core::{Model, Port, Scope, Strength, Trials};
 use mops_models::WithEffects;
 use nalgebra::DMatrix;
 
@@ -47,6 +47,15 @@ impl Added {
                 own.2 = variant.strengths(fit, point, index, count, piece)[own.1];
             }
         }
+    }
+
+    /// Whether it is as strong as just allowed where more is no effect but a mistake, as the gain of a sensor is that is off by
+    /// half. An actuator may well be at such a limit: dead, or acting one way only.
+    pub fn is_at_limit(&self) -> bool {
+        let (first, value) = (&self.candidate.effect.strengths()[0], self.strengths[0]);
+        let is_limit = |end: &f64| end.is_finite() && first.neutral != Some(*end);
+        !matches!(self.candidate.port, Port::Actuator { .. })
+            && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
 
     /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the

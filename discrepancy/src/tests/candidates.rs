@@ -1,6 +1,7 @@
 //! Where effects are tried, and at which values.
 
 use mops_core::{Dimension, Trials};
+use mops_models::effects::effects;
 
 use crate::candidate::{Candidate, Sizes, candidates};
 use crate::testing::{catalogue, model};
@@ -50,4 +51,16 @@ fn limits_and_rates_are_tried_where_the_command_is() {
     let rates = Trials::SlewAndScaled(&[0.1], &[3.0]);
     assert_eq!(tried(sizes([0.0, 1.0], Some(50.0)), rates), [5.0, 6.0]);
     assert_eq!(tried(sizes([0.0, 1.0], None), rates), [6.0]);
+}
+
+#[test]
+fn every_effect_is_tried_however_large_or_small_what_is_measured() {
+    for size in [1e-3, 1.0, 1e3] {
+        let range = [-size, size];
+        let all =
+            Sizes { output: size, position: size, speed: size, value: size, range, record: 10.0, ..Sizes::UNTOLD };
+        for effect in effects() {
+            assert!(!all.combinations(effect.as_ref()).is_empty(), "{} at {size}", effect.name());
+        }
+    }
 }

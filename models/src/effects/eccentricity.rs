@@ -21,7 +21,9 @@ impl Definition for Eccentricity {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("a", "amplitude", Dimension::OUTPUT), phase()];
+    // As large as the offset of the centre by the radius of the scale: half the radius is no scale.
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { a: s[0], phase: s[1] })
