@@ -79,3 +79,37 @@ fn an_executor_of_argmin_drives_a_solver_to_the_least_of_many_basins() {
     assert!(cost <= 1e-8 && best.iter().all(|x| x.abs() < 1e-4), "{cost} {best:?}");
     assert!(evaluations <= 20_000, "{evaluations}");
 }
+
+/// A file with every column that the recordings have, whatever its name.
+struct AnyRecording;
+
+impl mops::file::Files for AnyRecording {
+    fn read(&self, _: &str) -> std::io::Result<Vec<u8>> {
+        let row = |i: u32| {
+            let t = f64::from(i) * 0.05;
+            format!("{t},{},{},{},{}\n", t.cos(), t.sin(), (2.0 * t).sin(), (3.0 * t).cos())
+        };
+        let rows: String = (0..=800).map(row).collect();
+        Ok(format!("time,phi,theta,position,torque\n{rows}").into_bytes())
+    }
+
+    fn show(&self, path: &str) -> String {
+        path.to_owned()
+    }
+}
+
+#[test]
+fn the_studies_of_recordings_are_read_with_the_roles_of_their_experiments() {
+    for (name, text, roles) in [
+        ("furuta-lund", include_str!("../examples/recordings/furuta-lund.toml"), [1, 0, 0]),
+        ("furuta-lund-blocks", include_str!("../examples/recordings/furuta-lund-blocks.toml"), [2, 1, 2]),
+        ("pendulum-multiarm", include_str!("../examples/recordings/pendulum-multiarm.toml"), [9, 3, 6]),
+        ("pendulum-dfki", include_str!("../examples/recordings/pendulum-dfki.toml"), [1, 1, 1]),
+    ] {
+        let read = mops::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
+        let study = read.unwrap_or_else(|mistake| panic!("{name}: {mistake}")).study;
+        assert_eq!(study.name, name);
+        let of = |role| study.cases.iter().filter(|case| case.role() == role).count();
+        assert_eq!([mops::Role::Calibration, mops::Role::Selection, mops::Role::Validation].map(of), roles, "{name}");
+    }
+}

@@ -11,7 +11,7 @@ use crate::account::{
 use crate::base;
 use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
-use crate::judge::{Judgement, agreed, judge};
+use crate::judge::{Judgement, agreed, judge, within_limits};
 use crate::locate::locate;
 use crate::meter::Meter;
 use crate::screen::Scene;
@@ -98,6 +98,14 @@ fn explain(
             (last, after, rounds, Vec::new())
         }
         None => (last, after, rounds, allowed),
+    };
+    let (last, held, after, rounds, allowed) = match within_limits(&search, &last, &after) {
+        Some((last, after)) if last.added.is_empty() => (last, Vec::new(), after, rounds, Vec::new()),
+        Some((last, after)) => {
+            let rounds = search.held_against_rivals(&last);
+            (last, Vec::new(), after, rounds, Vec::new())
+        }
+        None => (last, held, after, rounds, allowed),
     };
     let standings: Vec<_> = (0..last.added.len()).map(|index| Standing::of(&search, &rounds, &last, index)).collect();
     let ranked = ranking(&search, &standings, &rounds);

@@ -234,9 +234,6 @@ impl<'a> Search<'a> {
     fn merged(&self, last: &Trial<'a>) -> Option<(Trial<'a>, Arc<Round<'a>>)> {
         let of = Dispersion::of(last);
         let most = criterion(last, &of) + CLEARLY;
-        if most.is_infinite() {
-            return None;
-        }
         for i in 0..last.added.len() {
             for j in i + 1..last.added.len() {
                 if last.added[i].candidate.port != last.added[j].candidate.port {

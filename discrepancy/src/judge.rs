@@ -13,6 +13,7 @@ use crate::screen::Scene;
 use crate::search::{Search, Trial};
 use crate::stopgap::{is_table, stopgap, unexplained};
 use crate::subject::Measurement;
+use crate::variant::Added;
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
 const CONTRADICTED: f64 = 1e-4;
@@ -58,7 +59,7 @@ pub fn judge<'a>(
     let mistaken = !last.added.is_empty()
         && after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
         && contradicts(contradiction(&last, &after), after.unknowns());
-    let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken || !last.is_physical()) {
+    let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::None,
         (false, false) => Verdict::Effect,
@@ -111,6 +112,25 @@ pub fn agreed<'a>(
     let other = search.led_by(after).filter(|other| other.fitted.chi2 < last.fitted.chi2)?;
     let after = search.calibrate(&other, &[])?;
     Some((other, after))
+}
+
+/// A model without what only an effect at its limit explains, and its fit to calibration data alone; `None` where no effect is at
+/// its limit, neither for all data nor for these.
+pub fn within_limits<'a>(
+    search: &Search<'a>,
+    last: &Trial<'a>,
+    after: &Calibrated<'a>,
+) -> Option<(Trial<'a>, Calibrated<'a>)> {
+    let is_within = |(both, alone): &(&Added, &Added)| !both.is_at_limit() && !alone.is_at_limit();
+    let pairs = || last.added.iter().zip(&after.added);
+    if pairs().all(|pair| is_within(&pair)) {
+        return None;
+    }
+    let kept: Vec<Added> = pairs().filter(is_within).map(|(both, _)| both.clone()).collect();
+    let less = search.from(last, &kept, 40)?;
+    let after = search.calibrate(&less, &[])?;
+    // What is left may end at its own limit without it.
+    within_limits(search, &less, &after).or(Some((less, after)))
 }
 
 /// By how much the sum of squares over calibration data is larger where all data were fitted than where these alone were.

@@ -19,6 +19,7 @@ impl<'a> Search<'a> {
     }
 
     /// The trial without effects that the others make superfluous, or that are at their limits; `None` where each is needed.
+    /// To leave one out may not drive another to its limit.
     pub fn pruned(&self, trial: &Trial<'a>, level: f64) -> Option<Trial<'a>> {
         /// Directions that chance is allowed. An assumption: the rounds that found the effects looked in other numbers of them.
         const DIRECTIONS: f64 = 30.0;
@@ -26,12 +27,13 @@ impl<'a> Search<'a> {
         let mut index = 0;
         loop {
             let last = pruned.as_ref().unwrap_or(trial);
-            if last.added.len() < 2 || index >= last.added.len() {
+            let is_alone = last.added.len() == 1 && last.is_physical();
+            if is_alone || index >= last.added.len() {
                 return pruned;
             }
             let superfluous = |without: &Trial<'a>| {
                 let loss = (without.fitted.chi2 - last.fitted.chi2) / Dispersion::of(last).weight();
-                last.added[index].is_at_limit() || by_chance(loss, DIRECTIONS) > level
+                last.added[index].is_at_limit() || (without.is_physical() && by_chance(loss, DIRECTIONS) > level)
             };
             match self.without(last, index).filter(superfluous) {
                 Some(without) => (pruned, index) = (Some(without), 0),
@@ -54,7 +56,8 @@ impl<'a> Search<'a> {
         let whole = self.left_on_selection_data(trial)?;
         let weight = Dispersion::of(trial).weight();
         let less = |index: usize| {
-            let less = self.without(trial, index).filter(|less| less.fitted.normalised() <= UNEXPLAINED)?;
+            let explains = |less: &Trial<'a>| less.is_physical() && less.fitted.normalised() <= UNEXPLAINED;
+            let less = self.without(trial, index).filter(explains)?;
             let left = self.left_on_selection_data(&less)?;
             let apart: f64 = left.iter().zip(&whole).map(|(a, b)| (a - b).powi(2)).sum();
             (apart / weight >= SEEN).then(|| (dot(&left, &left), less))

@@ -153,8 +153,8 @@ impl<'a> Search<'a> {
             };
             best_first(&mut trials);
         }
-        self.simplify(&mut trials, &screened);
         trials.retain(Trial::is_physical);
+        self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
         Some(Round { screened, trials, directions, independent, from: from.clone(), known })
@@ -195,7 +195,7 @@ impl<'a> Search<'a> {
         let simpler: Vec<&Screened> = screened.iter().filter(is_simpler).collect();
         let fit = |s: &&Screened| {
             let begun = self.from(best, &[others, &[s.added.begun_like(own)]].concat(), LOOK)?;
-            if near(&begun) { begun.continued(40) } else { None }
+            if near(&begun) { begun.continued(40).filter(Trial::is_physical) } else { None }
         };
         for one in simpler.par_iter().filter_map(fit).collect::<Vec<_>>() {
             let same = |t: &Trial<'a>| t.newest().zip(one.newest()).is_some_and(|(a, b)| a.is(b));
@@ -266,7 +266,7 @@ impl<'a> Search<'a> {
         self.race(started)
     }
 
-    /// Those that lead after a few steps go on, and the best of them to the end; best first.
+    /// Those that lead after a few steps go on, and the best of them to the end; best first, without those that end at a limit.
     ///
     /// Source: K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and hyperparameter optimization, AISTATS
     /// (2016), for halving; here of every place one stays for the first heat, and what is simpler than one that goes on.
@@ -275,6 +275,10 @@ impl<'a> Search<'a> {
         for (heat, (count, iterations)) in [(2 * few, 3), (few, 8), (3, 40)].into_iter().enumerate() {
             let (is_first, is_last) = (heat == 0, heat == 2);
             best_first(&mut trials);
+            if is_last {
+                // A step may have gone too far; by now it is what the data want.
+                trials.retain(Trial::is_physical);
+            }
             let mut places: Vec<String> = Vec::new();
             let near = nearness(trials.first());
             let (mut on, mut rest) = (Vec::new(), Vec::new());
@@ -289,6 +293,7 @@ impl<'a> Search<'a> {
             trials = on.into_par_iter().filter_map(|trial| trial.continued(iterations)).collect();
             trials.extend(rest);
         }
+        trials.retain(Trial::is_physical);
         best_first(&mut trials);
         trials
     }

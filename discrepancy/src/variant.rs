@@ -49,8 +49,8 @@ impl Added {
         }
     }
 
-    /// Whether it is as strong as just allowed where more is no effect but a mistake, as the gain of a sensor is that is off by
-    /// half. An actuator may well be at such a limit: dead, or acting one way only.
+    /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the gain of
+    /// a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
     pub fn is_at_limit(&self) -> bool {
         let (first, value) = (&self.candidate.effect.strengths()[0], self.strengths[0]);
         let is_limit = |end: &f64| end.is_finite() && first.neutral != Some(*end);

@@ -65,14 +65,11 @@ impl Dispersion {
 }
 
 /// Minus twice the logarithm of the evidence of a model, by the Bayesian information criterion; rarer effects pay a little
-/// more, as physicists think of the common ones first. Infinite where an effect is at its limit.
+/// more, as physicists think of the common ones first.
 ///
 /// Source: G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978) 461.
 #[allow(clippy::cast_precision_loss)]
 pub fn criterion(trial: &Trial<'_>, dispersion: &Dispersion) -> f64 {
-    if !trial.is_physical() {
-        return f64::INFINITY;
-    }
     let rarity: f64 = trial.added.iter().map(|a| f64::from(a.candidate.effect.rarity())).sum();
     // What each experiment has of its own is told by its samples alone.
     let own: f64 = trial.fitted.residuals.iter().map(|r| dispersion.worth(r.len())).sum();
@@ -111,11 +108,10 @@ fn is_plausible(added: &Added) -> bool {
     })
 }
 
-/// Probabilities of models from their criteria, lower being better; 0 for those that are infinite.
+/// Probabilities of models from their criteria, lower being better.
 pub fn probabilities(criteria: &[f64]) -> Vec<f64> {
     let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
-    let weight = |c: &f64| if c.is_finite() { (-0.5 * (c - best)).exp() } else { 0.0 };
-    let weights: Vec<f64> = criteria.iter().map(weight).collect();
+    let weights: Vec<f64> = criteria.iter().map(|c| (-0.5 * (c - best)).exp()).collect();
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|w| if sum > 0.0 { w / sum } else { 0.0 }).collect()
 }

@@ -271,7 +271,8 @@ impl Strength {
         self
     }
 
-    /// With other bounds.
+    /// With other bounds. A diagnosis does not tell an effect whose first strength the data press against an end that is finite
+    /// and not neutral, but at actuators: there it is a mistake, not an effect.
     #[must_use]
     pub const fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = [low, high];

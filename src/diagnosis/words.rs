@@ -33,16 +33,18 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
             format!("The model {what}: {}.", changed(diagnosis))
         }
         Verdict::Unexplained => {
+            let listed: Vec<String> = diagnosis.found.iter().map(|found| format!("`{}`", found.effect)).collect();
             let place = diagnosis.unexplained.as_ref().map_or_else(String::new, |u| format!(" {}", at(&u.place)));
-            let also = match diagnosis.found.iter().map(|f| format!("`{}`", f.effect)).collect::<Vec<_>>() {
-                found if found.is_empty() => String::new(),
-                found => format!(", even with {}", list(&found)),
+            let (subject, free) = if listed.is_empty() {
+                (format!("Something is missing{place}"), "; a free signal there takes".to_owned())
+            } else {
+                // The place is where the residual of the declared model comes from.
+                let subject = format!("Even with {} something is missing", list(&listed));
+                (subject, format!(". Without them a free signal{place} takes"))
             };
-            let free = diagnosis.unexplained.as_ref().map_or_else(String::new, free_signal);
-            format!(
-                "Something is missing{place} that none of the effects tried explains{also}: {}{free}.",
-                changed(diagnosis)
-            )
+            let told = |u: &Unexplained| format!("{free} {} of what is above the noise", share(u.share));
+            let free = diagnosis.unexplained.as_ref().map_or_else(String::new, told);
+            format!("{subject} that none of the effects tried explains: {}{free}.", changed(diagnosis))
         }
     }
 }
@@ -51,10 +53,6 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
 pub(crate) fn of_what(diagnosis: &Diagnosis) -> &'static str {
     let several = diagnosis.verdict == Verdict::Effect && diagnosis.found.len() > 1;
     if several { "that all of these are right" } else { "of the verdict" }
-}
-
-fn free_signal(unexplained: &Unexplained) -> String {
-    format!("; a free signal there takes {} of what is above the noise", share(unexplained.share))
 }
 
 /// `the error falls from 2.10 to 1.00 times the noise on calibration data and from 15.40 to 1.00 on validation data`.

@@ -21,7 +21,8 @@ impl Definition for Eccentricity {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    // As large as the offset of the centre by the radius of the scale: half the radius is no scale.
+    // In rad, as the angle is, it is the offset of the centre over the radius of the scale. An assumption: at half the radius it
+    // is no scale any more.
     const STRENGTHS: &'static [Strength] =
         &[Strength::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
 

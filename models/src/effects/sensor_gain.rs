@@ -20,7 +20,7 @@ impl Definition for SensorGain {
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] =
-        // A scale that is off by half is another scale, or a mistake of units.
+        // An assumption: what is off by half is another scale, or a mistake of units.
         &[Strength::signed("g", "error of the gain", Dimension::ONE).within(-0.5, 0.5)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

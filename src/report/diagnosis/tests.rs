@@ -112,6 +112,18 @@ fn what_no_effect_explains_has_a_place_and_a_table() {
 }
 
 #[test]
+fn what_is_left_beside_an_effect_is_told_apart_from_where_the_declared_model_fails() {
+    let diagnosis = Diagnosis { found: made_up::coulomb().found, ..made_up::unexplained() };
+    let (_, page) = written(diagnosis);
+    assert!(page.contains(
+        "Even with <code>coulomb-friction</code> something is missing that none of the effects tried explains: "
+    ));
+    assert!(page.contains(
+        ". Without them a free signal in the equation of <code>x</code> takes 80 % of what is above the noise."
+    ));
+}
+
+#[test]
 fn a_diagnosis_without_numbers_still_has_a_page() {
     let mut diagnosis = made_up::coulomb();
     for prediction in &mut diagnosis.predictions {
