@@ -56,8 +56,7 @@ pub fn judge<'a>(
     let (left, note) = if last.fitted.normalised() > UNEXPLAINED { left(&last) } else { (0.0, None) };
     // A bad forecast counts where calibration data alone contradict what all data together want; else it only shows how
     // little they determine.
-    let mistaken = !last.added.is_empty()
-        && after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
+    let mistaken = after.error_on(Role::Selection, search.subject).is_some_and(|error| error > MISTAKEN)
         && contradicts(contradiction(&last, &after), after.unknowns());
     let verdict = match (last.added.is_empty(), left > FORETOLD || mistaken) {
         (_, true) => Verdict::Unexplained,

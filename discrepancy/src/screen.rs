@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Fitted, Piece, Residuals, dot};
-use crate::trace_of::{View, sizes, sizes_by_samples};
+use crate::trace_of::{View, relative_sizes, sizes, sizes_by_samples};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -172,14 +172,20 @@ pub fn screen(
     Screening { screened, by_chance }
 }
 
-/// Typical sizes for a candidate: at its port; of a joint that is the companion of an actuator or sensor the position and speed.
+/// Typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that is the companion of an
+/// actuator or sensor the position and speed.
 fn sizes_for(
     candidate: &Candidate,
     model: &WithEffects,
     pieces: &[Piece],
     trajectories: &[Trajectory],
 ) -> Option<Sizes> {
-    let own = sizes(&candidate.port, model, pieces, trajectories)?;
+    let own = match &candidate.companion {
+        Some(other @ Port::Joint { .. }) if candidate.effect.mutual() => {
+            relative_sizes(&candidate.port, other, model, pieces, trajectories)?
+        }
+        _ => sizes(&candidate.port, model, pieces, trajectories)?,
+    };
     let own = sizes_by_samples(own, candidate, model, pieces);
     match (&candidate.port, &candidate.companion) {
         (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {

@@ -13,6 +13,7 @@ mod intervals;
 mod limits;
 mod namesakes;
 mod pairs;
+mod play;
 mod selection;
 mod sessions;
 mod shapes;

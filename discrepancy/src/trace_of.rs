@@ -167,6 +167,29 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
     Some(Sizes { output: positive(sizes.output), ..sizes })
 }
 
+/// The same at a joint, with position and speed relative to those of another: of shafts that turn together, by how much one is
+/// ahead.
+pub fn relative_sizes(
+    joint: &Port,
+    other: &Port,
+    model: &WithEffects,
+    pieces: &[Piece],
+    trajectories: &[Trajectory],
+) -> Option<Sizes> {
+    let own = sizes(joint, model, pieces, trajectories)?;
+    let (first, second) = (spot(joint, model, pieces.first()?)?, spot(other, model, pieces.first()?)?);
+    let (Spot::Joint(_, q, v), Spot::Joint(_, other_q, other_v)) = (first, second) else { return None };
+    let moments = || trajectories.iter().flat_map(|along| along.moments.iter());
+    let positions = moments().map(|m| m.x[q] - m.x[other_q]);
+    let [position, speed] = [amplitude(positions.clone()), amplitude(moments().map(|m| m.x[v] - m.x[other_v]))];
+    let moves = |x: f64| x.is_finite() && x > 1e-300;
+    // Joints that move as one tell no size of their own.
+    if !moves(position) || !moves(speed) {
+        return Some(own);
+    }
+    Some(Sizes { position, speed, time: position / speed, range: range(positions), ..own })
+}
+
 /// The same with what samples at a sensor tell of an effect whose strengths ask for it: the size of steps, a gap.
 pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects, pieces: &[Piece]) -> Sizes {
     let asks = |wanted: fn(Trials) -> bool| candidate.effect.strengths().iter().any(|s| wanted(s.trials));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Effect, Role};
+use mops_core::{Effect, Hold, Input, Role};
 
 use crate::base;
 use crate::diagnosis::StrengthValue;
@@ -12,9 +12,9 @@ use crate::round::Round;
 use crate::search::{Limits, Search, Trial};
 use crate::standing::Standing;
 use crate::subject::Subject;
-use crate::testing::{Record, catalogue, integrated, study, subject};
+use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::weigh::{Dispersion, criterion, probabilities};
-use crate::{Diagnosis, Options, diagnose};
+use crate::{Diagnosis, Options, Verdict, diagnose};
 
 /// A block that slides on without friction, of which the data have some of the air: `v' = -k v |v|`.
 const BLOCK: &str = r#"
@@ -166,4 +166,29 @@ fn what_is_left_of_two_effects_stands_in_a_round_without_the_other() {
         assert_eq!(standing.round.from.added.len(), 0);
         assert!(standing.probability() > 0.9 && standing.gains[standing.own] > 100.0, "{:?}", standing.gains);
     });
+}
+
+/// A gain of a signal that nothing foretells.
+const AMPLIFIER: &str = r#"
+states     = { x = "V" }
+inputs     = { u = "V" }
+parameters = { k = "1" }
+der        = { x = "x' = -x" }
+outputs    = { y = { value = "k*u", unit = "V" } }
+"#;
+
+#[test]
+fn a_model_that_selection_data_contradict_is_not_called_right_although_no_signal_foretells_what_is_left() {
+    let record = |label: &str, k: f64| {
+        let times: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+        let values = white(label, 1.0, 200);
+        let y = values.iter().zip(white(&format!("{label} y"), NOISE, 200)).map(|(u, e)| k * u + e).collect();
+        let input = Input::Sampled { times: times.clone(), values, hold: Hold::Zero };
+        Record { inputs: vec![("u", input)], times, signals: vec![("y", y, NOISE)] }
+    };
+    let records = vec![record("amplifier 0", 1.0), record("amplifier 1", 1.0), record("amplifier 2", 1.1)];
+    let mut subject = subject(AMPLIFIER, &[0.8, 0.0], 1, records);
+    subject.measurements[2].role = Role::Selection;
+    let none = diagnose(&study(&subject), &[], &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).unwrap();
+    assert_eq!(none.verdict, Verdict::Unexplained, "{none:?}");
 }

@@ -34,7 +34,7 @@ impl Definition for CouplingPlay {
             "width of the gap",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.002, 0.01, 0.05, 0.2]),
+            Trials::Scaled(&[0.1, 0.4, 1.0, 2.0]),
         ),
     ];
 

@@ -1,0 +1,75 @@
+//! Play is looked for in what one shaft is ahead of the other, however far both turn.
+
+use mops_core::{Hold, Input, Port};
+
+use crate::meter::Meter;
+use crate::subject::Subject;
+use crate::testing::{Record, catalogue, fitted, integrated, study, subject, white};
+use crate::trace_of::{relative_sizes, sizes};
+use crate::{Options, Verdict, diagnose};
+
+/// Two inertias with an elastic shaft between.
+const DRIVE: &str = r#"
+states     = { q1 = "rad", w1 = "rad/s", q2 = "rad", w2 = "rad/s" }
+inputs     = { u = "N*m" }
+parameters = { J1 = "kg*m^2", J2 = "kg*m^2", k = "N*m/rad", d = "N*m*s/rad", b = "N*m*s/rad" }
+der        = { q1 = "w1", q2 = "w2", w1 = "J1*w1' = u - k*(q1 - q2) - d*(w1 - w2)", w2 = "J2*w2' = k*(q1 - q2) + d*(w1 - w2) - b*w2" }
+"#;
+
+const NOISE: f64 = 7e-4;
+
+/// A run with a gap of 9 mrad, 5 rad and more in all.
+fn run(label: &str, mean: f64) -> Record {
+    const EVERY: f64 = 0.02;
+    let torques: Vec<f64> = white(label, 0.4, 151).iter().map(|u| mean + u).collect();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let rates = |t: f64, x: &[f64; 4]| {
+        let u = torques[((t / EVERY) as usize).min(150)];
+        let ahead = x[0] - x[2];
+        let shaft = 6.0 * (ahead - ahead.clamp(-0.0045, 0.0045)) + 0.012 * (x[1] - x[3]);
+        [x[1], (u - shaft) / 0.0012, x[3], (shaft - 0.013 * x[3]) / 0.004]
+    };
+    let states = integrated(rates, [0.0; 4], 0.01, 300);
+    assert!(states[299][2].abs() > 5.0, "{}", states[299][2]);
+    let signal = |name: &'static str, index: usize| {
+        let noise = white(&format!("{label} {name}"), NOISE, states.len());
+        (name, states.iter().zip(noise).map(|(x, e)| x[index] + e).collect(), NOISE)
+    };
+    let times = (0..151).map(|k| EVERY * f64::from(k)).collect();
+    let input = Input::Sampled { times, values: torques.clone(), hold: Hold::Zero };
+    Record {
+        inputs: vec![("u", input)],
+        times: (0..300).map(|k| 0.01 * f64::from(k)).collect(),
+        signals: vec![signal("q1", 0), signal("q2", 2)],
+    }
+}
+
+fn drive() -> Subject {
+    let start = [0.0015, 0.005, 4.5, 0.015, 0.01, 0.0, 0.0, 0.0, 0.0];
+    subject(DRIVE, &start, 4, vec![run("forward", 0.08), run("backward", -0.08)])
+}
+
+#[test]
+fn gaps_are_tried_as_wide_as_one_shaft_is_ahead_of_the_other() {
+    let subject = drive();
+    let simulations = Meter::new(&());
+    let (fit, variant, _, scene) = fitted(&subject, &simulations);
+    let ports = &variant.model.model().interface().ports;
+    let joints: Vec<&Port> = ports.iter().filter(|port| matches!(port, Port::Joint { .. })).collect();
+    let turned = sizes(joints[0], &variant.model, &fit.pieces, &scene.trajectories).unwrap();
+    let ahead = relative_sizes(joints[0], joints[1], &variant.model, &fit.pieces, &scene.trajectories).unwrap();
+    assert!(turned.position > 2.0 && ahead.position < 0.1 && ahead.position > 0.0045, "{turned:?} {ahead:?}");
+    assert_eq!(ahead.output, turned.output);
+}
+
+#[test]
+fn play_between_shafts_that_turn_far_is_found() {
+    let subject = drive();
+    let effects = catalogue(&["coupling-play", "cubic-stiffness", "flexible-mode", "periodic-disturbance"]);
+    let told = diagnose(&study(&subject), &effects, &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).unwrap();
+    assert_eq!(told.verdict, Verdict::Effect, "{:?}", told.found);
+    assert_eq!((told.found[0].effect.as_str(), told.found[0].place.as_str()), ("coupling-play", "joint:q1"));
+    let gap = &told.found[0].strengths[1];
+    let [low, high] = gap.interval95.expect("it was fitted");
+    assert!((low..high).contains(&0.009) && high - low < 0.009, "{gap:?}");
+}
