@@ -47,11 +47,11 @@ fn parabola(chosen: &[usize], x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// The samples without those that stand alone, more than ten times the noise from what their neighbours on both sides lead
-/// to, and how many those were.
+/// to, and how many those were. The first and the last have neighbours on one side alone: there it may be a transient.
 pub fn without_spikes(times: &[f64], values: &[f64], noise: f64) -> (Vec<f64>, Vec<f64>, usize) {
     let n = values.len();
     let alone = |i: usize| {
-        if n < 8 {
+        if n < 8 || i == 0 || i == n - 1 {
             return false;
         }
         let from = i.saturating_sub(3).min(n - 7);
@@ -99,6 +99,13 @@ mod tests {
         assert_eq!((dropped, kept.len()), (1, 399));
         values[200] -= 0.5;
         values[300..].iter_mut().for_each(|v| *v += 0.5);
+        assert_eq!(without_spikes(&times, &values, 0.001).2, 0);
+    }
+
+    #[test]
+    fn a_transient_that_is_over_by_the_second_sample_is_kept() {
+        let (times, mut values) = samples(0.001);
+        values[0] -= 0.5;
         assert_eq!(without_spikes(&times, &values, 0.001).2, 0);
     }
 
