@@ -7,6 +7,7 @@ use std::sync::Arc;
 use mops_core::Watch;
 use rayon::prelude::*;
 
+use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
 use crate::round::{Round, best_first, best_in};
@@ -326,6 +327,8 @@ impl<'a> Search<'a> {
 
     /// The round for one of the effects with the others in.
     fn rivals(&self, last: &Trial<'a>, index: usize) -> Option<Round<'a>> {
+        /// Share of the gain, to first order, from which on another effect counts as near.
+        const NEAR: f64 = 0.9;
         let without = self.over_or_in_windows(&self.without(last, index)?);
         let mut round = Round::clone(&*self.round(&without)?);
         let own = &last.added[index];
@@ -338,6 +341,17 @@ impl<'a> Search<'a> {
         // What is simpler begins there too, whatever a linear view from afar says of it.
         let simpler = round.screened.iter().filter(|s| s.added.candidate.is_simpler_than(&own.candidate));
         trials.extend(simpler.filter_map(|s| self.from(last, &with(&s.added.begun_like(own)), 40)));
+        // As does what the linear view had as near, and a short fit may have lost, as a declared term must go for it.
+        let gain = |of: &Candidate| round.screened.iter().find(|s| s.added.candidate.is(of)).map(|s| s.gain);
+        let near = |s: &&Screened| {
+            let candidate = &s.added.candidate;
+            candidate.port == own.candidate.port
+                && !own.candidate.has_fewer_strengths_than(candidate)
+                && gain(&own.candidate).is_some_and(|gain| s.gain > NEAR * gain)
+                && !round.trials.iter().filter_map(Trial::newest).any(|tried| tried.is(candidate))
+        };
+        let lost: Vec<&Screened> = round.screened.iter().filter(near).take(self.limits.finalists).collect();
+        trials.extend(lost.par_iter().filter_map(|s| self.from(last, &with(&s.added), 40)).collect::<Vec<_>>());
         for (rank, trial) in std::mem::take(&mut round.trials).into_iter().enumerate() {
             // As does what was looked at in windows alone.
             if trial.windows == last.windows {
