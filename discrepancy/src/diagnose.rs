@@ -100,9 +100,8 @@ fn explain(
         None => (last, after, rounds, allowed),
     };
     let (last, held, after, rounds, allowed) = match within_limits(&search, &last, &after) {
-        Some((last, after)) if last.added.is_empty() => (last, Vec::new(), after, rounds, Vec::new()),
         Some((last, after)) => {
-            let rounds = search.held_against_rivals(&last);
+            let rounds = if last.added.is_empty() { rounds } else { search.held_against_rivals(&last) };
             (last, Vec::new(), after, rounds, Vec::new())
         }
         None => (last, held, after, rounds, allowed),

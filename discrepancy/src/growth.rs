@@ -7,7 +7,6 @@ use std::sync::Arc;
 use mops_core::Watch;
 use rayon::prelude::*;
 
-use crate::candidate::Candidate;
 use crate::diagnose::{Options, UNEXPLAINED};
 use crate::diagnosis::Step;
 use crate::round::{Round, best_first, best_in};
@@ -342,12 +341,12 @@ impl<'a> Search<'a> {
         let simpler = round.screened.iter().filter(|s| s.added.candidate.is_simpler_than(&own.candidate));
         trials.extend(simpler.filter_map(|s| self.from(last, &with(&s.added.begun_like(own)), 40)));
         // As does what the linear view had as near, and a short fit may have lost, as a declared term must go for it.
-        let gain = |of: &Candidate| round.screened.iter().find(|s| s.added.candidate.is(of)).map(|s| s.gain);
+        let own_gain = round.screened.iter().find(|s| s.added.candidate.is(&own.candidate)).map(|s| s.gain);
         let near = |s: &&Screened| {
             let candidate = &s.added.candidate;
             candidate.port == own.candidate.port
                 && !own.candidate.has_fewer_strengths_than(candidate)
-                && gain(&own.candidate).is_some_and(|gain| s.gain > NEAR * gain)
+                && own_gain.is_some_and(|gain| s.gain > NEAR * gain)
                 && !round.trials.iter().filter_map(Trial::newest).any(|tried| tried.is(candidate))
         };
         let lost: Vec<&Screened> = round.screened.iter().filter(near).take(self.limits.finalists).collect();

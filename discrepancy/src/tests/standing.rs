@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use mops_core::{Hold, Input};
+
 use crate::base;
 use crate::meter::Meter;
 use crate::round::Round;
@@ -69,4 +71,36 @@ fn what_an_effect_gains_is_told_over_the_windows_of_the_model_without_it() {
     let rounds = [Arc::new(apart)];
     let told = Standing::of(&search, &rounds, own, 0).expect("it was tried").gains[0];
     assert!(mixed < told && told < whole, "{mixed} {told} {whole}");
+}
+
+/// A tank that empties through an orifice: `x' = u - a sqrt(x)`.
+const TANK: &str = r#"
+states     = { x = "cm" }
+inputs     = { u = "cm/s" }
+parameters = { a = "1" }
+der        = { x = "x' = u - a*sqrt(max(x, 0))" }
+"#;
+
+#[test]
+fn what_the_linear_view_has_as_near_is_held_against_an_effect_although_no_short_fit_tried_it() {
+    let step = |t: f64| 1.0 + 0.6 * (0.3 * t).sin();
+    let states = integrated(|t, x: &[f64; 2]| [step(t) - 0.4 * x[0].max(0.0).powf(0.7), 0.0], [2.0, 0.0], 0.2, 300);
+    let mut record = Record::of_first("x", &states, 0.2, 0.01, "tank");
+    let values = record.times.iter().map(|&t| step(t)).collect();
+    record.inputs = vec![("u", Input::Sampled { times: record.times.clone(), values, hold: Hold::First })];
+    let subject = subject(TANK, &[0.6, 2.0], 1, vec![record]);
+    let simulations = Meter::new(&());
+    let effects = catalogue(&["linear-loss", "leak", "orifice-exponent"]);
+    let search = Search::new(&subject, &effects, Limits { refits: 1, ..Limits::at(0.01) }, &simulations);
+    let calibrated = base::fit(&subject, 1, &simulations).expect("it simulates");
+    let declared = search.over_or_in_windows(&search.declared(&calibrated).expect("it simulates"));
+    let round = search.round(&declared).expect("it simulates");
+    let names = |round: &Round<'_>| -> Vec<String> {
+        round.trials.iter().filter_map(|t| Some(t.newest()?.effect.name().to_owned())).collect()
+    };
+    // Room for two at a place; the third gains nearly as much.
+    assert_eq!(names(&round), ["orifice-exponent", "linear-loss"]);
+    assert!(round.screened[2].gain > 0.9 * round.screened[0].gain);
+    let rivals = search.held_against_rivals(&round.trials[0]);
+    assert_eq!(names(&rivals[0]), ["orifice-exponent", "linear-loss", "leak"]);
 }
