@@ -6,18 +6,28 @@
 use std::sync::Arc;
 
 use crate::diagnose::UNEXPLAINED;
-use crate::fit::{Fit, Fitted, Point};
+use crate::fit::{Fit, Fitted, Point, Residuals, Slopes};
 use crate::weigh::CLEARLY;
 
 /// Distances from the first guess that are tried, in scales of the unknown. The scale of a start value is a tenth of its
 /// typical size: half of that, once and twice, to both sides.
 const DISTANCES: [f64; 6] = [-5.0, 5.0, -10.0, 10.0, -20.0, 20.0];
 
-/// Iterations that follow each of them, as the others had made up for a start that was wrong.
+/// Iterations that follow the best of them, as the others had made up for a start that was wrong.
 const FEW: usize = 4;
 
-/// Relative change of the sum of squares that is none.
-const NOTHING: f64 = 1e-9;
+/// Shares of a clear gain: what one step must bring at least to be followed, and what is none.
+const PROMISING: f64 = 0.1;
+const NOTHING: f64 = 0.01;
+
+/// A fit that starts elsewhere are compared with.
+struct Origin {
+    point: Point,
+    /// Residuals and slopes there.
+    known: Vec<Residuals>,
+    /// One step from there.
+    stays: Fitted,
+}
 
 impl Fit<'_> {
     /// The fit with what effects have of their own in pieces that begin with a record, and no slope tells, where that leaves
@@ -27,11 +37,13 @@ impl Fit<'_> {
         if silent.is_empty() {
             return fitted;
         }
-        // The few iterations that follow each trial are not to its credit.
-        let Some(beside) = self.few_more(fitted.point.clone()) else { return fitted };
-        let mut best = None;
+        let mut best: Option<Fitted> = None;
+        let mut origin = self.origin(&fitted);
         for start in silent {
-            best = self.start_elsewhere(best.as_ref().unwrap_or(&beside), start).or(best);
+            let Some(from) = &origin else { break };
+            let Some(moved) = self.start_elsewhere(from, start) else { continue };
+            origin = self.origin(&moved);
+            best = Some(moved);
         }
         let Some(best) = best else { return fitted };
         match self.normal_at(&best) {
@@ -69,25 +81,45 @@ impl Fit<'_> {
         starts.into_iter().filter(|(_, unknown)| normal.tells_nothing_of(*unknown)).map(|(start, _)| start).collect()
     }
 
-    /// The fit with an unknown of a piece elsewhere, where that leaves clearly less.
+    /// Where starts elsewhere are compared with.
+    fn origin(&self, fitted: &Fitted) -> Option<Origin> {
+        let known = self.looks(&fitted.point, Slopes::Free)?;
+        let stays = self.one_step(fitted.point.clone(), known.clone());
+        Some(Origin { point: fitted.point.clone(), known, stays })
+    }
+
+    /// One step from a point whose residuals and slopes are known.
+    fn one_step(&self, from: Point, known: Vec<Residuals>) -> Fitted {
+        let normal = Arc::new(self.equations(&from, known));
+        self.levenberg_marquardt(from, normal, 1)
+    }
+
+    /// The fit with an unknown of a piece elsewhere, where that leaves clearly less: the distance from the first guess that does
+    /// best in one step of all others. What follows that is not to its credit.
     #[allow(clippy::cast_precision_loss)]
-    fn start_elsewhere(&self, fitted: &Fitted, (piece, k): (usize, usize)) -> Option<Fitted> {
+    fn start_elsewhere(&self, origin: &Origin, (piece, k): (usize, usize)) -> Option<Fitted> {
+        let Origin { point: from, known, stays } = origin;
         let local = &self.pieces[piece].locals[k];
-        let mut least = self.total(fitted) - CLEARLY * fitted.chi2 / fitted.count.max(1) as f64;
-        let mut best = None;
+        let clearly = CLEARLY * stays.chi2 / stays.count.max(1) as f64;
+        let (mut least, mut best) = (self.total(stays) - PROMISING * clearly, None);
         for distance in DISTANCES {
-            let mut point = fitted.point.clone();
+            let mut point = from.clone();
             point.locals[piece][k] = (local.start + distance * local.scale).clamp(local.bounds[0], local.bounds[1]);
-            let Some(tried) = self.few_more(point) else { continue };
-            if (tried.chi2 - fitted.chi2).abs() <= NOTHING * fitted.chi2 {
+            // It changes what begins with it alone.
+            let Some(there) = self.look(piece, &point, Slopes::Free) else { continue };
+            let mut all = known.clone();
+            all[piece] = there;
+            let moved = self.one_step(point, all);
+            if (moved.chi2 - stays.chi2).abs() <= NOTHING * clearly {
                 // What acts nowhere begins anywhere.
                 break;
             }
-            let total = self.total(&tried);
+            let total = self.total(&moved);
             if total < least {
-                (least, best) = (total, Some(tried));
+                (least, best) = (total, Some(moved));
             }
         }
-        best
+        let (moved, stays) = (self.few_more(best?.point)?, self.few_more(stays.point.clone())?);
+        (self.total(&moved) < self.total(&stays) - clearly).then_some(moved)
     }
 }
