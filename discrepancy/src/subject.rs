@@ -127,10 +127,13 @@ impl Subject {
                 let largest = estimate.map_or(noise, |estimate| noise.max(estimate));
                 let (times, values, dropped) = without_spikes(&channel.times, &channel.values, largest);
                 if dropped > 0 {
-                    notes.push(format!(
-                        "{dropped} samples of `{}` in `{}` stand alone, far from their neighbours, and are left out",
-                        channel.signal, case.name
-                    ));
+                    let (samples, are) = if dropped == 1 {
+                        ("sample", "stands alone, far from its neighbours, and is")
+                    } else {
+                        ("samples", "stand alone, far from their neighbours, and are")
+                    };
+                    notes
+                        .push(format!("{dropped} {samples} of `{}` in `{}` {are} left out", channel.signal, case.name));
                 }
                 let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
                 if channel.noise.is_none() {

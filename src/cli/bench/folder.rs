@@ -61,7 +61,7 @@ fn text(replies: &[Reply]) -> String {
         }
         Ok(said) => {
             let found = said.answer.found.iter().map(|((effect, place), _)| format!("{effect} at {place}"));
-            let found = found.chain(said.answer.unexplained_at.iter().map(|place| format!("at {place}")));
+            let found = found.chain(said.answer.unexplained_at.iter().map(|place| format!("something at {place}")));
             let errors = |which: usize| {
                 let each: Vec<String> = said.errors.iter().map(|(_, pair)| format!("{:.2}", pair[which])).collect();
                 each.join(", ")

@@ -33,7 +33,10 @@ pub(super) fn answer(
             ranked.push((class, location, p));
         }
     }
-    let added = diagnosis.found.iter().map(|f| entry(&f.effect, &f.place));
+    let added = diagnosis.found.iter().map(|f| {
+        let (class, location) = entry(&f.effect, &f.place);
+        json!({ "class": class, "location": location, "p": f.probability, "strengths": f.strengths })
+    });
     let unexplained = diagnosis.unexplained.as_ref().map(|u| &u.place);
     let residual = unexplained.or_else(|| diagnosis.found.first().map(|f| &f.place));
     let residual = residual.or_else(|| diagnosis.evidence.first().map(|e| &e.place));
@@ -42,7 +45,7 @@ pub(super) fn answer(
         "verdict": spelt(diagnosis.verdict),
         "probability": diagnosis.probability,
         "ranked_effects": ranked.iter().map(|(c, l, p)| json!({ "class": c, "location": l, "p": p })).collect::<Value>(),
-        "added_effects": added.map(|(c, l)| json!({ "class": c, "location": l })).collect::<Value>(),
+        "added_effects": added.collect::<Value>(),
         "residual_location": residual.map(|place| located(place, &declared.locations)),
         "rmse_before": errors(&diagnosis.before),
         "rmse_after": errors(&diagnosis.after),
