@@ -6,7 +6,7 @@ use crate::meter::Meter;
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, fitted, integrated, study, subject, white};
 use crate::trace_of::{relative_sizes, sizes};
-use crate::{Options, Verdict, diagnose};
+use crate::{Options, StrengthValue, Verdict, diagnose};
 
 /// Two inertias with an elastic shaft between.
 const DRIVE: &str = r#"
@@ -18,15 +18,30 @@ der        = { q1 = "w1", q2 = "w2", w1 = "J1*w1' = u - k*(q1 - q2) - d*(w1 - w2
 
 const NOISE: f64 = 7e-4;
 
+/// How the shaft is damped.
+#[derive(Clone, Copy)]
+enum Damper {
+    /// Within the gap too.
+    Always,
+    /// In contact, which never pulls.
+    InContact,
+}
+
 /// A run with a gap of 9 mrad, 5 rad and more in all.
-fn run(label: &str, mean: f64) -> Record {
+fn run(label: &str, mean: f64, damper: Damper) -> Record {
     const EVERY: f64 = 0.02;
     let torques: Vec<f64> = white(label, 0.4, 151).iter().map(|u| mean + u).collect();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let rates = |t: f64, x: &[f64; 4]| {
         let u = torques[((t / EVERY) as usize).min(150)];
         let ahead = x[0] - x[2];
-        let shaft = 6.0 * (ahead - ahead.clamp(-0.0045, 0.0045)) + 0.012 * (x[1] - x[3]);
+        let (into, damped) = (ahead - ahead.clamp(-0.0045, 0.0045), 0.012 * (x[1] - x[3]));
+        let shaft = match damper {
+            Damper::Always => 6.0 * into + damped,
+            Damper::InContact if into > 0.0 => (6.0 * into + damped).max(0.0),
+            Damper::InContact if into < 0.0 => (6.0 * into + damped).min(0.0),
+            Damper::InContact => 0.0,
+        };
         [x[1], (u - shaft) / 0.0012, x[3], (shaft - 0.013 * x[3]) / 0.004]
     };
     let states = integrated(rates, [0.0; 4], 0.01, 300);
@@ -44,14 +59,14 @@ fn run(label: &str, mean: f64) -> Record {
     }
 }
 
-fn drive() -> Subject {
+fn drive(damper: Damper) -> Subject {
     let start = [0.0015, 0.005, 4.5, 0.015, 0.01, 0.0, 0.0, 0.0, 0.0];
-    subject(DRIVE, &start, 4, vec![run("forward", 0.08), run("backward", -0.08)])
+    subject(DRIVE, &start, 4, vec![run("forward", 0.08, damper), run("backward", -0.08, damper)])
 }
 
 #[test]
 fn gaps_are_tried_as_wide_as_one_shaft_is_ahead_of_the_other() {
-    let subject = drive();
+    let subject = drive(Damper::Always);
     let simulations = Meter::new(&());
     let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let ports = &variant.model.model().interface().ports;
@@ -62,14 +77,31 @@ fn gaps_are_tried_as_wide_as_one_shaft_is_ahead_of_the_other() {
     assert_eq!(ahead.output, turned.output);
 }
 
-#[test]
-fn play_between_shafts_that_turn_far_is_found() {
-    let subject = drive();
+/// The gap and the time constant of the damping in contact that are found.
+fn found(damper: Damper) -> [StrengthValue; 2] {
+    let subject = drive(damper);
     let effects = catalogue(&["coupling-play", "cubic-stiffness", "flexible-mode", "periodic-disturbance"]);
     let told = diagnose(&study(&subject), &effects, &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).unwrap();
     assert_eq!(told.verdict, Verdict::Effect, "{:?}", told.found);
     assert_eq!((told.found[0].effect.as_str(), told.found[0].place.as_str()), ("coupling-play", "joint:q1"));
-    let gap = &told.found[0].strengths[1];
-    let [low, high] = gap.interval95.expect("it was fitted");
-    assert!((low..high).contains(&0.009) && high - low < 0.009, "{gap:?}");
+    [1, 2].map(|k| told.found[0].strengths[k].clone())
+}
+
+fn covers(found: &StrengthValue, value: f64) -> bool {
+    found.interval95.is_some_and(|[low, high]| low <= value && value <= high && high - low < value)
+}
+
+#[test]
+fn play_between_shafts_that_turn_far_is_found() {
+    let [gap, tau] = found(Damper::Always);
+    assert!(covers(&gap, 0.009), "{gap:?}");
+    assert!(tau.value < 2e-4, "{tau:?}");
+}
+
+/// Of the damping of the shaft too the gap takes away what does not act in contact; 0.012 N m s/rad over 6 N m/rad.
+#[test]
+fn play_with_a_damper_that_acts_in_contact_alone_is_found() {
+    let [gap, tau] = found(Damper::InContact);
+    assert!(covers(&gap, 0.009), "{gap:?}");
+    assert!(covers(&tau, 0.002), "{tau:?}");
 }

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, clamp};
+use super::terms::{NOT_NEGATIVE, above, clamp};
 
 /// `coupling-play`.
 pub struct CouplingPlay;
@@ -12,16 +12,18 @@ pub struct CouplingPlay;
 struct AtStrengths<S> {
     k: S,
     gap: S,
+    tau: S,
 }
 
 impl Definition for CouplingPlay {
     const NAME: &'static str = "coupling-play";
-    const ABOUT: &'static str =
-        "Play in a declared elastic coupling of two joints: within the gap it transmits nothing.";
-    const FORMULA: &'static str = "k clamp(q - q2, -gap/2, gap/2), and its reaction at the companion joint, which a \
-                                   coupling -k (q - q2) with play lacks";
-    const SOURCE: &'static str =
-        "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
+    const ABOUT: &'static str = "Play in a declared elastic coupling of two joints: within the gap it transmits nothing, \
+                                 and contact never pulls.";
+    const FORMULA: &'static str = "k (e + tau e' - c) with c = max(e - gap/2 + tau e', 0) for e = q - q2 > gap/2, \
+                                   min(e + gap/2 + tau e', 0) for e < -gap/2, else 0, and its reaction at the \
+                                   companion joint: what a coupling -k (e + tau e') with play lacks";
+    const SOURCE: &'static str = "M. Nordin, J. Galic, P.-O. Gutman, New models for backlash and gear play, \
+                                  International Journal of Adaptive Control and Signal Processing 11 (1997) 49";
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
@@ -36,17 +38,32 @@ impl Definition for CouplingPlay {
             NOT_NEGATIVE,
             Trials::Scaled(&[0.1, 0.4, 1.0, 2.0]),
         ),
+        Strength::shape(
+            "tau",
+            "damping of the coupling that acts in contact alone, over its stiffness",
+            Dimension::TIME,
+            NOT_NEGATIVE,
+            Trials::Plain(&[0.0]),
+        ),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
-        Box::new(AtStrengths { k: s[0], gap: s[1] })
+        Box::new(AtStrengths { k: s[0], gap: s[1], tau: s[2] })
     }
 }
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
         let half = self.gap * 0.5;
-        self.k * clamp(at.q - at.other, -half, half)
+        let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
+        let into = ahead - clamp(ahead, -half, half);
+        let damped = self.tau * faster;
+        let contact = match into.value() {
+            side if side > 0.0 => above(into + damped),
+            side if side < 0.0 => -above(-into - damped),
+            _ => S::from(0.0),
+        };
+        self.k * (ahead + damped - contact)
     }
 
     fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
