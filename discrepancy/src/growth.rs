@@ -83,7 +83,11 @@ impl<'a> Search<'a> {
         let mut further: Vec<Trial<'a>> = ways.iter().filter(leads).cloned().collect();
         if further.is_empty() {
             // With the effect that helps each most.
-            further = ways.iter().filter_map(|way| self.whole(self.round(way)?.trials.first()?)).collect();
+            let round = |way: &Trial<'a>| match &best {
+                Some(best) => self.round_against(way, best),
+                None => self.round(way),
+            };
+            further = ways.iter().filter_map(|way| self.whole(round(way)?.trials.first()?)).collect();
         }
         let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
         let Some(way) = way else { return growth };
@@ -167,7 +171,7 @@ impl<'a> Search<'a> {
         let single = self.over_or_in_windows(single);
         let Some(pair) = pair else { return single };
         let pair = self.over_or_in_windows(pair);
-        let second = self.round(&single);
+        let second = self.round_against(&single, &pair);
         let rival = second.as_ref().and_then(|second| second.trials.first());
         let of = Dispersion::of(&pair);
         // What cannot be followed over whole records has lost against what can.
@@ -241,7 +245,7 @@ impl<'a> Search<'a> {
                 }
                 let others = last.added.iter().enumerate().filter(|(k, _)| *k != i && *k != j).map(|(_, a)| a.clone());
                 let Some(without) = self.from(last, &others.collect::<Vec<_>>(), 40) else { continue };
-                let Some(round) = self.round(&self.over_or_in_windows(&without)) else { continue };
+                let Some(round) = self.round_against(&self.over_or_in_windows(&without), last) else { continue };
                 let one = round.trials.first().filter(|t| t.windows == 1 && criterion(t, &of) <= most).cloned();
                 if let Some(one) = one {
                     return Some((one, round));
@@ -329,7 +333,7 @@ impl<'a> Search<'a> {
         /// Share of the gain, to first order, from which on another effect counts as near.
         const NEAR: f64 = 0.9;
         let without = self.over_or_in_windows(&self.without(last, index)?);
-        let mut round = Round::clone(&*self.round(&without)?);
+        let mut round = Round::clone(&*self.round_against(&without, last)?);
         let own = &last.added[index];
         let others = last.added.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, a)| a.clone());
         let others: Vec<Added> = others.collect();

@@ -28,6 +28,8 @@ pub struct Round<'a> {
     pub independent: f64,
     /// What the round began with.
     pub from: Trial<'a>,
+    /// The sum of squares that its models were to reach; infinite where all of them matter.
+    goal: f64,
     /// Residuals and slopes of that.
     known: Arc<Known>,
 }
@@ -40,6 +42,9 @@ const LOOK: usize = 2;
 
 /// How many times more than its screening says, to first order, a candidate may gain.
 const AMPLE: f64 = 2.0;
+
+/// The same where it is to reach what another model leaves: among winners of the test bed 1 to 3.6, and 8 once.
+const FARTHEST: f64 = 10.0;
 
 /// How many times more than a model that explains the data one may leave that still goes on beside it.
 const FAR: f64 = 3.0;
@@ -80,17 +85,28 @@ fn white(count: usize) -> Vec<Vec<f64>> {
 impl<'a> Search<'a> {
     /// The round that begins with a trial; what was found in it once is not looked for again.
     pub fn round(&self, from: &Trial<'a>) -> Option<Arc<Round<'a>>> {
+        self.round_towards(from, f64::INFINITY)
+    }
+
+    /// The same where models matter that leave no more than another, which may be in fewer windows: without those that
+    /// screening shows to be far from that.
+    pub fn round_against(&self, from: &Trial<'a>, rival: &Trial<'a>) -> Option<Arc<Round<'a>>> {
+        let goal = if from.windows < rival.windows { f64::INFINITY } else { rival.fitted.chi2 };
+        self.round_towards(from, goal)
+    }
+
+    fn round_towards(&self, from: &Trial<'a>, goal: f64) -> Option<Arc<Round<'a>>> {
         let looked = || self.looked.lock().expect("no thread panics with it");
-        if let Some(round) = looked().iter().find(|round| round.from.is_like(from)) {
+        if let Some(round) = looked().iter().find(|round| round.goal >= goal && round.from.is_like(from)) {
             return Some(Arc::clone(round));
         }
-        let round = Arc::new(self.look(from)?);
+        let round = Arc::new(self.look(from, goal)?);
         looked().push(Arc::clone(&round));
         Some(round)
     }
 
     /// Screens the whole catalogue against what a trial leaves, and fits the best.
-    fn look(&self, from: &Trial<'a>) -> Option<Round<'a>> {
+    fn look(&self, from: &Trial<'a>, goal: f64) -> Option<Round<'a>> {
         let scene = Scene::new(&from.fit, &from.variant.model, &from.fitted)?;
         // What chance does is asked of the declared model alone.
         let draws = if from.added.is_empty() { white(scene.residuals.len()) } else { Vec::new() };
@@ -122,6 +138,7 @@ impl<'a> Search<'a> {
             let weight = Dispersion::of(from).weight();
             chosen.retain(|&i| by_chance(AMPLE * screened[i].gain / weight, directions) <= self.limits.level);
         }
+        chosen.retain(|&i| from.fitted.chi2 - FARTHEST * screened[i].gain <= goal);
         let shapes = chosen.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
         let shapes: Vec<&Added> = shapes.collect();
         let look = |added: &&Added| self.beside(from, &known, &[self.neutral_start(added)], LOOK);
@@ -157,7 +174,7 @@ impl<'a> Search<'a> {
         self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
-        Some(Round { screened, trials, directions, independent, from: from.clone(), known })
+        Some(Round { screened, trials, directions, independent, from: from.clone(), goal, known })
     }
 
     /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began

@@ -7,6 +7,7 @@ use mops_core::{Hold, Input};
 use crate::base;
 use crate::meter::Meter;
 use crate::round::Round;
+use crate::screen::Screened;
 use crate::search::{Limits, Search};
 use crate::standing::Standing;
 use crate::testing::{Record, catalogue, integrated, subject};
@@ -48,6 +49,30 @@ fn a_likelier_rival_of_what_was_chosen_is_told_first() {
     let (behind, ahead) = (first.rivals(), second.rivals());
     assert!(behind.iter().all(|rival| rival.bic_behind > 0.0), "{behind:?}");
     assert!(ahead[0].effect == "coulomb-friction" && ahead[0].bic_behind < 0.0, "{ahead:?}");
+}
+
+#[test]
+fn rivals_that_are_far_off_to_first_order_are_not_fitted_again() {
+    let subject = subject(PENDULUM, &[17.0, 0.2, 0.9, 0.0], 2, vec![swing()]);
+    let simulations = Meter::new(&());
+    let some = catalogue(&["coulomb-friction", "asymmetric-friction", "sensor-bias", "constant-force"]);
+    let search = || Search::new(&subject, &some, Limits::at(0.01), &simulations);
+    let searched = search();
+    let declared = searched.declared(&base::fit(&subject, 1, &simulations).expect("it simulates"));
+    let declared = declared.expect("it simulates");
+    let round = searched.round(&declared).expect("it simulates");
+    let names =
+        |round: &Round<'_>| -> Vec<&str> { round.trials.iter().map(|t| t.added[0].candidate.effect.name()).collect() };
+    assert_eq!(round.trials.len(), 4, "{:?}", names(&round));
+    let known = searched.round_against(&declared, &round.trials[0]).expect("it simulates");
+    assert!(Arc::ptr_eq(&known, &round), "what was looked at whole is not looked at again");
+
+    let anew = search().round_against(&declared, &round.trials[0]).expect("it simulates");
+    let far = |s: &&Screened| declared.fitted.chi2 - 10.0 * s.gain > round.trials[0].fitted.chi2;
+    let far: Vec<&str> = anew.screened.iter().filter(far).map(|s| s.added.candidate.effect.name()).collect();
+    assert!(far.contains(&"sensor-bias"), "{far:?}");
+    let near: Vec<&str> = names(&round).into_iter().filter(|name| !far.contains(name)).collect();
+    assert_eq!(names(&anew), near);
 }
 
 #[test]
