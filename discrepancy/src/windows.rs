@@ -4,7 +4,7 @@
 //! Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
 //! Problems (1983) 95.
 
-use mops_core::{Case, Hold, Input, Model};
+use mops_core::{Case, Input, Model};
 
 use crate::fit::Piece;
 use crate::subject::{Local, Measurement, Series};
@@ -118,7 +118,7 @@ fn derivative(series: &Series) -> Series {
     Series { values: pairs.collect(), ..series.clone() }
 }
 
-/// An input that begins at a later time.
+/// An input as a clock meets it that begins at a later time: what was before has a time below 0.
 fn shifted(input: &Input, from: f64) -> Input {
     match input {
         Input::Constant(value) => Input::Constant(*value),
@@ -129,25 +129,10 @@ fn shifted(input: &Input, from: f64) -> Input {
             phase: phase + std::f64::consts::TAU * frequency * from,
             offset: *offset,
         },
-        // The signal between two samples is told by those around them, before the window too.
-        Input::Sampled { times, values, hold: Hold::BandLimited } => Input::Sampled {
-            times: times.iter().map(|t| t - from).collect(),
-            values: values.clone(),
-            hold: Hold::BandLimited,
-        },
         Input::Sampled { times, values, hold } => {
-            let first = times.partition_point(|&t| t <= from);
-            let mut new = (vec![0.0], vec![input.at(from)]);
-            if *hold == Hold::First && first == 0 {
-                new.1[0] = values[0];
-            }
-            for k in first..times.len() {
-                if times[k] - from > 1e-12 * (1.0 + from.abs()) {
-                    new.0.push(times[k] - from);
-                    new.1.push(values[k]);
-                }
-            }
-            Input::Sampled { times: new.0, values: new.1, hold: *hold }
+            // Where a window begins with a sample, rounding does not part them.
+            let later = |t: &f64| if (t - from).abs() <= 1e-12 * (1.0 + from.abs()) { 0.0 } else { t - from };
+            Input::Sampled { times: times.iter().map(later).collect(), values: values.clone(), hold: *hold }
         }
     }
 }

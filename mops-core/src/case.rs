@@ -15,7 +15,8 @@ pub struct Case {
     pub experiment: Option<Experiment>,
     /// End of the simulation, s; the models' own where absent.
     pub horizon: Option<f64>,
-    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time.
+    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time. Inputs hold what was
+    /// before at negative times, for actuators that remember or come late.
     pub begins: f64,
 }
 

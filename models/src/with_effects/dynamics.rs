@@ -68,12 +68,14 @@ impl WithEffects {
 struct Command<'a, S> {
     drive: Drive<'a, S>,
     delay: Option<S>,
+    /// When it began, s: below 0 in a window of a record.
+    begun: f64,
 }
 
 impl<S: Scalar> Command<'_, S> {
     /// The time up to which a delayed input has come out.
     fn out(&self, t: f64) -> f64 {
-        self.delay.map_or(t, |delay| (t - delay.value() + 1e-12 * (1.0 + t.abs())).max(0.0))
+        self.delay.map_or(t, |delay| (t - delay.value() + 1e-12 * (1.0 + t.abs())).max(self.begun))
     }
 
     fn at(&self, t: f64) -> S {
@@ -81,7 +83,7 @@ impl<S: Scalar> Command<'_, S> {
             None => self.drive.at(t),
             Some(delay) => {
                 let late = delay - delay.value();
-                let then = (t - delay.value()).max(0.0);
+                let then = (t - delay.value()).max(self.begun);
                 self.drive.at(then) - late * self.drive.slope(then)
             }
         }
@@ -142,8 +144,13 @@ impl<'a, S: Opening> Driven<'a, S> {
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
         };
         let commands = of.inputs.iter().enumerate();
-        let commands = commands.map(|(i, v)| Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i) });
-        let commands: Vec<_> = commands.collect();
+        let begun = 0.0 - job.case.begins;
+        let command = |(i, v): (usize, &mops_core::Variable)| {
+            let mut command = Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i), begun };
+            command.drive.pass_break(command.out(0.0));
+            command
+        };
+        let commands: Vec<_> = commands.map(command).collect();
         let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
         let shown = |signal: &mops_core::Variable| {
             let all = of.states.len() == own;
@@ -317,7 +324,7 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// Holds the commands.
     pub(super) fn command(&mut self, drives: impl Iterator<Item = Drive<'a, S>>) {
-        self.commands = drives.map(|drive| Command { drive, delay: None }).collect();
+        self.commands = drives.map(|drive| Command { drive, delay: None, begun: 0.0 }).collect();
     }
 
     /// Rates of all states and values of signals, with `further` forces at the ports.
@@ -415,6 +422,28 @@ impl<'a, S: Opening> Driven<'a, S> {
                 actor.follow(&at)
             };
             u[input] = passed;
+        }
+    }
+
+    /// Takes actuators that remember through what was commanded before time 0, in a window of a record.
+    fn run_up(&mut self, x: &[S]) {
+        let none = S::from(0.0);
+        let begins: Vec<S> = self.actors.iter_mut().map(|a| std::mem::replace(&mut a.begins, none)).collect();
+        let mut t = 0.0 - self.begins;
+        while t < 0.0 {
+            for command in &mut self.commands {
+                let out = command.out(t);
+                command.drive.pass_break(out);
+            }
+            self.remember(t, x);
+            t = self.commands.iter().map(|command| command.next_break(t, true)).fold(0.0, f64::min);
+            self.remember(t, x);
+        }
+        for (actor, begins) in self.actors.iter_mut().zip(begins) {
+            actor.begins = begins;
+            if matches!(actor.place.site, Site::Actuator { .. }) && !actor.memory.is_empty() {
+                actor.memory[0] += begins;
+            }
         }
     }
 
@@ -518,6 +547,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // What is remembered is moved up to the break, and across it.
         if remembers && self.started {
             self.remember(t, x);
+        } else if remembers && self.begins > 0.0 {
+            self.run_up(x);
         }
         self.pass(t, x);
         if remembers {

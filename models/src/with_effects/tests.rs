@@ -125,6 +125,43 @@ fn a_lag_at_rest_has_tangents_that_decay() {
     assert!((tangents[0].trace("v").last() * mass / tau - 1.0).abs() < 1e-3, "{}", tangents[0].trace("v").last());
 }
 
+#[test]
+fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_remembers_or_is_late() {
+    const BEGINS: f64 = 1.03;
+    let times: Vec<f64> = (0..20).map(|k| f64::from(k) * 0.1).collect();
+    let values: Vec<f64> = (0..20).map(|k| (f64::from(k) * 1.7).sin()).collect();
+    let block = equations(BLOCK);
+    for (effect, strength) in [("input-rate-limit", 1.9), ("backlash", 0.8), ("input-delay", 0.17)] {
+        let model = with(&block, &[(effect, "actuator:u")]);
+        for hold in [Hold::Zero, Hold::First] {
+            let input = |from: f64| {
+                let times = times.iter().map(|t| t - from).collect();
+                vec![("u".to_owned(), Input::Sampled { times, values: values.clone(), hold })]
+            };
+            let parameters = |[x, v]: [f64; 2]| {
+                let mut parameters = vec![2.0, x, v, strength];
+                parameters.resize(model.interface().parameters.len(), 0.0);
+                parameters
+            };
+            let part = run(&model, &parameters([0.1, 0.2]), input(0.0), BEGINS);
+            let whole = run(&model, &parameters([0.1, 0.2]), input(0.0), 1.9);
+            let parameters = parameters(part);
+            let case = Case { inputs: input(BEGINS), begins: BEGINS, ..Case::default() };
+            let job = Job { case: &case, parameters: &parameters, signals: &[0, 1], horizon: 1.9 - BEGINS };
+            let window = model.analyse(&job).expect("it simulates");
+            let apart = ["x", "v"].map(|signal| window.trace(signal).last()).map(f64::to_bits);
+            for (signal, whole) in ["x", "v"].into_iter().zip(whole) {
+                let window = window.trace(signal).last();
+                // Kinks within a step cost the integrator digits.
+                assert!((window - whole).abs() < 1e-6, "{effect} {hold:?} {signal}: {window} {whole}");
+            }
+            // A clock that begins with the window knows nothing of what was before.
+            let late = run(&model, &parameters, input(BEGINS), 1.9 - BEGINS);
+            assert_ne!(late.map(f64::to_bits), apart, "{effect} {hold:?}");
+        }
+    }
+}
+
 fn built_in(kind: &str) -> Arc<dyn Model> {
     let kinds = crate::kinds();
     let kind = kinds.iter().find(|known| known.name == kind).expect("it is there");
