@@ -49,6 +49,9 @@ pub(crate) struct Beside {
 pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, beside: Beside) -> Results {
     let done = each(&plan.wishes(), jobs, tools.watch, |wish| {
         let trial = plan.make(wish);
+        if trial.as_ref().is_some_and(|trial| !plan.wants(&trial.name)) {
+            return None;
+        }
         Some(trial.map(|trial| answered(plan, wish, &trial, tools, beside)))
     });
     let unmade = done.iter().filter(|case| case.is_none()).count();

@@ -31,6 +31,8 @@ pub(crate) struct Plan {
     pub counts: [(Kind, usize); 4],
     /// Seed.
     pub seed: u64,
+    /// Names of the cases that are wanted; all where there is none.
+    pub only: Vec<String>,
 }
 
 /// A case that is asked for.
@@ -49,9 +51,35 @@ impl Plan {
         let of_kind = |&(kind, count): &(Kind, usize)| {
             (0..count).map(move |number| ((number as f64 + 0.5) / count as f64, Wish { kind, number }))
         };
-        let mut all: Vec<(f64, Wish)> = self.counts.iter().flat_map(of_kind).collect();
+        let may_be = |name: &String, wish: &Wish| self.number_in(name) == Some(wish.number as u64);
+        let is_wanted = |wish: &Wish| self.only.is_empty() || self.only.iter().any(|name| may_be(name, wish));
+        let mut all: Vec<(f64, Wish)> = self.counts.iter().flat_map(of_kind).filter(|(_, w)| is_wanted(w)).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all.into_iter().map(|(_, wish)| wish).collect()
+    }
+
+    /// The cases that are wanted by name.
+    pub fn named(&self) -> Vec<Trial> {
+        if self.only.is_empty() {
+            return Vec::new();
+        }
+        self.wishes().iter().filter_map(|wish| self.make(wish)).filter(|trial| self.wants(&trial.name)).collect()
+    }
+
+    /// Whether a case of that name is wanted.
+    pub fn wants(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|wanted| wanted == name)
+    }
+
+    /// The seed of an attempt at a case.
+    fn seed_of(&self, number: u64, attempt: u64) -> u64 {
+        (self.seed << 32) + number * ATTEMPTS + attempt
+    }
+
+    /// The number of a case, from its name, which ends with its seed.
+    fn number_in(&self, name: &str) -> Option<u64> {
+        let seed: u64 = name.rsplit('-').next()?.parse().ok()?;
+        Some(seed.checked_sub(self.seed_of(0, 0))? / ATTEMPTS)
     }
 
     /// The size asked for that is nearest to one reached.
@@ -84,7 +112,7 @@ impl Plan {
             all
         };
         (0..ATTEMPTS).find_map(|attempt| {
-            let seed = (self.seed << 32) + (number as u64) * ATTEMPTS + attempt;
+            let seed = self.seed_of(number as u64, attempt);
             if kind == Kind::Nothing {
                 let name = &self.plants[number % self.plants.len()];
                 return generate(name, Missing::Nothing, 0.0, seed);
@@ -117,6 +145,7 @@ mod tests {
             sizes: vec![5.0, 2.0],
             counts: [(Kind::One, 4), (Kind::Two, 1), (Kind::Nothing, 2), (Kind::Outside, 1)],
             seed: 1,
+            only: Vec::new(),
         }
     }
 
@@ -136,6 +165,16 @@ mod tests {
                 assert!(made.contains(&(effect.to_owned(), size)), "{effect} {size}: {made:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_case_is_made_again_by_its_name() {
+        let all = plan();
+        let third = all.make(&Wish { kind: Kind::One, number: 3 }).expect("it can be made");
+        let only = Plan { only: vec![third.name.clone(), "nothing-9".into()], ..all };
+        assert!(only.wants(&third.name) && !only.wants("nothing-9-1"));
+        assert_eq!(only.wishes().len(), 1, "no other kind has so many");
+        assert_eq!(only.named(), [third]);
     }
 
     #[test]

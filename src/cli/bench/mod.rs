@@ -59,6 +59,10 @@ struct Diagnosis {
     /// Seed of the cases, and of the diagnosis.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Only the cases of these names, as `cases.csv` of an earlier run with the same options spells them; their studies and
+    /// data go to the folder too.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", conflicts_with = "folder")]
+    only: Vec<String>,
     /// Number of cases that run at once, each on one thread; all cores where absent.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -122,6 +126,11 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         if against {
             write(folder, "brute-force.csv", &diagnosis::csv(&results.brute))?;
         }
+        for trial in plan.named() {
+            let folder = folder.join(&trial.name);
+            write(&folder, "study.toml", &trial.study)?;
+            trial.files.iter().try_for_each(|(name, content)| write(&folder, name, content))?;
+        }
         write(folder, "index.html", &diagnosis::page(&text, &tables::stated(&results.rows)))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -154,6 +163,7 @@ fn plan(arguments: &Diagnosis) -> Result<Plan, Diagnostic> {
         sizes: arguments.sizes.clone(),
         counts,
         seed: arguments.seed,
+        only: arguments.only.clone(),
     })
 }
 

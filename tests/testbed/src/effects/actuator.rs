@@ -110,8 +110,9 @@ pub const ALL: &[Effect] = &[
         name: "rate-limit",
         fits: real_actuator,
         build: |s| {
-            // The limit is neutral at infinity: what is open is its inverse.
-            let (from_command, peak, quick) = (s.chance(0.6), s.peak(), 0.1 * s.setup.dt);
+            // The limit is neutral at infinity: what is open is its inverse. A command that is nearly reached is approached
+            // within less than a step of the integrator.
+            let (from_command, peak, quick) = (s.chance(0.6), s.peak(), 0.03 * s.setup.dt);
             Family::up_to(0.25 * s.setup.duration(), move |slowness| {
                 let limit = peak / slowness;
                 let law = Law {
