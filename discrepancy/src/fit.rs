@@ -52,7 +52,7 @@ pub enum Sets {
 pub struct Piece {
     /// The experiment, by index.
     pub measurement: usize,
-    /// Inputs, from the start of the piece.
+    /// Inputs, at times from the start of the piece: below 0 what was before.
     pub case: Case,
     /// Samples, from the start of the piece.
     pub series: Vec<Series>,

@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
         let single = self.over_or_in_windows(single);
         let Some(pair) = pair else { return single };
         let pair = self.over_or_in_windows(pair);
-        let second = self.round_against(&single, &pair);
+        let second = self.round(&single);
         let rival = second.as_ref().and_then(|second| second.trials.first());
         let of = Dispersion::of(&pair);
         // What cannot be followed over whole records has lost against what can.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Trials, stream};
+use mops_core::{Port, Trials, stream};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
@@ -11,7 +11,7 @@ use crate::candidate::Candidate;
 use crate::diagnose::UNEXPLAINED;
 use crate::fit::{Known, dot};
 use crate::screen::{Scene, Screened, screen};
-use crate::search::{NEARLY_LINEAR, Search, Trial};
+use crate::search::{NEARLY_LINEAR, SAME, Search, Trial};
 use crate::variant::{Added, problem};
 use crate::weigh::{Dispersion, by_chance};
 
@@ -28,10 +28,10 @@ pub struct Round<'a> {
     pub independent: f64,
     /// What the round began with.
     pub from: Trial<'a>,
+    /// Residuals and slopes of what it began with.
+    known: Arc<Known>,
     /// The sum of squares that its models were to reach; infinite where all of them matter.
     goal: f64,
-    /// Residuals and slopes of that.
-    known: Arc<Known>,
 }
 
 /// Draws of white noise in place of residuals.
@@ -43,8 +43,13 @@ const LOOK: usize = 2;
 /// How many times more than its screening says, to first order, a candidate may gain.
 const AMPLE: f64 = 2.0;
 
-/// The same where it is to reach what another model leaves: among winners of the test bed 1 to 3.6, and 8 once.
+/// How many times more than its screening says a candidate may gain that is to reach what another model leaves; among those
+/// that were first in some 30 experiments of the test bed 1 to 3.6 times, and 8 once.
 const FARTHEST: f64 = 10.0;
+
+/// How much more than that, in units of the noise as it repeats, it may leave: what weighing may take away in the end
+/// ([`crate::weigh::weighed`]), and what unknowns are worth.
+const ALLOWANCE: f64 = 80.0;
 
 /// How many times more than a model that explains the data one may leave that still goes on beside it.
 const FAR: f64 = 3.0;
@@ -88,16 +93,17 @@ impl<'a> Search<'a> {
         self.round_towards(from, f64::INFINITY)
     }
 
-    /// The same where models matter that leave no more than another, which may be in fewer windows: without those that
-    /// screening shows to be far from that.
+    /// The same where models matter that leave little more than another, which may be in fewer windows: of every place the
+    /// best, and those others that screening does not show to be far from that.
     pub fn round_against(&self, from: &Trial<'a>, rival: &Trial<'a>) -> Option<Arc<Round<'a>>> {
-        let goal = if from.windows < rival.windows { f64::INFINITY } else { rival.fitted.chi2 };
-        self.round_towards(from, goal)
+        let goal = rival.fitted.chi2 + ALLOWANCE * Dispersion::of(rival).weight();
+        self.round_towards(from, if from.windows < rival.windows { f64::INFINITY } else { goal })
     }
 
     fn round_towards(&self, from: &Trial<'a>, goal: f64) -> Option<Arc<Round<'a>>> {
         let looked = || self.looked.lock().expect("no thread panics with it");
-        if let Some(round) = looked().iter().find(|round| round.goal >= goal && round.from.is_like(from)) {
+        let serves = |round: &&Arc<Round<'a>>| round.goal * (1.0 + SAME) >= goal && round.from.is_like(from);
+        if let Some(round) = looked().iter().find(serves) {
             return Some(Arc::clone(round));
         }
         let round = Arc::new(self.look(from, goal)?);
@@ -138,7 +144,15 @@ impl<'a> Search<'a> {
             let weight = Dispersion::of(from).weight();
             chosen.retain(|&i| by_chance(AMPLE * screened[i].gain / weight, directions) <= self.limits.level);
         }
-        chosen.retain(|&i| from.fitted.chi2 - FARTHEST * screened[i].gain <= goal);
+        let mut places: Vec<&Port> = Vec::new();
+        chosen.retain(|&i| {
+            let Screened { added, gain, .. } = &screened[i];
+            let is_best = !places.contains(&&added.candidate.port);
+            places.push(&added.candidate.port);
+            // Of what is not proportional to its strength, the screening knows less.
+            let is_linear = added.candidate.effect.strengths()[0].trials == Trials::Linear;
+            is_best || !is_linear || from.fitted.chi2 - FARTHEST * gain <= goal
+        });
         let shapes = chosen.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
         let shapes: Vec<&Added> = shapes.collect();
         let look = |added: &&Added| self.beside(from, &known, &[self.neutral_start(added)], LOOK);
@@ -174,7 +188,7 @@ impl<'a> Search<'a> {
         self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
         let (screened, known) = (Arc::new(screened), Arc::new(known));
-        Some(Round { screened, trials, directions, independent, from: from.clone(), goal, known })
+        Some(Round { screened, trials, directions, independent, from: from.clone(), known, goal })
     }
 
     /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began

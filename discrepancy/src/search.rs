@@ -23,6 +23,9 @@ pub(crate) const NEARLY_LINEAR: f64 = 6.0;
 /// Residuals of windows, in units of the noise, up to which a model is brought to whole records by windows that grow.
 const WORTH_STRETCHING: f64 = 1.5;
 
+/// Share by which the sums of squares of fits that are taken for the same may differ.
+pub(crate) const SAME: f64 = 1e-5;
+
 /// How many times larger than expected the residuals of an experiment are where its fit went astray.
 pub(crate) const ASTRAY: f64 = 2.0;
 
@@ -354,10 +357,9 @@ impl<'a> Trial<'a> {
 
     /// Whether it is the same model of the same pieces, and leaves as much but for a small share.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        const SHARE: f64 = 1e-5;
         self.windows == other.windows
             && self.has_effects_of(other)
-            && (self.fitted.chi2 - other.fitted.chi2).abs() <= SHARE * self.fitted.chi2
+            && (self.fitted.chi2 - other.fitted.chi2).abs() <= SAME * self.fitted.chi2
     }
 
     /// Whether it has the same effects in the same order.

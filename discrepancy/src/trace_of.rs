@@ -1,6 +1,6 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Input, Port, Trials};
+use mops_core::{Acting, At, Hold, Input, Port, Trials};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
@@ -345,7 +345,7 @@ impl<'a> View<'a> {
         let along = self.along;
         let inputs = along.inputs();
         let begins = self.piece.case.begins;
-        let command = |t: f64| self.input.map_or(0.0, |input| input.at(t.max(0.0)));
+        let command = |t: f64| self.input.map_or(0.0, |input| input.at(t.max(-begins)));
         let delayed = |k: usize, delay: f64| command(self.seen[k].t - begins - delay);
         let change = |at: &At<'_, f64>, value: f64, z: &[f64]| match self.here {
             Spot::Actuator(_) => value - at.value,
@@ -384,6 +384,9 @@ impl<'a> View<'a> {
         let effect = self.candidate.effect.as_ref();
         let mut z = vec![0.0; effect.states()];
         let mut memory = vec![f64::NAN; effect.memory()];
+        if matches!(self.here, Spot::Actuator(_)) && !memory.is_empty() {
+            self.before().iter().for_each(|at| acting.remember(at, &mut memory));
+        }
         let delay = acting.delay();
         let one = |(k, at): (usize, &At<'_, f64>)| {
             if k == 0 {
@@ -402,6 +405,23 @@ impl<'a> View<'a> {
             made(at, value, &z)
         };
         self.seen.iter().enumerate().map(one).collect()
+    }
+
+    /// What came to an actuator before the window of a record, where it bends or jumps: there from the left and from the right.
+    fn before(&self) -> Vec<At<'a, f64>> {
+        let begins = self.piece.case.begins;
+        let (Some(input), Some(first)) = (self.input, self.seen.first()) else { return Vec::new() };
+        let at = |t: f64, value: f64| At { t: t + begins, value, q: value, ..*first };
+        let mut before = Vec::new();
+        let mut t = -begins;
+        while t < 0.0 {
+            let value = input.at(t);
+            let next = input.next_break(t).min(0.0);
+            let is_held = matches!(input, Input::Sampled { hold: Hold::Zero, .. } | Input::Step { .. });
+            before.extend([at(t, value), at(next, if is_held { value } else { input.at(next) })]);
+            t = next;
+        }
+        before
     }
 
     /// What an effect changes at a sensor, in units of the noise.

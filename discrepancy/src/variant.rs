@@ -126,9 +126,12 @@ impl Variant {
     }
 }
 
-/// Whether a strength is looked for in its logarithm: shapes that cannot be 0.
+/// Whether a strength is looked for in its logarithm: shapes that cannot be 0, and are not tried there.
 fn is_log(strength: &Strength, value: f64) -> bool {
-    strength.neutral != Some(0.0) && strength.bounds[0] >= 0.0 && value > 0.0
+    !matches!(strength.trials, Trials::Plain([0.0]))
+        && strength.neutral != Some(0.0)
+        && strength.bounds[0] >= 0.0
+        && value > 0.0
 }
 
 /// What is known of the start values of an effect's states in pieces: those of the same pieces, else those of the beginnings of

@@ -9,14 +9,14 @@ pub struct Case {
     pub name: String,
     /// Values of parameters that hold in this case, in the models' units.
     pub parameters: Vec<(String, f64)>,
-    /// Inputs that are not zero, by name, in the models' units.
+    /// Inputs that are not zero, by name, in the models' units. In a window of a record they hold what was before at negative
+    /// times, for actuators that remember or come late.
     pub inputs: Vec<(String, Input)>,
     /// What was measured.
     pub experiment: Option<Experiment>,
     /// End of the simulation, s; the models' own where absent.
     pub horizon: Option<f64>,
-    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time. Inputs hold what was
-    /// before at negative times, for actuators that remember or come late.
+    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time.
     pub begins: f64,
 }
 

@@ -84,6 +84,7 @@ fn found(damper: Damper) -> [StrengthValue; 2] {
     let told = diagnose(&study(&subject), &effects, &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).unwrap();
     assert_eq!(told.verdict, Verdict::Effect, "{:?}", told.found);
     assert_eq!((told.found[0].effect.as_str(), told.found[0].place.as_str()), ("coupling-play", "joint:q1"));
+    assert!(covers(&told.found[0].strengths[0], 6.0), "{:?}", told.found[0].strengths);
     [1, 2].map(|k| told.found[0].strengths[k].clone())
 }
 

@@ -11,6 +11,7 @@ use crate::meter::Meter;
 use crate::testing::{Record, fitted, subject};
 use crate::trace_of::{View, sizes};
 use crate::variant::{Added, Variant};
+use crate::windows::cut;
 
 const PLANT: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -88,4 +89,58 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
     let wrong: Vec<_> = compared.iter().filter(|c| c.1.is_nan() || c.1 >= 0.01).collect();
     assert!(compared.len() > 20, "{compared:?}");
     assert!(wrong.is_empty(), "{wrong:?} of {}", compared.len());
+}
+
+/// In a plant that is linear in its input the change that is screened is that of the simulation, whatever its size.
+#[test]
+fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
+    let subject = subject(&PLANT.replace(" - 3*k*x^3", ""), &TRUTH, 2, vec![record()]);
+    let simulations = Meter::new(&());
+    let (mut fit, variant, mut at, _) = fitted(&subject, &simulations);
+    fit.pieces = cut(0, &subject.measurements[0], subject.model.as_ref(), 4);
+    at.point.globals = TRUTH[..3].to_vec();
+    at.point.locals = vec![TRUTH[3..].to_vec(); 4];
+    let piece = &fit.pieces[2];
+    assert_eq!(piece.case.begins, 3.0 - 0.01);
+    let Some((_, Input::Sampled { times, .. })) = piece.case.inputs.first() else { panic!("{:?}", piece.case.inputs) };
+    assert!(
+        times[0] == -piece.case.begins && times.len() == COUNT as usize,
+        "{} samples from {}",
+        times.len(),
+        times[0]
+    );
+    let trajectory = crate::trajectory::Trajectory::new(&fit, &variant.model, 2, &at.point).expect("it runs");
+    let measured = ["x", "v"].map(str::to_owned);
+    for (name, strength) in [("input-rate-limit", 6.0), ("backlash", 2.0), ("input-delay", 0.3)] {
+        let all = candidates(&effects(), subject.model.interface(), &measured, &[0]);
+        let candidate = all.into_iter().find(|c| c.is_named(name, "actuator:u")).expect("it fits");
+        let view = View::new(&candidate, &variant.model, piece, &trajectory).expect("it is there");
+        let screened = view.trace(&[strength]).expect("it is finite");
+        let sizes = sizes(&candidate.port, &variant.model, &fit.pieces[2..3], std::slice::from_ref(&trajectory));
+        let added = Added {
+            candidate: candidate.clone(),
+            strengths: vec![strength],
+            own: Vec::new(),
+            starts: Vec::new(),
+            sizes: sizes.expect("it moves"),
+            expected: None,
+        };
+        let with = Variant::new(&subject, &[added], &fit.pieces[2..3]);
+        let simulated = |strength: f64| -> Vec<f64> {
+            let mut parameters = [&TRUTH[..], &[strength]].concat();
+            parameters.resize(with.model.interface().parameters.len(), 0.0);
+            let job = Job { case: &piece.case, parameters: &parameters, signals: &[0, 1], horizon: piece.horizon };
+            let run = with.model.analyse(&job).expect("it runs");
+            piece
+                .series
+                .iter()
+                .flat_map(|s| run.trace(&s.name).sample(&s.times).into_iter().map(|y| y / s.noise))
+                .collect()
+        };
+        let neutral = candidate.effect.strengths()[0].neutral.expect("it has one");
+        let changed = simulated(strength).iter().zip(simulated(neutral)).map(|(a, b)| a - b).collect::<Vec<f64>>();
+        let off: Vec<f64> = screened.iter().zip(&changed).map(|(a, b)| a - b).collect();
+        let error = (dot(&off, &off) / dot(&changed, &changed)).sqrt();
+        assert!(error < 0.02, "{name}: {error}");
+    }
 }

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, above, clamp};
+use super::terms::{NOT_NEGATIVE, clamp, pushed};
 
 /// `coupling-play`.
 pub struct CouplingPlay;
@@ -17,13 +17,14 @@ struct AtStrengths<S> {
 
 impl Definition for CouplingPlay {
     const NAME: &'static str = "coupling-play";
-    const ABOUT: &'static str = "Play in a declared elastic coupling of two joints: within the gap it transmits nothing, \
-                                 and contact never pulls.";
+    const ABOUT: &'static str = "Play in a declared elastic coupling of two joints: within the gap a stiffness k, and \
+                                 damping k tau of it, transmit nothing, and contact never pulls.";
     const FORMULA: &'static str = "k (e + tau e' - c) with c = max(e - gap/2 + tau e', 0) for e = q - q2 > gap/2, \
                                    min(e + gap/2 + tau e', 0) for e < -gap/2, else 0, and its reaction at the \
                                    companion joint: what a coupling -k (e + tau e') with play lacks";
-    const SOURCE: &'static str = "M. Nordin, J. Galic, P.-O. Gutman, New models for backlash and gear play, \
-                                  International Journal of Adaptive Control and Signal Processing 11 (1997) 49";
+    const SOURCE: &'static str = "Modelica Standard Library 4.0, Modelica.Mechanics.Rotational.Components.ElastoBacklash2: \
+                                  contact is made again where it was lost, without the relaxation of a damped shaft \
+                                  in the gap";
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
@@ -58,12 +59,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
         let into = ahead - clamp(ahead, -half, half);
         let damped = self.tau * faster;
-        let contact = match into.value() {
-            side if side > 0.0 => above(into + damped),
-            side if side < 0.0 => -above(-into - damped),
-            _ => S::from(0.0),
-        };
-        self.k * (ahead + damped - contact)
+        self.k * (ahead + damped - pushed(into, damped))
     }
 
     fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {

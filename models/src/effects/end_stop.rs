@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{ANY, NOT_NEGATIVE, above};
+use super::terms::{ANY, NOT_NEGATIVE, above, pushed};
 
 /// `end-stop`.
 pub struct EndStop;
@@ -56,12 +56,7 @@ impl Definition for EndStop {
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
         let (below, beyond) = (self.low - at.q, at.q - self.high);
-        if beyond.value() > 0.0 {
-            -self.k * above(beyond + self.tau * at.v)
-        } else if below.value() > 0.0 {
-            self.k * above(below - self.tau * at.v)
-        } else {
-            S::from(0.0)
-        }
+        let into = if beyond.value() > 0.0 { beyond } else { -above(below) };
+        -self.k * pushed(into, self.tau * at.v)
     }
 }

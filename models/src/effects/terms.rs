@@ -72,6 +72,17 @@ pub(super) fn above<S: Scalar>(x: S) -> S {
     if x.value() > 0.0 { x } else { S::from(0.0) }
 }
 
+/// What a damped contact pushes back with, over its stiffness: how far it is pressed in and its damping over its stiffness times
+/// how fast, towards where `into` is positive or negative, and never against that; nothing where `into` is 0. It jumps as contact
+/// is made, and the time of that has no tangent: a step ends there by its error alone.
+pub(super) fn pushed<S: Scalar>(into: S, damped: S) -> S {
+    match into.value() {
+        side if side > 0.0 => above(into + damped),
+        side if side < 0.0 => -above(-into - damped),
+        _ => S::from(0.0),
+    }
+}
+
 /// `x^exponent` for `x > 0`, else 0.
 pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }

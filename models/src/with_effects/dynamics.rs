@@ -18,7 +18,7 @@ pub(super) struct Actor<S> {
     /// What it remembers.
     pub(super) memory: Vec<S>,
     /// By how much the first value that it lets through differs from the one that comes in.
-    begins: S,
+    ahead: S,
     inertial: bool,
 }
 
@@ -28,7 +28,7 @@ impl<S: Scalar> Actor<S> {
         let first = self.memory[0].value().is_nan();
         self.acting.remember(at, &mut self.memory);
         if first {
-            self.memory[0] += self.begins;
+            self.memory[0] += self.ahead;
         }
         self.acting.recall(at, &self.memory)
     }
@@ -55,7 +55,7 @@ impl WithEffects {
                 place,
                 z,
                 memory: vec![S::from(f64::NAN); effect.memory()],
-                begins: S::from(0.0),
+                ahead: S::from(0.0),
                 inertial: effect.is_inertial(),
             }
         };
@@ -82,8 +82,11 @@ impl<S: Scalar> Command<'_, S> {
         match self.delay {
             None => self.drive.at(t),
             Some(delay) => {
+                let then = t - delay.value();
+                if then < self.begun {
+                    return self.drive.at(self.begun);
+                }
                 let late = delay - delay.value();
-                let then = (t - delay.value()).max(self.begun);
                 self.drive.at(then) - late * self.drive.slope(then)
             }
         }
@@ -92,6 +95,9 @@ impl<S: Scalar> Command<'_, S> {
     fn next_break(&self, t: f64, smooth: bool) -> f64 {
         let delay = self.delay.map_or(0.0, Scalar::value);
         let out = if delay > 0.0 { self.out(t) } else { t };
+        if t < self.begun + delay - 1e-12 * (1.0 + t.abs()) {
+            return self.begun + delay;
+        }
         delay + if smooth { self.drive.next_break(out) } else { self.drive.next_sample(out) }
     }
 }
@@ -224,7 +230,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             if let Some(starts) = actor.place.starts {
                 z.iter_mut().zip(&parameters[starts..]).for_each(|(z, &over)| *z += over);
-                self.actors[index].begins = parameters[starts];
+                self.actors[index].ahead = parameters[starts];
             }
             x[first..first + count].copy_from_slice(&z);
         }
@@ -425,24 +431,32 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
+    /// Commands as they are from `t` on.
+    fn follow_commands(&mut self, t: f64) {
+        for command in &mut self.commands {
+            let out = command.out(t);
+            command.drive.pass_break(out);
+        }
+    }
+
     /// Takes actuators that remember through what was commanded before time 0, in a window of a record.
+    ///
+    /// N.B.: what comes before them on the same actuator and depends on the state of the plant, or has states of its own, is as
+    /// it is at time 0.
     fn run_up(&mut self, x: &[S]) {
         let none = S::from(0.0);
-        let begins: Vec<S> = self.actors.iter_mut().map(|a| std::mem::replace(&mut a.begins, none)).collect();
+        let ahead: Vec<S> = self.actors.iter_mut().map(|a| std::mem::replace(&mut a.ahead, none)).collect();
         let mut t = 0.0 - self.begins;
         while t < 0.0 {
-            for command in &mut self.commands {
-                let out = command.out(t);
-                command.drive.pass_break(out);
-            }
+            self.follow_commands(t);
             self.remember(t, x);
-            t = self.commands.iter().map(|command| command.next_break(t, true)).fold(0.0, f64::min);
+            t = self.next_break(t).min(0.0);
             self.remember(t, x);
         }
-        for (actor, begins) in self.actors.iter_mut().zip(begins) {
-            actor.begins = begins;
+        for (actor, ahead) in self.actors.iter_mut().zip(ahead) {
+            actor.ahead = ahead;
             if matches!(actor.place.site, Site::Actuator { .. }) && !actor.memory.is_empty() {
-                actor.memory[0] += begins;
+                actor.memory[0] += ahead;
             }
         }
     }
@@ -465,10 +479,7 @@ impl<'a, S: Opening> Driven<'a, S> {
                 }
             }
         }
-        for command in &mut self.commands {
-            let out = command.out(t);
-            command.drive.pass_break(out);
-        }
+        self.follow_commands(t);
     }
 }
 
@@ -543,7 +554,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
-        let remembers = self.actors.iter().any(|actor| !actor.memory.is_empty());
+        let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
+        let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
         // What is remembered is moved up to the break, and across it.
         if remembers && self.started {
             self.remember(t, x);

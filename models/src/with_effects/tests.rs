@@ -149,7 +149,7 @@ fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_rem
             let case = Case { inputs: input(BEGINS), begins: BEGINS, ..Case::default() };
             let job = Job { case: &case, parameters: &parameters, signals: &[0, 1], horizon: 1.9 - BEGINS };
             let window = model.analyse(&job).expect("it simulates");
-            let apart = ["x", "v"].map(|signal| window.trace(signal).last()).map(f64::to_bits);
+            let end = ["x", "v"].map(|signal| window.trace(signal).last());
             for (signal, whole) in ["x", "v"].into_iter().zip(whole) {
                 let window = window.trace(signal).last();
                 // Kinks within a step cost the integrator digits.
@@ -157,7 +157,7 @@ fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_rem
             }
             // A clock that begins with the window knows nothing of what was before.
             let late = run(&model, &parameters, input(BEGINS), 1.9 - BEGINS);
-            assert_ne!(late.map(f64::to_bits), apart, "{effect} {hold:?}");
+            assert!((late[1] - end[1]).abs() > 1e-3, "{effect} {hold:?}: {late:?} {end:?}");
         }
     }
 }

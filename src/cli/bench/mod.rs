@@ -60,7 +60,7 @@ struct Diagnosis {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Only the cases of these names, as `cases.csv` of an earlier run with the same options spells them; their studies and
-    /// data go to the folder too.
+    /// data go to the folder too. Choose another folder than that of the earlier run, whose tables would be lost.
     #[arg(long, value_delimiter = ',', value_name = "NAMES", conflicts_with = "folder")]
     only: Vec<String>,
     /// Number of cases that run at once, each on one thread; all cores where absent.
@@ -113,6 +113,13 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         return done;
     }
     let plan = plan(arguments)?;
+    let named = plan.named();
+    if let Some(unknown) = plan.only.iter().find(|name| !named.iter().any(|trial| trial.name == **name)) {
+        let fact = format!("these options make no case `{unknown}`");
+        return Err(Diagnostic::new(fact)
+            .with_help("repeat the options of the run that has it in its cases.csv")
+            .into());
+    }
     let progress = Progress::of_cases(!arguments.quiet);
     let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
     let beside = Beside { brute_force: against, orders: arguments.orders, told: arguments.told };
@@ -126,7 +133,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         if against {
             write(folder, "brute-force.csv", &diagnosis::csv(&results.brute))?;
         }
-        for trial in plan.named() {
+        for trial in named {
             let folder = folder.join(&trial.name);
             write(&folder, "study.toml", &trial.study)?;
             trial.files.iter().try_for_each(|(name, content)| write(&folder, name, content))?;
