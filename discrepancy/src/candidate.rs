@@ -134,6 +134,9 @@ const NOISES_PER_STEP: f64 = 5.0;
 const PER_PERIOD: f64 = 1.5;
 const MOST_PERIODS: f64 = 160.0;
 
+/// How many times the largest multiple tried of its typical size a shape may be, and how many widths beyond a range.
+const FARTHEST_SHAPE: f64 = 10.0;
+
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
 
@@ -188,6 +191,25 @@ impl Sizes {
             * power(self.speed, dimension.speed)
             * power(self.value, dimension.value)
             * power(self.time, dimension.time)
+    }
+
+    /// Smallest and largest value of a strength: those that physics allows, and of a shape no more than [`FARTHEST_SHAPE`] times
+    /// the largest multiple of its typical size that is tried, or beyond the range in which it is. A force that yields over
+    /// a path much longer than the motion never does, and stands for something else.
+    pub fn bounds(&self, strength: &Strength) -> [f64; 2] {
+        let [low, high] = strength.bounds;
+        let [least, most] = match (strength.neutral, strength.trials) {
+            (None, Trials::Scaled(multiples)) => {
+                let largest = multiples.iter().copied().fold(0.0, f64::max) * self.of(strength.dimension);
+                [f64::NEG_INFINITY, FARTHEST_SHAPE * largest]
+            }
+            (None, Trials::Within(_)) => {
+                let beyond = FARTHEST_SHAPE * (self.range[1] - self.range[0]);
+                [self.range[0] - beyond, self.range[1] + beyond]
+            }
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
     }
 
     /// The values of a strength that are tried.

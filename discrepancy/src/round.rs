@@ -192,26 +192,26 @@ impl<'a> Search<'a> {
     }
 
     /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began
-    /// with, as strong as it was found and twice as strong: where a step changes much, a fit from nothing may have stuck.
+    /// with: where a step changes much, a fit from nothing may have stuck.
     fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>) -> Trial<'a> {
-        const TIMES_AS_STRONG: [f64; 2] = [1.0, 2.0];
         const ITERATIONS: usize = 40;
-        let mut best = trial;
-        let Some(stuck) = best.added.last().cloned() else { return best };
-        let first = &stuck.candidate.effect.strengths()[0];
-        if first.neutral == Some(stuck.strengths[0]) {
-            return best;
+        let Some(stuck) = trial.added.last().cloned() else { return trial };
+        if trial.fitted.normalised() <= UNEXPLAINED {
+            return trial;
         }
-        for times in TIMES_AS_STRONG {
+        let begun = |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
+        let less = |again: &Trial<'a>, than: &Trial<'a>| again.fitted.chi2 < than.fitted.chi2;
+        let anew = stuck.begun_anew();
+        if !anew.is_empty() {
+            let again = self.race(anew.into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect());
+            return again.into_iter().next().filter(|again| less(again, &trial)).unwrap_or(trial);
+        }
+        let mut best = trial;
+        for newest in stuck.as_strong_and_twice() {
             if best.fitted.normalised() <= UNEXPLAINED {
                 break;
             }
-            let mut newest = stuck.clone();
-            // A limit is the stronger the lower it is.
-            let strength = stuck.strengths[0] * if first.neutral == Some(0.0) { times } else { 1.0 / times };
-            newest.strengths[0] = strength.clamp(first.bounds[0], first.bounds[1]);
-            let again = self.from(from, &[from.added.as_slice(), &[newest]].concat(), ITERATIONS);
-            best = again.filter(|again| again.fitted.chi2 < best.fitted.chi2).unwrap_or(best);
+            best = begun(newest, ITERATIONS).filter(|again| less(again, &best)).unwrap_or(best);
         }
         best
     }

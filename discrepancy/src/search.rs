@@ -102,7 +102,7 @@ impl<'a> Search<'a> {
     /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them.
     pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
         let mut best = trial;
-        for windows in [2, 4, 8] {
+        for windows in [2, 4, 8, 16, 32] {
             if best.fitted.normalised() < NEARLY_LINEAR {
                 break;
             }

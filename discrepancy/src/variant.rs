@@ -58,6 +58,31 @@ impl Added {
             && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
 
+    /// The same at all shapes that are tried, as strong as its first strength says that a fit begins anew; none where it does not
+    /// say.
+    pub fn begun_anew(&self) -> Vec<Self> {
+        let effect = self.candidate.effect.as_ref();
+        let first = &effect.strengths()[0];
+        let shapes = if first.anew.is_empty() { Vec::new() } else { self.sizes.combinations(effect) };
+        let at = |times: &f64| {
+            let strength = (times * self.sizes.of(first.dimension)).clamp(first.bounds[0], first.bounds[1]);
+            shapes.iter().map(move |shape| Self { strengths: [&[strength], &shape[1..]].concat(), ..self.clone() })
+        };
+        first.anew.iter().flat_map(at).collect()
+    }
+
+    /// The same as strong as it is, and twice as strong; none where it is neutral. A limit is the stronger the lower it is.
+    pub fn as_strong_and_twice(&self) -> Vec<Self> {
+        let (first, strength) = (&self.candidate.effect.strengths()[0], self.strengths[0]);
+        let at = |times: f64| {
+            let strength = strength * if first.neutral == Some(0.0) { times } else { 1.0 / times };
+            let mut strong = self.clone();
+            strong.strengths[0] = strength.clamp(first.bounds[0], first.bounds[1]);
+            strong
+        };
+        if first.neutral == Some(strength) { Vec::new() } else { [1.0, 2.0].map(at).to_vec() }
+    }
+
     /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the
     /// simpler part of one that was fitted.
     pub fn begun_like(&self, other: &Self) -> Self {
@@ -192,8 +217,9 @@ pub fn problem<'a>(
                     Trials::Jumps(_) => 0.5 * scale,
                     _ => scale,
                 };
-                all.push(Global { sets: Sets::Parameter(parameter), bounds: strength.bounds, log, scale, steps });
-                values.push(value);
+                let bounds = a.sizes.bounds(strength);
+                all.push(Global { sets: Sets::Parameter(parameter), bounds, log, scale, steps });
+                values.push(value.clamp(bounds[0], bounds[1]));
             }
         }
         if let Some(only) = a.candidate.only {

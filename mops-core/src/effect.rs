@@ -224,6 +224,9 @@ pub struct Strength {
     pub scope: Scope,
     /// Whether it stays at the value that was tried: a whole number of periods in a turn.
     pub fixed: bool,
+    /// Multiples of its typical size at which a fit begins anew, with every shape tried, where one from nothing has stuck: a
+    /// contact that is soft at first spreads over the whole motion. None where once and twice what was found will do.
+    pub anew: &'static [f64],
 }
 
 impl Strength {
@@ -238,6 +241,7 @@ impl Strength {
             trials: Trials::Linear,
             scope: Scope::Study,
             fixed: false,
+            anew: &[],
         }
     }
 
@@ -283,6 +287,13 @@ impl Strength {
     #[must_use]
     pub const fn per_experiment(mut self) -> Self {
         self.scope = Scope::Experiment;
+        self
+    }
+
+    /// Begun anew at these multiples of its typical size where a fit from nothing has stuck.
+    #[must_use]
+    pub const fn begun_anew_at(mut self, multiples: &'static [f64]) -> Self {
+        self.anew = multiples;
         self
     }
 

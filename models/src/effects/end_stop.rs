@@ -24,7 +24,8 @@ impl Definition for EndStop {
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))
+            .begun_anew_at(&[1.0, 10.0]),
         Strength::shape(
             "low",
             "position of the lower stop",
