@@ -56,12 +56,27 @@ impl Candidate {
         if untold && strength.dimension.output != 0 { String::new() } else { unit.to_string() }
     }
 
+    /// Whether fits of it may stick and begin anew: see [`Strength::anew`].
+    pub fn is_begun_anew(&self) -> bool {
+        !self.effect.strengths()[0].anew.is_empty()
+    }
+
     /// Whether it is dry friction: a joint has one at most.
     pub fn is_dry_friction(&self) -> bool {
         let strengths: Vec<f64> =
             self.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect();
-        let moving =
-            At { t: 0.0, value: 0.0, q: 0.0, v: 1.0, a: 0.0, mobility: 1.0, other: 0.0, other_speed: 0.0, u: &[] };
+        let moving = At {
+            t: 0.0,
+            value: 0.0,
+            q: 0.0,
+            v: 1.0,
+            a: 0.0,
+            mobility: 1.0,
+            other: 0.0,
+            other_speed: 0.0,
+            u: &[],
+            closed: None,
+        };
         self.effect.act(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
     }
 

@@ -13,7 +13,7 @@ use crate::fit::{Known, dot};
 use crate::screen::{Scene, Screened, screen};
 use crate::search::{NEARLY_LINEAR, SAME, Search, Trial};
 use crate::variant::{Added, problem};
-use crate::weigh::{Dispersion, by_chance};
+use crate::weigh::{CLEARLY, Dispersion, by_chance};
 
 /// Candidates of one round: as screened, and the best of them as fitted.
 #[derive(Clone)]
@@ -165,25 +165,7 @@ impl<'a> Search<'a> {
                 trials.push(trial);
             }
         }
-        let mut trials = self.race(trials);
-        if from.windows > 1 {
-            // Windows forgive what whole records do not: these decide, where they can be fitted.
-            let finalists = &trials[..trials.len().min(self.limits.finalists)];
-            let is_simpler = |t: &Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
-            let near = nearness(trials.first());
-            let is_worth = |(rank, t)| if rank < finalists.len() { near(t) } else { is_simpler(t) };
-            let worth: Vec<bool> = trials.iter().enumerate().map(is_worth).collect();
-            let (chosen, rest): (Vec<_>, Vec<_>) = trials.into_iter().zip(worth).partition(|(_, worth)| *worth);
-            let again = chosen.into_par_iter().map(|(trial, _)| self.begun_again(from, trial));
-            let chosen: Vec<Trial<'a>> = again.collect();
-            let wholes: Vec<Trial<'a>> = chosen.par_iter().filter_map(|t| self.over_whole(t)).collect();
-            trials = if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
-                wholes
-            } else {
-                chosen.into_iter().chain(rest.into_iter().map(|(trial, _)| trial)).collect()
-            };
-            best_first(&mut trials);
-        }
+        let mut trials = self.finals(from, self.race(trials));
         trials.retain(Trial::is_physical);
         self.simplify(&mut trials, &screened);
         let independent = independent.unwrap_or(directions);
@@ -191,20 +173,50 @@ impl<'a> Search<'a> {
         Some(Round { screened, trials, directions, independent, from: from.clone(), known, goal })
     }
 
-    /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began
-    /// with: where a step changes much, a fit from nothing may have stuck.
-    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>) -> Trial<'a> {
+    /// Those that may rival the best, begun again where they have stuck; over whole records where they are in windows, which
+    /// forgive what those do not.
+    fn finals(&self, from: &Trial<'a>, trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
+        let finalists = &trials[..trials.len().min(self.limits.finalists)];
+        let is_simpler = |t: &Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
+        let near = nearness(trials.first());
+        let is_worth = |(rank, t): (usize, &Trial<'a>)| if rank < finalists.len() { near(t) } else { is_simpler(t) };
+        let worth: Vec<bool> = trials.iter().enumerate().map(is_worth).collect();
+        let least = trials.first().map_or(f64::INFINITY, |best| best.fitted.chi2);
+        let (chosen, rest): (Vec<_>, Vec<_>) = trials.into_iter().zip(worth).partition(|(_, worth)| *worth);
+        let again = |(trial, _): (Trial<'a>, bool)| {
+            let sticks = from.windows > 1 || trial.newest().is_some_and(Candidate::is_begun_anew);
+            if sticks { self.begun_again(from, trial, least) } else { trial }
+        };
+        let chosen: Vec<Trial<'a>> = chosen.into_par_iter().map(again).collect();
+        let wholes: Vec<Trial<'a>> = match from.windows {
+            1 => Vec::new(),
+            _ => chosen.par_iter().filter_map(|t| self.over_whole(t)).collect(),
+        };
+        let mut trials = if wholes.iter().any(|t| t.fitted.normalised() < NEARLY_LINEAR) {
+            wholes
+        } else {
+            chosen.into_iter().chain(rest.into_iter().map(|(trial, _)| trial)).collect()
+        };
+        best_first(&mut trials);
+        trials
+    }
+
+    /// The trial; or, where that leaves less, its newest effect begun anew beside what the round began with: where a step changes
+    /// much, a fit from nothing may have stuck. It has where it leaves something, and one that may stick has already where it
+    /// leaves clearly more than the `least` of the round.
+    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>, least: f64) -> Trial<'a> {
         const ITERATIONS: usize = 40;
         let Some(stuck) = trial.added.last().cloned() else { return trial };
-        if trial.fitted.normalised() <= UNEXPLAINED {
+        let is_behind = stuck.candidate.is_begun_anew() && trial.fitted.chi2 > least + CLEARLY;
+        if trial.fitted.normalised() <= UNEXPLAINED && !is_behind {
             return trial;
         }
-        let begun = |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
+        let begun =
+            |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
         let less = |again: &Trial<'a>, than: &Trial<'a>| again.fitted.chi2 < than.fitted.chi2;
-        let anew = stuck.begun_anew();
-        if !anew.is_empty() {
-            let again = self.race(anew.into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect());
-            return again.into_iter().next().filter(|again| less(again, &trial)).unwrap_or(trial);
+        if stuck.candidate.is_begun_anew() {
+            let again = stuck.begun_anew().into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect();
+            return self.race(again).into_iter().next().filter(|again| less(again, &trial)).unwrap_or(trial);
         }
         let mut best = trial;
         for newest in stuck.as_strong_and_twice() {

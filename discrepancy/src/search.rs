@@ -20,6 +20,12 @@ use crate::windows::cut;
 /// Residuals, in units of the noise, up to which a linear view of them is trusted.
 pub(crate) const NEARLY_LINEAR: f64 = 6.0;
 
+/// Residuals up to which it is better than nothing.
+const FAIRLY_LINEAR: f64 = 20.0;
+
+/// Samples of a window per start value that it brings in, at least.
+const SAMPLES_PER_START: usize = 4;
+
 /// Residuals of windows, in units of the noise, up to which a model is brought to whole records by windows that grow.
 const WORTH_STRETCHING: f64 = 1.5;
 
@@ -99,7 +105,8 @@ impl<'a> Search<'a> {
         whole.iter().flat_map(cut).collect()
     }
 
-    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them.
+    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them. Where start values of
+    /// the windows would make up for all that the declared model lacks, it stays with larger residuals that tell of it.
     pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
         let mut best = trial;
         for windows in [2, 4, 8, 16, 32] {
@@ -107,9 +114,17 @@ impl<'a> Search<'a> {
                 break;
             }
             let pieces = self.pieces(windows);
+            let samples = |piece: &Piece| piece.series.iter().map(|s| s.times.len()).sum::<usize>();
+            if pieces.iter().any(|piece| samples(piece) < SAMPLES_PER_START * piece.locals.len()) {
+                break;
+            }
             let tuners = best.fitted.point.globals[..self.subject.globals.len()].to_vec();
             let locals = base::first_locals(&pieces);
             if let Some(next) = self.trial(&best.added, &tuners, locals, windows, 40) {
+                let hides_all = next.fitted.normalised() <= UNEXPLAINED && best.added.is_empty();
+                if hides_all && best.fitted.normalised() <= FAIRLY_LINEAR {
+                    break;
+                }
                 best = next;
             }
         }

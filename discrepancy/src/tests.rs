@@ -22,6 +22,7 @@ mod stability;
 mod standing;
 mod starts;
 mod steps;
+mod stops;
 mod switched_on;
 mod tangents;
 mod undefined;

@@ -275,7 +275,7 @@ impl<'a> View<'a> {
             Spot::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
             Spot::Sensor(_) => (0.0, 0.0, 0.0, 0.0, 0.0),
         };
-        At { t: m.t + self.piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u }
+        At { t: m.t + self.piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u, closed: None }
     }
 
     fn at_sample(&self, series: usize, companion: Option<Spot>, k: usize) -> At<'a, f64> {
@@ -295,6 +295,7 @@ impl<'a> View<'a> {
             other,
             other_speed: 0.0,
             u: &[],
+            closed: None,
         }
     }
 
@@ -459,6 +460,7 @@ fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &m
             other: mix(from.other, to.other),
             other_speed: mix(from.other_speed, to.other_speed),
             u: from.u,
+            closed: None,
         }
     };
     let h = (to.t - from.t) / f64::from(PARTS);

@@ -17,7 +17,7 @@ fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
     model.interface().parameters.iter().map(value).collect()
 }
 
-fn respond(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) -> Response {
+pub(crate) fn respond(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) -> Response {
     simulate(model, case, &values(model, parameters), horizon)
 }
 
@@ -34,7 +34,7 @@ fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], ho
 
 /// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
 /// the part `step` of their value.
-fn check_tangents_by(step: f64, model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
+pub(crate) fn check_tangents_by(step: f64, model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
     let values = values(model, parameters);
     let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
     let finite: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();

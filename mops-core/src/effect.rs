@@ -326,6 +326,8 @@ pub struct At<'a, S> {
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
+    /// Whether a contact is closed, as a simulation holds it throughout a step; `None` where [`Acting::gap`] is to tell.
+    pub closed: Option<bool>,
 }
 
 /// Dry friction: the kernel finds out whether the joint sticks.
@@ -356,6 +358,12 @@ pub trait Acting<S: Scalar> {
 
     /// Dry friction on top of [`Acting::value`], at a joint.
     fn friction(&self, _at: &At<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
+        None
+    }
+
+    /// How far a contact is open; negative while it is closed. A simulation ends a step where that changes sign, so that tangents
+    /// know that the moment moves.
+    fn gap(&self, _at: &At<'_, S>) -> Option<S> {
         None
     }
 

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, clamp, pushed};
+use super::terms::{NOT_NEGATIVE, Pressed};
 
 /// `coupling-play`.
 pub struct CouplingPlay;
@@ -53,16 +53,27 @@ impl Definition for CouplingPlay {
     }
 }
 
+impl<S: Scalar> AtStrengths<S> {
+    /// The contact on the side on which one is ahead of the other, and which that is.
+    fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
+        let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
+        let side = if ahead.value() < 0.0 { -1.0 } else { 1.0 };
+        (Pressed { into: ahead * side - self.gap * 0.5, damped: self.tau * faster * side }, side)
+    }
+}
+
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        let half = self.gap * 0.5;
-        let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
-        let into = ahead - clamp(ahead, -half, half);
-        let damped = self.tau * faster;
-        self.k * (ahead + damped - pushed(into, damped))
+        let (pressed, side) = self.nearer(at);
+        let coupled = at.q - at.other + self.tau * (at.v - at.other_speed);
+        self.k * (coupled - pressed.force(at.closed) * side)
     }
 
     fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
         -self.value(at, z)
+    }
+
+    fn gap(&self, at: &At<'_, S>) -> Option<S> {
+        (self.k.value() != 0.0).then(|| self.nearer(at).0.gap())
     }
 }

@@ -3,7 +3,7 @@
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
-use super::terms::{ANY, NOT_NEGATIVE, above, pushed};
+use super::terms::{ANY, NOT_NEGATIVE, Pressed};
 
 /// `end-stop`.
 pub struct EndStop;
@@ -31,14 +31,14 @@ impl Definition for EndStop {
             "position of the lower stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[0.0, 0.05, 0.2]),
+            Trials::Within(&[-0.05, 0.05, 0.2]),
         ),
         Strength::shape(
             "high",
             "position of the upper stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[0.8, 0.95, 1.0]),
+            Trials::Within(&[0.8, 0.95, 1.05]),
         ),
         Strength::shape(
             "tau",
@@ -54,10 +54,22 @@ impl Definition for EndStop {
     }
 }
 
+impl<S: Scalar> AtStrengths<S> {
+    /// The contact with the nearer stop, and where that pushes.
+    fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
+        let (below, above) = (self.low - at.q, at.q - self.high);
+        let (into, to) = if below.value() > above.value() { (below, 1.0) } else { (above, -1.0) };
+        (Pressed { into, damped: self.tau * at.v * -to }, to)
+    }
+}
+
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        let (below, beyond) = (self.low - at.q, at.q - self.high);
-        let into = if beyond.value() > 0.0 { beyond } else { -above(below) };
-        -self.k * pushed(into, self.tau * at.v)
+        let (pressed, to) = self.nearer(at);
+        self.k * pressed.force(at.closed) * to
+    }
+
+    fn gap(&self, at: &At<'_, S>) -> Option<S> {
+        (self.k.value() != 0.0).then(|| self.nearer(at).0.gap())
     }
 }

@@ -67,19 +67,23 @@ pub(super) fn clamp<S: Scalar>(x: S, low: S, high: S) -> S {
     }
 }
 
-/// `max(x, 0)`.
-pub(super) fn above<S: Scalar>(x: S) -> S {
-    if x.value() > 0.0 { x } else { S::from(0.0) }
+/// A damped contact: how far it is pressed in, and its damping over its stiffness times how fast.
+#[derive(Clone, Copy)]
+pub(super) struct Pressed<S> {
+    pub into: S,
+    pub damped: S,
 }
 
-/// What a damped contact pushes back with, over its stiffness: how far it is pressed in and its damping over its stiffness times
-/// how fast, towards where `into` is positive or negative, and never against that; nothing where `into` is 0. It jumps as contact
-/// is made, and the time of that has no tangent: a step ends there by its error alone.
-pub(super) fn pushed<S: Scalar>(into: S, damped: S) -> S {
-    match into.value() {
-        side if side > 0.0 => above(into + damped),
-        side if side < 0.0 => -above(-into - damped),
-        _ => S::from(0.0),
+impl<S: Scalar> Pressed<S> {
+    /// How far it is open: apart, or parting so fast that it would pull; negative while it pushes.
+    pub fn gap(self) -> S {
+        if self.damped.value() > 0.0 { -self.into } else { -self.into - self.damped }
+    }
+
+    /// What it pushes back with, over its stiffness. It jumps as contact is made; within a step of a simulation it is what
+    /// `closed` says.
+    pub fn force(self, closed: Option<bool>) -> S {
+        if closed.unwrap_or(self.gap().value() < 0.0) { self.into + self.damped } else { S::from(0.0) }
     }
 }
 

@@ -35,7 +35,7 @@ fn place(even: &mut Even) -> [f64; 11] {
 
 fn at<S: Scalar>(seen: &[S; 11]) -> At<'static, S> {
     let [value, q, v, a, mobility, other, other_speed, ..] = *seen;
-    At { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[] }
+    At { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
 }
 
 /// What the effect gives at a place: its value, its delay, the four numbers of dry friction, the rates of its states.

@@ -19,6 +19,8 @@ pub(super) struct Actor<S> {
     pub(super) memory: Vec<S>,
     /// By how much the first value that it lets through differs from the one that comes in.
     ahead: S,
+    /// Whether its contact is closed; `None` where it has none.
+    closed: Option<bool>,
     inertial: bool,
 }
 
@@ -56,6 +58,7 @@ impl WithEffects {
                 z,
                 memory: vec![S::from(f64::NAN); effect.memory()],
                 ahead: S::from(0.0),
+                closed: None,
                 inertial: effect.is_inertial(),
             }
         };
@@ -228,10 +231,12 @@ impl<'a, S: Opening> Driven<'a, S> {
                 };
                 self.contacts.add(index, w, velocity);
             }
+            let closed = actor.acting.gap(&at).map(|gap| gap.value() < 0.0);
             if let Some(starts) = actor.place.starts {
                 z.iter_mut().zip(&parameters[starts..]).for_each(|(z, &over)| *z += over);
                 self.actors[index].ahead = parameters[starts];
             }
+            self.actors[index].closed = closed;
             x[first..first + count].copy_from_slice(&z);
         }
         Ok(x)
@@ -263,7 +268,8 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             None => (zero, zero),
         };
-        At { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u }
+        let closed = actor.closed;
+        At { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u, closed }
     }
 
     fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
@@ -461,6 +467,22 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
+    /// Not negative while the gap with this number stays open, or closed.
+    fn gap_guard(&self, number: usize, t: f64, x: &[S]) -> S {
+        let mut gaps = self.actors.iter().filter(|actor| actor.closed.is_some());
+        let actor = gaps.nth(number).expect("it is one of them");
+        let gap = actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0))).expect("it had one at the start");
+        if actor.closed == Some(true) { -gap } else { gap }
+    }
+
+    /// Its guard became negative. Returns whether it is closed now.
+    fn gap_switch(&mut self, number: usize) -> bool {
+        let mut gaps = self.actors.iter_mut().filter_map(|actor| actor.closed.as_mut());
+        let closed = gaps.nth(number).expect("it is one of them");
+        *closed = !*closed;
+        *closed
+    }
+
     /// Passes a break of inputs. The time at which a delayed input jumps moves with the delay, and the state with it.
     fn pass(&mut self, t: f64, x: &mut [S]) {
         let delayed = self.commands.iter().any(|c| c.delay.is_some());
@@ -504,13 +526,18 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn guards(&self) -> usize {
-        self.plant.guards() + self.contacts.len()
+        let gaps = self.actors.iter().filter(|actor| actor.closed.is_some()).count();
+        self.plant.guards() + self.contacts.len() + gaps
     }
 
     fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> S {
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx } = &mut *scratch;
         let own = self.plant.guards();
+        let sticking = own + self.contacts.len();
+        if index >= sticking {
+            return self.gap_guard(index - sticking, t, x);
+        }
         if index >= own {
             return self.contact_guard(index - own, t, x, u, w);
         }
@@ -521,13 +548,22 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn switch(&mut self, index: usize, t: f64, x: &mut Vec<S>) -> &str {
         let own = self.plant.guards();
+        let sticking = own + self.contacts.len();
         let (mut u, mut w) = (Vec::new(), Vec::new());
         let mut dx = vec![S::from(0.0); self.own];
         if index >= own {
-            let sticks = self.contact_switch(index - own, t, x);
+            let what = if index >= sticking {
+                let closes = self.gap_switch(index - sticking);
+                self.settle_contacts(t, x, None);
+                if closes { "a contact closes" } else { "a contact opens" }
+            } else if self.contact_switch(index - own, t, x) {
+                "a joint sticks"
+            } else {
+                "a joint slides"
+            };
             self.balance(t, x, &mut u, &mut w, &mut dx);
             self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
-            return if sticks { "a joint sticks" } else { "a joint slides" };
+            return what;
         }
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();

@@ -47,6 +47,7 @@ impl<S: Opening> Driven<'_, S> {
                             other: zero,
                             other_speed: zero,
                             u: &[],
+                            closed: None,
                         };
                         let measured = actor.follow(&at);
                         nodes[0][node] = measured.value();

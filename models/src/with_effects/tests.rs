@@ -11,6 +11,7 @@ use super::{Own, OwnModel, WithEffects};
 use crate::effects::effects;
 use crate::equations::EquationsOptions;
 use crate::kernel::mechanism;
+use crate::tests::{check_tangents_by, respond};
 
 fn equations(text: &str) -> Arc<dyn Model> {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
@@ -107,6 +108,20 @@ fn tangents_along_strengths_are_those_of_differences() {
             assert!((exact - difference).abs() < 1e-4 * (1.0 + difference.abs()), "{i} {signal} {exact} {difference}");
         }
     }
+}
+
+/// The force of a damped stop jumps as contact is made, at a moment that moves with all that comes before.
+#[test]
+fn tangents_across_damped_contacts_are_those_of_differences() {
+    let exact = "tolerance = { relative = 1e-12, absolute = 1e-14 }";
+    let model = with(&equations(&format!("{BLOCK}{exact}")), &[("end-stop", "joint:x")]);
+    let case = Case { inputs: vec![("u".to_owned(), Input::Constant(1.0))], ..Case::default() };
+    let thrown = [("m", 2.0), ("x0", 0.0), ("v0", 3.0)];
+    let stops = [("e0.k", 5000.0), ("e0.low", -0.2), ("e0.high", 0.3), ("e0.tau", 4e-3)];
+    let parameters = [thrown.as_slice(), &stops].concat();
+    check_tangents_by(1e-6, &model, &case, &parameters, 0.6);
+    let events = respond(&model, &case, &parameters, 0.6).events;
+    assert!(events.iter().filter(|event| event.what == "a contact closes").count() > 1, "{events:?}");
 }
 
 #[test]
