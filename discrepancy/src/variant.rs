@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Model, Port, Scope, Strength, Trials};
+use mops_core::{Dimension, Model, Port, Scope, Strength, Trials};
 use mops_models::WithEffects;
 use nalgebra::DMatrix;
 
@@ -231,7 +231,9 @@ pub fn problem<'a>(
             for (state, &dimension) in effect.free_starts().iter().enumerate() {
                 let parameter = first + effect.strengths().len() + state;
                 let scale = a.sizes.of(dimension);
-                let bounds = [-10.0 * scale, 10.0 * scale];
+                // What has no unit is a share of its limit.
+                let most = if dimension == Dimension::ONE { 1.0 } else { 10.0 * scale };
+                let bounds = [-most, most];
                 let start = known.map_or(0.0, |known| known[state].clamp(bounds[0], bounds[1]));
                 piece.locals.push(Local { parameter, bounds, start, scale: 0.1 * scale });
                 locals.push(start);

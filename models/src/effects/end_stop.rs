@@ -31,14 +31,14 @@ impl Definition for EndStop {
             "position of the lower stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[-0.05, 0.05, 0.2]),
+            Trials::Within(&[-0.05, 0.0, 0.05, 0.2]),
         ),
         Strength::shape(
             "high",
             "position of the upper stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[0.8, 0.95, 1.05]),
+            Trials::Within(&[0.8, 0.95, 1.0, 1.05]),
         ),
         Strength::shape(
             "tau",
