@@ -44,7 +44,8 @@ struct Look {
     x: Vec<f64>,
     u: Vec<f64>,
     contacts: super::contacts::Contacts,
-    memories: Vec<Vec<f64>>,
+    /// Of each effect whether its contact is closed, and what it remembers.
+    effects: Vec<(Option<bool>, Vec<f64>)>,
 }
 
 impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
@@ -60,7 +61,7 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
                 x: x.clone(),
                 u: dynamics.commanded(t.clamp(step.start, end)),
                 contacts: dynamics.contacts.clone(),
-                memories: dynamics.actors.iter().map(|actor| actor.memory.clone()).collect(),
+                effects: dynamics.actors.iter().map(|actor| (actor.closed, actor.memory.clone())).collect(),
             });
             self.next += 1;
         }
@@ -97,7 +98,7 @@ fn moment(tangent: &mut Driven<'_, Along>, look: &Look, forces: usize, signals: 
     let columns = n + inputs + forces;
     let mut slopes = DMatrix::zeros(n + signals.len(), columns);
     let (mut rates, mut y) = (vec![0.0; n], vec![0.0; signals.len()]);
-    tangent.take(&look.contacts, &look.memories);
+    tangent.take(&look.contacts, &look.effects);
     for first in (0..columns).step_by(DIRECTIONS) {
         let seeded = |(j, &value): (usize, &f64)| {
             let direction = j.wrapping_sub(first);

@@ -20,7 +20,7 @@ pub(super) struct Actor<S> {
     /// By how much the first value that it lets through differs from the one that comes in.
     ahead: S,
     /// Whether its contact is closed; `None` where it has none.
-    closed: Option<bool>,
+    pub(super) closed: Option<bool>,
     inertial: bool,
 }
 
@@ -326,10 +326,11 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.commands.iter().map(|command| command.at(t)).collect()
     }
 
-    /// Takes the contacts and memories of another simulation.
-    pub(super) fn take(&mut self, contacts: &Contacts, memories: &[Vec<f64>]) {
+    /// Takes the contacts of another simulation, and of its effects whether they are closed and what they remember.
+    pub(super) fn take(&mut self, contacts: &Contacts, effects: &[(Option<bool>, Vec<f64>)]) {
         self.contacts = contacts.clone();
-        for (actor, memory) in self.actors.iter_mut().zip(memories) {
+        for (actor, (closed, memory)) in self.actors.iter_mut().zip(effects) {
+            actor.closed = *closed;
             actor.memory = memory.iter().map(|&m| S::from(m)).collect();
         }
     }

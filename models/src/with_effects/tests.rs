@@ -125,6 +125,18 @@ fn tangents_across_damped_contacts_are_those_of_differences() {
 }
 
 #[test]
+fn a_stop_is_a_spring_in_the_linear_system_while_it_is_reached() {
+    let model = with(&equations(BLOCK), &[("end-stop", "joint:x")]);
+    let (m, k) = (2.0, 5000.0);
+    let parameters = [m, 0.0, 3.0, k, -0.2, 0.3, 4e-3];
+    let job = Job { case: &Case::default(), parameters: &parameters, signals: &[0], horizon: 0.3 };
+    // It is reached at 0.1 s, for half a period, 63 ms, or less.
+    let moments = model.along(&job, &[0.05, 0.12, 0.2]).expect("it simulates");
+    let stiffness: Vec<f64> = moments.iter().map(|moment| moment.a[(1, 0)]).collect();
+    assert_eq!(stiffness, [0.0, -k / m, 0.0]);
+}
+
+#[test]
 fn a_lag_at_rest_has_tangents_that_decay() {
     let model = with(&equations(BLOCK), &[("actuator-lag", "actuator:u")]);
     // The command is 1 all along, and the lag begins at 1: nothing but its time limits the step.
