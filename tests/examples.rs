@@ -104,7 +104,7 @@ fn the_studies_of_recordings_are_read_with_the_roles_of_their_experiments() {
         ("furuta-lund", include_str!("../examples/recordings/furuta-lund.toml"), [1, 0, 0]),
         ("furuta-lund-blocks", include_str!("../examples/recordings/furuta-lund-blocks.toml"), [2, 1, 2]),
         ("pendulum-multiarm", include_str!("../examples/recordings/pendulum-multiarm.toml"), [9, 3, 6]),
-        ("pendulum-dfki", include_str!("../examples/recordings/pendulum-dfki.toml"), [2, 0, 1]),
+        ("pendulum-dfki", include_str!("../examples/recordings/pendulum-dfki.toml"), [3, 0, 1]),
     ] {
         let read = mops::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
         let study = read.unwrap_or_else(|mistake| panic!("{name}: {mistake}")).study;

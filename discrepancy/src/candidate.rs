@@ -56,9 +56,9 @@ impl Candidate {
         if untold && strength.dimension.output != 0 { String::new() } else { unit.to_string() }
     }
 
-    /// Whether fits of it may stick and begin anew: see [`Strength::anew`].
-    pub fn is_begun_anew(&self) -> bool {
-        !self.effect.strengths()[0].anew.is_empty()
+    /// Whether fits of it that have stuck are restarted at every shape: [`Strength::restarts`].
+    pub fn has_restarts(&self) -> bool {
+        !self.effect.strengths()[0].restarts.is_empty()
     }
 
     /// Whether it is dry friction: a joint has one at most.
@@ -150,7 +150,7 @@ const PER_PERIOD: f64 = 1.5;
 const MOST_PERIODS: f64 = 160.0;
 
 /// How many times the largest multiple tried of its typical size a shape may be, and how many widths beyond a range.
-const FARTHEST_SHAPE: f64 = 10.0;
+pub(crate) const FARTHEST_SHAPE: f64 = 10.0;
 
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
@@ -208,9 +208,10 @@ impl Sizes {
             * power(self.time, dimension.time)
     }
 
-    /// Smallest and largest value of a strength: those that physics allows, and of a shape no more than [`FARTHEST_SHAPE`] times
-    /// the largest multiple of its typical size that is tried, or beyond the range in which it is. A force that yields over
-    /// a path much longer than the motion never does, and stands for something else.
+    /// Smallest and largest value of a strength in a fit: those that physics allows. A shape that is tried at multiples of its
+    /// typical size is besides no more than [`FARTHEST_SHAPE`] times the largest of them, and one that is tried within a range is
+    /// no more than so many widths beyond it: farther off it does nothing, or stands for something else, as a force stands for
+    /// a constant one that would yield after a path much longer than the motion.
     pub fn bounds(&self, strength: &Strength) -> [f64; 2] {
         let [low, high] = strength.bounds;
         let [least, most] = match (strength.neutral, strength.trials) {

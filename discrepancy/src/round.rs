@@ -181,11 +181,12 @@ impl<'a> Search<'a> {
         let near = nearness(trials.first());
         let is_worth = |(rank, t): (usize, &Trial<'a>)| if rank < finalists.len() { near(t) } else { is_simpler(t) };
         let worth: Vec<bool> = trials.iter().enumerate().map(is_worth).collect();
-        let least = trials.first().map_or(f64::INFINITY, |best| best.fitted.chi2);
+        let clearly = |best: &Trial<'a>| best.fitted.chi2 + CLEARLY * Dispersion::of(best).weight();
+        let most = trials.first().map_or(f64::INFINITY, clearly);
         let (chosen, rest): (Vec<_>, Vec<_>) = trials.into_iter().zip(worth).partition(|(_, worth)| *worth);
         let again = |(trial, _): (Trial<'a>, bool)| {
-            let sticks = from.windows > 1 || trial.newest().is_some_and(Candidate::is_begun_anew);
-            if sticks { self.begun_again(from, trial, least) } else { trial }
+            let sticks = from.windows > 1 || trial.newest().is_some_and(Candidate::has_restarts);
+            if sticks { self.begun_again(from, trial, most) } else { trial }
         };
         let chosen: Vec<Trial<'a>> = chosen.into_par_iter().map(again).collect();
         let wholes: Vec<Trial<'a>> = match from.windows {
@@ -202,20 +203,20 @@ impl<'a> Search<'a> {
     }
 
     /// The trial; or, where that leaves less, its newest effect begun anew beside what the round began with: where a step changes
-    /// much, a fit from nothing may have stuck. It has where it leaves something, and one that may stick has already where it
-    /// leaves clearly more than the `least` of the round.
-    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>, least: f64) -> Trial<'a> {
+    /// much, a fit from nothing may have stuck. It counts as stuck where its residuals exceed the noise, and where an effect with
+    /// restarts leaves more than `most`.
+    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>, most: f64) -> Trial<'a> {
         const ITERATIONS: usize = 40;
         let Some(stuck) = trial.added.last().cloned() else { return trial };
-        let is_behind = stuck.candidate.is_begun_anew() && trial.fitted.chi2 > least + CLEARLY;
+        let is_behind = stuck.candidate.has_restarts() && trial.fitted.chi2 > most;
         if trial.fitted.normalised() <= UNEXPLAINED && !is_behind {
             return trial;
         }
         let begun =
             |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
         let less = |again: &Trial<'a>, than: &Trial<'a>| again.fitted.chi2 < than.fitted.chi2;
-        if stuck.candidate.is_begun_anew() {
-            let again = stuck.begun_anew().into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect();
+        if stuck.candidate.has_restarts() {
+            let again = stuck.restarts().into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect();
             return self.race(again).into_iter().next().filter(|again| less(again, &trial)).unwrap_or(trial);
         }
         let mut best = trial;

@@ -20,10 +20,13 @@ use crate::windows::cut;
 /// Residuals, in units of the noise, up to which a linear view of them is trusted.
 pub(crate) const NEARLY_LINEAR: f64 = 6.0;
 
-/// Residuals up to which it is better than nothing.
+/// Residuals, in units of the noise, up to which a linear view still ranks effects better than none would.
 const FAIRLY_LINEAR: f64 = 20.0;
 
-/// Samples of a window per start value that it brings in, at least.
+/// Windows of a record that are tried however short they are.
+const FEW_WINDOWS: usize = 8;
+
+/// Samples per start value of the model in each of more windows.
 const SAMPLES_PER_START: usize = 4;
 
 /// Residuals of windows, in units of the noise, up to which a model is brought to whole records by windows that grow.
@@ -105,8 +108,9 @@ impl<'a> Search<'a> {
         whole.iter().flat_map(cut).collect()
     }
 
-    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them. Where start values of
-    /// the windows would make up for all that the declared model lacks, it stays with larger residuals that tell of it.
+    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them, or the most that have
+    /// samples enough. Where start values of the windows would make up for all that the declared model lacks, it stays in fewer,
+    /// whose larger residuals tell of it.
     pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
         let mut best = trial;
         for windows in [2, 4, 8, 16, 32] {
@@ -115,7 +119,8 @@ impl<'a> Search<'a> {
             }
             let pieces = self.pieces(windows);
             let samples = |piece: &Piece| piece.series.iter().map(|s| s.times.len()).sum::<usize>();
-            if pieces.iter().any(|piece| samples(piece) < SAMPLES_PER_START * piece.locals.len()) {
+            let is_short = |piece: &Piece| samples(piece) < SAMPLES_PER_START * piece.locals.len();
+            if windows > FEW_WINDOWS && pieces.iter().any(is_short) {
                 break;
             }
             let tuners = best.fitted.point.globals[..self.subject.globals.len()].to_vec();

@@ -58,17 +58,16 @@ impl Added {
             && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
 
-    /// The same at all shapes that are tried, as strong as its first strength says that a fit begins anew; none where it does not
-    /// say.
-    pub fn begun_anew(&self) -> Vec<Self> {
+    /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::Strength::restarts`].
+    pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
         let first = &effect.strengths()[0];
-        let shapes = if first.anew.is_empty() { Vec::new() } else { self.sizes.combinations(effect) };
+        let shapes = self.sizes.combinations(effect);
         let at = |times: &f64| {
             let strength = (times * self.sizes.of(first.dimension)).clamp(first.bounds[0], first.bounds[1]);
             shapes.iter().map(move |shape| Self { strengths: [&[strength], &shape[1..]].concat(), ..self.clone() })
         };
-        first.anew.iter().flat_map(at).collect()
+        first.restarts.iter().flat_map(at).collect()
     }
 
     /// The same as strong as it is, and twice as strong; none where it is neutral. A limit is the stronger the lower it is.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::candidate::FARTHEST_SHAPE;
 use crate::fit::{Fit, Fitted};
 use crate::search::Trial;
 use crate::variant::Added;
@@ -104,8 +105,8 @@ fn is_plausible(added: &Added) -> bool {
         let tried = added.sizes.values(strength.dimension, strength.trials, strength.bounds);
         let low = tried.iter().copied().fold(f64::INFINITY, f64::min);
         let high = tried.iter().copied().fold(0.0, f64::max);
-        // Where nothing but 0 was tried, nothing says how far off a value is.
-        high == 0.0 || (0.1 * low..=10.0 * high).contains(&value)
+        // Where nothing but 0 was tried, nothing says how far off a value is. One at its limit has run away.
+        high == 0.0 || (0.1 * low..0.99 * FARTHEST_SHAPE * high).contains(&value)
     })
 }
 

@@ -224,9 +224,9 @@ pub struct Strength {
     pub scope: Scope,
     /// Whether it stays at the value that was tried: a whole number of periods in a turn.
     pub fixed: bool,
-    /// Multiples of its typical size at which a fit begins anew, with every shape tried, where one from nothing has stuck: a
-    /// contact that is soft at first spreads over the whole motion. None where once and twice what was found will do.
-    pub anew: &'static [f64],
+    /// Multiples of its typical size from which a fit is restarted, at every shape tried, where one from nothing has stuck: a
+    /// contact that is soft at first spreads over the whole motion. Empty: restarted from once and twice what was found.
+    pub restarts: &'static [f64],
 }
 
 impl Strength {
@@ -241,7 +241,7 @@ impl Strength {
             trials: Trials::Linear,
             scope: Scope::Study,
             fixed: false,
-            anew: &[],
+            restarts: &[],
         }
     }
 
@@ -290,10 +290,10 @@ impl Strength {
         self
     }
 
-    /// Begun anew at these multiples of its typical size where a fit from nothing has stuck.
+    /// Restarted from these multiples of its typical size where a fit from nothing has stuck.
     #[must_use]
-    pub const fn begun_anew_at(mut self, multiples: &'static [f64]) -> Self {
-        self.anew = multiples;
+    pub const fn restarted_from(mut self, multiples: &'static [f64]) -> Self {
+        self.restarts = multiples;
         self
     }
 
@@ -326,7 +326,8 @@ pub struct At<'a, S> {
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
-    /// Whether a contact is closed, as a simulation holds it throughout a step; `None` where [`Acting::gap`] is to tell.
+    /// Whether the contact of the effect is closed, as a simulation holds it throughout a step; `None` where there is no contact, or
+    /// the sign of [`Acting::gap`] is to tell.
     pub closed: Option<bool>,
 }
 
@@ -361,8 +362,9 @@ pub trait Acting<S: Scalar> {
         None
     }
 
-    /// How far a contact is open; negative while it is closed. A simulation ends a step where that changes sign, so that tangents
-    /// know that the moment moves.
+    /// How far a contact at a joint is open; negative while it is closed. It depends on positions and speeds alone, and an effect has
+    /// it throughout a simulation or never. A simulation ends a step where it changes sign, and tangents account for that
+    /// moment; within a step [`At::closed`] says which law holds, also a little beyond the change.
     fn gap(&self, _at: &At<'_, S>) -> Option<S> {
         None
     }
@@ -446,7 +448,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Dimensions of the start values that an experiment leaves free as they matter: those of all its states, or that of what
-    /// an effect with a memory lets through.
+    /// an effect with a memory lets through. One without unit is a share of a limit, between -1 and 1.
     fn free_starts(&self) -> &'static [Dimension] {
         &[]
     }

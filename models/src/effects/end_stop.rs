@@ -25,7 +25,7 @@ impl Definition for EndStop {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))
-            .begun_anew_at(&[1.0, 10.0]),
+            .restarted_from(&[1.0, 10.0]),
         Strength::shape(
             "low",
             "position of the lower stop",
@@ -55,9 +55,11 @@ impl Definition for EndStop {
 }
 
 impl<S: Scalar> AtStrengths<S> {
-    /// The contact with the nearer stop, and where that pushes.
+    /// The contact with the nearer stop, and where that pushes. Stops that have crossed meet in the middle.
     fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
-        let (below, above) = (self.low - at.q, at.q - self.high);
+        let middle = (self.low + self.high) * 0.5;
+        let (low, high) = if self.low.value() > self.high.value() { (middle, middle) } else { (self.low, self.high) };
+        let (below, above) = (low - at.q, at.q - high);
         let (into, to) = if below.value() > above.value() { (below, 1.0) } else { (above, -1.0) };
         (Pressed { into, damped: self.tau * at.v * -to }, to)
     }

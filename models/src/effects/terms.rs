@@ -67,10 +67,12 @@ pub(super) fn clamp<S: Scalar>(x: S, low: S, high: S) -> S {
     }
 }
 
-/// A damped contact: how far it is pressed in, and its damping over its stiffness times how fast.
+/// A damped contact.
 #[derive(Clone, Copy)]
 pub(super) struct Pressed<S> {
+    /// How far it is pressed in, a length or an angle.
     pub into: S,
+    /// How fast, times its damping over its stiffness: likewise.
     pub damped: S,
 }
 
@@ -80,8 +82,7 @@ impl<S: Scalar> Pressed<S> {
         if self.damped.value() > 0.0 { -self.into } else { -self.into - self.damped }
     }
 
-    /// What it pushes back with, over its stiffness. It jumps as contact is made; within a step of a simulation it is what
-    /// `closed` says.
+    /// What it pushes back with, over its stiffness. It jumps as contact is made; `closed` keeps to one law until a step ends.
     pub fn force(self, closed: Option<bool>) -> S {
         if closed.unwrap_or(self.gap().value() < 0.0) { self.into + self.damped } else { S::from(0.0) }
     }

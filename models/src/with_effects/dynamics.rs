@@ -126,6 +126,8 @@ pub(super) struct Driven<'a, S> {
     /// What a clock shows at time 0, s.
     begins: f64,
     started: bool,
+    /// What happened at the last event of the plant.
+    happened: String,
     scratch: RefCell<Scratch<S>>,
     /// For each force the sign with which a positive one acts forward.
     forward: Vec<f64>,
@@ -191,6 +193,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             untouched,
             begins,
             started: false,
+            happened: String::new(),
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
             further: Vec::new(),
@@ -231,14 +234,13 @@ impl<'a, S: Opening> Driven<'a, S> {
                 };
                 self.contacts.add(index, w, velocity);
             }
-            let closed = actor.acting.gap(&at).map(|gap| gap.value() < 0.0);
             if let Some(starts) = actor.place.starts {
                 z.iter_mut().zip(&parameters[starts..]).for_each(|(z, &over)| *z += over);
                 self.actors[index].ahead = parameters[starts];
             }
-            self.actors[index].closed = closed;
             x[first..first + count].copy_from_slice(&z);
         }
+        self.settle_gaps(0.0, &x);
         Ok(x)
     }
 
@@ -476,6 +478,18 @@ impl<'a, S: Opening> Driven<'a, S> {
         if actor.closed == Some(true) { -gap } else { gap }
     }
 
+    /// Finds which contacts are closed: at the start, and where the state of the plant has jumped.
+    fn settle_gaps(&mut self, t: f64, x: &[S]) {
+        for index in 0..self.actors.len() {
+            let actor = &self.actors[index];
+            if !matches!(actor.place.site, Site::Joint { .. }) {
+                continue;
+            }
+            let gap = actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0)));
+            self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
+        }
+    }
+
     /// Its guard became negative. Returns whether it is closed now.
     fn gap_switch(&mut self, number: usize) -> bool {
         let mut gaps = self.actors.iter_mut().filter_map(|actor| actor.closed.as_mut());
@@ -535,9 +549,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx } = &mut *scratch;
         let own = self.plant.guards();
-        let sticking = own + self.contacts.len();
-        if index >= sticking {
-            return self.gap_guard(index - sticking, t, x);
+        let gaps = own + self.contacts.len();
+        if index >= gaps {
+            return self.gap_guard(index - gaps, t, x);
         }
         if index >= own {
             return self.contact_guard(index - own, t, x, u, w);
@@ -549,12 +563,12 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn switch(&mut self, index: usize, t: f64, x: &mut Vec<S>) -> &str {
         let own = self.plant.guards();
-        let sticking = own + self.contacts.len();
+        let gaps = own + self.contacts.len();
         let (mut u, mut w) = (Vec::new(), Vec::new());
         let mut dx = vec![S::from(0.0); self.own];
         if index >= own {
-            let what = if index >= sticking {
-                let closes = self.gap_switch(index - sticking);
+            let what = if index >= gaps {
+                let closes = self.gap_switch(index - gaps);
                 self.settle_contacts(t, x, None);
                 if closes { "a contact closes" } else { "a contact opens" }
             } else if self.contact_switch(index - own, t, x) {
@@ -568,7 +582,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         }
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
-        self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own])
+        let jumped = &mut x[..self.own];
+        self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, jumped).clone_into(&mut self.happened);
+        self.settle_gaps(t, x);
+        &self.happened
     }
 
     fn shows(&self, signal: usize) -> Option<usize> {

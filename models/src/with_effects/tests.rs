@@ -125,6 +125,31 @@ fn tangents_across_damped_contacts_are_those_of_differences() {
 }
 
 #[test]
+fn stops_that_have_crossed_are_one_spring_about_their_middle() {
+    let model = with(&equations(BLOCK), &[("end-stop", "joint:x")]);
+    let (m, k): (f64, f64) = (2.0, 50.0);
+    let [x, v] = run(&model, &[m, 0.3, 0.0, k, 0.5, -0.3, 0.0], Vec::new(), 4.0);
+    let omega = (k / m).sqrt();
+    assert!((x - 0.1 - 0.2 * (4.0 * omega).cos()).abs() < 1e-5, "{x}");
+    assert!((v + 0.2 * omega * (4.0 * omega).sin()).abs() < 1e-5, "{v}");
+}
+
+/// A catch 20 mm behind the stop throws the block back, 0.2 m before it.
+#[test]
+fn a_contact_is_found_anew_where_the_state_jumps() {
+    let text = format!("{BLOCK}when = {{ wall = {{ guard = \"0.32 - x\", reset = {{ x = \"0.1\", v = \"-v\" }} }} }}");
+    let model = with(&equations(&text), &[("end-stop", "joint:x")]);
+    let [x, v] = run(&model, &[2.0, 0.0, 3.0, 500.0, -9.0, 0.3, 1e-3], Vec::new(), 0.2);
+    // It has flown on freely, and made no contact but the first.
+    assert!(v < -2.9 && x < 0.1, "{x} {v}");
+    let case = Case::default();
+    let thrown =
+        [("m", 2.0), ("x0", 0.0), ("v0", 3.0), ("e0.k", 500.0), ("e0.low", -9.0), ("e0.high", 0.3), ("e0.tau", 1e-3)];
+    let events = respond(&model, &case, &thrown, 0.2).events;
+    assert_eq!(events.len(), 2, "{events:?}");
+}
+
+#[test]
 fn a_stop_is_a_spring_in_the_linear_system_while_it_is_reached() {
     let model = with(&equations(BLOCK), &[("end-stop", "joint:x")]);
     let (m, k) = (2.0, 5000.0);
