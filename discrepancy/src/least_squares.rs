@@ -254,8 +254,8 @@ impl Fit<'_> {
 
     /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly
     /// narrow them: the logarithm of how many times smaller they make the variance. Beforehand a global lies anywhere between
-    /// its bounds, but what is looked for in its logarithm within a decade either way; what no slope tells and has no upper bound
-    /// within 20 of its scales; a start value within ten of its scales. What has no bounds at all costs the whole, as
+    /// its bounds; what physics gives no upper one within a decade either way where it is looked for in its logarithm, and within
+    /// 20 of its scales where no slope tells it; a start value within ten of its scales. What has no bounds at all costs the whole, as
     /// does the strength itself, at `first`, where no slope tells it.
     ///
     /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 2.3: the Occam factor.
@@ -269,7 +269,7 @@ impl Fit<'_> {
             Sets::Parameter(parameter) if parameter > first || parameter == first && !global.is_stepped() => {
                 let width = (global.bounds[1] - global.bounds[0]) / self.stretch(k, fitted.point.globals[k]);
                 uniform(match (width.is_finite(), global.log, global.is_stepped()) {
-                    (_, true, _) => width.min(2.0 * 10.0_f64.ln()),
+                    (_, true, _) if global.open => 2.0 * 10.0_f64.ln(),
                     (false, false, true) => STEPPED,
                     _ => width,
                 })

@@ -216,8 +216,7 @@ impl<'a> Search<'a> {
             |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
         let less = |again: &Trial<'a>, than: &Trial<'a>| again.fitted.chi2 < than.fitted.chi2;
         if stuck.candidate.has_restarts() {
-            let again = stuck.restarts().into_par_iter().filter_map(|newest| begun(newest, LOOK)).collect();
-            return self.race(again).into_iter().next().filter(|again| less(again, &trial)).unwrap_or(trial);
+            return self.restarted(from, trial, &stuck);
         }
         let mut best = trial;
         for newest in stuck.as_strong_and_twice() {
@@ -227,6 +226,23 @@ impl<'a> Search<'a> {
             best = begun(newest, ITERATIONS).filter(|again| less(again, &best)).unwrap_or(best);
         }
         best
+    }
+
+    /// The trial; or, where that leaves less over whole records, its newest effect restarted at every shape, in short windows where
+    /// longer ones leave too much.
+    fn restarted(&self, from: &Trial<'a>, trial: Trial<'a>, stuck: &Added) -> Trial<'a> {
+        let short = self.in_short_windows(from.clone());
+        let begun = |newest| self.from(&short, &[short.added.as_slice(), &[newest]].concat(), LOOK);
+        let again = self.race(stuck.restarts().into_par_iter().filter_map(begun).collect()).into_iter().next();
+        if short.windows == 1 {
+            return again.filter(|again| again.fitted.chi2 < trial.fitted.chi2).unwrap_or(trial);
+        }
+        let whole = again.and_then(|again| self.over_whole(&again));
+        let Some(whole) = whole.filter(|whole| whole.fitted.normalised() < NEARLY_LINEAR) else { return trial };
+        match self.over_whole(&trial) {
+            Some(before) if before.fitted.chi2 <= whole.fitted.chi2 => trial,
+            _ => whole,
+        }
     }
 
     /// Where the best explains the data, fits what is simpler once more, from where that ended: records with stops have minima

@@ -108,12 +108,21 @@ impl<'a> Search<'a> {
         whole.iter().flat_map(cut).collect()
     }
 
-    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them, or the most that have
-    /// samples enough. Where start values of the windows would make up for all that the declared model lacks, it stays in fewer,
-    /// whose larger residuals tell of it.
+    /// The trial in windows: the fewest in which its residuals are small enough for a linear view of them. Where start values of
+    /// the windows would make up for all that the declared model lacks, it stays in fewer, whose larger residuals tell of it.
     pub fn in_windows(&self, trial: Trial<'a>) -> Trial<'a> {
+        self.cut_into(&[2, 4, 8], trial)
+    }
+
+    /// The same in windows so short that a contact begins or ends in each, as long as samples suffice: what acts over longer
+    /// times is made up for by their start values.
+    pub fn in_short_windows(&self, trial: Trial<'a>) -> Trial<'a> {
+        self.cut_into(&[16, 32], trial)
+    }
+
+    fn cut_into(&self, counts: &[usize], trial: Trial<'a>) -> Trial<'a> {
         let mut best = trial;
-        for windows in [2, 4, 8, 16, 32] {
+        for &windows in counts {
             if best.fitted.normalised() < NEARLY_LINEAR {
                 break;
             }

@@ -217,7 +217,8 @@ pub fn problem<'a>(
                     _ => scale,
                 };
                 let bounds = a.sizes.bounds(strength);
-                all.push(Global { sets: Sets::Parameter(parameter), bounds, log, scale, steps });
+                let open = strength.bounds[1].is_infinite();
+                all.push(Global { sets: Sets::Parameter(parameter), bounds, open, log, scale, steps });
                 values.push(value.clamp(bounds[0], bounds[1]));
             }
         }
