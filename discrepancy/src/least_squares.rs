@@ -255,8 +255,8 @@ impl Fit<'_> {
     /// How much the unknowns that set parameters from `first` on cost less than [`Dispersion::worth`] each, as the data hardly
     /// narrow them: the logarithm of how many times smaller they make the variance. Beforehand a global lies anywhere between
     /// its bounds; what physics gives no upper one within a decade either way where it is looked for in its logarithm, and within
-    /// 20 of its scales where no slope tells it; a start value within ten of its scales. What has no bounds at all costs the whole, as
-    /// does the strength itself, at `first`, where no slope tells it.
+    /// 20 of its scales where no slope tells it; a start value within ten of its scales. What has no bounds at all costs the
+    /// whole, as does the strength itself, at `first`, where no slope tells it.
     ///
     /// Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415, section 2.3: the Occam factor.
     pub fn spared(&self, fitted: &Fitted, first: usize, dispersion: &Dispersion) -> f64 {

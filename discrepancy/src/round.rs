@@ -174,7 +174,7 @@ impl<'a> Search<'a> {
     }
 
     /// Those that may rival the best, begun again where they have stuck; over whole records where they are in windows, which
-    /// forgive what those do not.
+    /// forgive what those do not. One with restarts counts as stuck where it leaves clearly more than the best, too.
     fn finals(&self, from: &Trial<'a>, trials: Vec<Trial<'a>>) -> Vec<Trial<'a>> {
         let finalists = &trials[..trials.len().min(self.limits.finalists)];
         let is_simpler = |t: &Trial<'a>| finalists.iter().any(|than| t.is_simpler_than(than));
@@ -184,9 +184,15 @@ impl<'a> Search<'a> {
         let clearly = |best: &Trial<'a>| best.fitted.chi2 + CLEARLY * Dispersion::of(best).weight();
         let most = trials.first().map_or(f64::INFINITY, clearly);
         let (chosen, rest): (Vec<_>, Vec<_>) = trials.into_iter().zip(worth).partition(|(_, worth)| *worth);
-        let again = |(trial, _): (Trial<'a>, bool)| {
-            let sticks = from.windows > 1 || trial.newest().is_some_and(Candidate::has_restarts);
-            if sticks { self.begun_again(from, trial, most) } else { trial }
+        let restarts = |trial: &Trial<'a>| trial.newest().is_some_and(Candidate::has_restarts);
+        let is_behind = |trial: &Trial<'a>| trial.fitted.normalised() > UNEXPLAINED || trial.fitted.chi2 > most;
+        // All that are restarted are so beside the same.
+        let short =
+            chosen.iter().any(|(t, _)| restarts(t) && is_behind(t)).then(|| self.in_short_windows(from.clone()));
+        let again = |(trial, _): (Trial<'a>, bool)| match &short {
+            Some(short) if restarts(&trial) && is_behind(&trial) => self.restarted(short, trial),
+            _ if from.windows > 1 && !restarts(&trial) => self.begun_again(from, trial),
+            _ => trial,
         };
         let chosen: Vec<Trial<'a>> = chosen.into_par_iter().map(again).collect();
         let wholes: Vec<Trial<'a>> = match from.windows {
@@ -202,37 +208,27 @@ impl<'a> Search<'a> {
         trials
     }
 
-    /// The trial; or, where that leaves less, its newest effect begun anew beside what the round began with: where a step changes
-    /// much, a fit from nothing may have stuck. It counts as stuck where its residuals exceed the noise, and where an effect with
-    /// restarts leaves more than `most`.
-    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>, most: f64) -> Trial<'a> {
+    /// The trial; or, where it leaves something and that leaves less, its newest effect begun anew beside what the round began
+    /// with, as strong as it was found and twice as strong: where a step changes much, a fit from nothing may have stuck.
+    fn begun_again(&self, from: &Trial<'a>, trial: Trial<'a>) -> Trial<'a> {
         const ITERATIONS: usize = 40;
         let Some(stuck) = trial.added.last().cloned() else { return trial };
-        let is_behind = stuck.candidate.has_restarts() && trial.fitted.chi2 > most;
-        if trial.fitted.normalised() <= UNEXPLAINED && !is_behind {
-            return trial;
-        }
-        let begun =
-            |newest: Added, iterations| self.from(from, &[from.added.as_slice(), &[newest]].concat(), iterations);
-        let less = |again: &Trial<'a>, than: &Trial<'a>| again.fitted.chi2 < than.fitted.chi2;
-        if stuck.candidate.has_restarts() {
-            return self.restarted(from, trial, &stuck);
-        }
         let mut best = trial;
         for newest in stuck.as_strong_and_twice() {
             if best.fitted.normalised() <= UNEXPLAINED {
                 break;
             }
-            best = begun(newest, ITERATIONS).filter(|again| less(again, &best)).unwrap_or(best);
+            let again = self.from(from, &[from.added.as_slice(), &[newest]].concat(), ITERATIONS);
+            best = again.filter(|again| again.fitted.chi2 < best.fitted.chi2).unwrap_or(best);
         }
         best
     }
 
-    /// The trial; or, where that leaves less over whole records, its newest effect restarted at every shape, in short windows where
-    /// longer ones leave too much.
-    fn restarted(&self, from: &Trial<'a>, trial: Trial<'a>, stuck: &Added) -> Trial<'a> {
-        let short = self.in_short_windows(from.clone());
-        let begun = |newest| self.from(&short, &[short.added.as_slice(), &[newest]].concat(), LOOK);
+    /// The trial; or, where that leaves less over whole records, its newest effect restarted at every shape beside what the round
+    /// began with, `short`: in short windows where longer ones leave too much.
+    fn restarted(&self, short: &Trial<'a>, trial: Trial<'a>) -> Trial<'a> {
+        let Some(stuck) = trial.added.last() else { return trial };
+        let begun = |newest| self.from(short, &[short.added.as_slice(), &[newest]].concat(), LOOK);
         let again = self.race(stuck.restarts().into_par_iter().filter_map(begun).collect()).into_iter().next();
         if short.windows == 1 {
             return again.filter(|again| again.fitted.chi2 < trial.fitted.chi2).unwrap_or(trial);

@@ -326,8 +326,8 @@ pub struct At<'a, S> {
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
-    /// Whether the contact of the effect is closed, as a simulation holds it throughout a step; `None` where there is no contact, or
-    /// the sign of [`Acting::gap`] is to tell.
+    /// Whether the contact of the effect is closed, as a simulation holds it throughout a step; `None` where there is no
+    /// contact, or the sign of [`Acting::gap`] is to tell.
     pub closed: Option<bool>,
 }
 
@@ -362,9 +362,9 @@ pub trait Acting<S: Scalar> {
         None
     }
 
-    /// How far a contact at a joint is open; negative while it is closed. It depends on positions and speeds alone, and an effect has
-    /// it throughout a simulation or never. A simulation ends a step where it changes sign, and tangents account for that
-    /// moment; within a step [`At::closed`] says which law holds, also a little beyond the change.
+    /// How far a contact at a joint is open; negative while it is closed. It depends on positions and speeds alone, and an
+    /// effect has it throughout a simulation or never. A simulation ends a step where it changes sign, and tangents account
+    /// for that moment; within a step [`At::closed`] says which law holds, also a little beyond the change.
     fn gap(&self, _at: &At<'_, S>) -> Option<S> {
         None
     }
