@@ -11,6 +11,7 @@ pub mod data;
 mod diagnostic;
 mod differences;
 mod effect;
+pub mod enclosure;
 mod evaluator;
 mod experiment;
 pub mod expression;
@@ -69,7 +70,7 @@ pub use outcome::{
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
 pub use placement::{Augment, EffectDraft};
-pub use plant::{Instant, Open, Opening, Plant};
+pub use plant::{Instant, Open, Opening, Plant, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
