@@ -522,6 +522,11 @@ fn experiments_that_do_not_fit_their_data() {
             calibration("an end that leaves one sample", "free     =", "to = 0.01\nfree     ="),
             calibration("every sample skipped", "free     =", "skip = 4\nfree     ="),
             calibration("an experiment that measures nothing", "channels = {", "channels = {}\n# {"),
+            calibration(
+                "an input that is not known when the simulation begins",
+                "free     =",
+                "skip = 1\nreset-time = false\nfree     =",
+            ),
             calibration("a noise of zero", "noise = 0.003", "noise = 0.0"),
             calibration(
                 "an error in units of a noise that nobody gave",

@@ -250,7 +250,8 @@ pub(super) struct ExperimentSection {
     /// Number of samples dropped at the start of the file; sensors often begin with a wrong one.
     #[serde(default)]
     pub skip: usize,
-    /// `false` keeps the times of the file; otherwise the first sample used is at time 0.
+    /// `false` keeps the times of the file: the simulation begins at 0 s, and inputs are taken from the file from then on, also
+    /// before `from`. Otherwise the simulation begins at the first sample used.
     pub reset_time: Option<bool>,
 }
 
