@@ -13,7 +13,7 @@ use mops::{Analysis, Case, Dual, Input, Job, Model, Scalar, Work};
 
 const END: f64 = 3.0;
 const TOLERANCE: Tolerance =
-    Tolerance { relative: 1e-6, absolute: 1e-8, max_steps: 100_000, method: IntegrationMethod::Explicit };
+    Tolerance { relative: 1e-6, absolute: Some(1e-8), max_steps: 100_000, ..Tolerance::DEFAULT };
 /// `a`, `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp`, in the units of the model.
 const VISCOUS: [f64; 8] = [0.0044, 0.0118, 0.0036, 0.105, 0.002, 0.0003, 0.0, 0.0];
 /// The same with dry friction: 10 mN m in the arm, 2 mN m in the pendulum.

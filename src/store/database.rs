@@ -350,6 +350,7 @@ fn columns(known: &Known, rows: usize) -> Columns {
                     Failure::Diverged(t) => ("diverged", Some(t), None),
                     Failure::StepLimit(t) => ("step-limit", Some(t), None),
                     Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
+                    Failure::EventsAccumulate(t, why) => ("events-accumulate", Some(t), Some(why)),
                     Failure::Undefined(why) => ("undefined", None, Some(why)),
                     Failure::Criterion(why) => ("criterion", None, Some(why)),
                 };
@@ -426,6 +427,7 @@ fn failure_of(written: &serde_json::Value) -> Failure {
         Some("diverged") => Failure::Diverged(at),
         Some("step-limit") => Failure::StepLimit(at),
         Some("step-too-small") => Failure::StepTooSmall(at),
+        Some("events-accumulate") => Failure::EventsAccumulate(at, why),
         Some("criterion") => Failure::Criterion(why),
         _ => Failure::Undefined(why),
     }

@@ -55,6 +55,7 @@ fn what_is_written_of_a_point_is_read_bit_by_bit() {
         Failure::Diverged(1.0 / 3.0),
         Failure::StepLimit(f64::INFINITY),
         Failure::StepTooSmall(0.1),
+        Failure::EventsAccumulate(0.3, "they come closer".into()),
         Failure::Undefined("a \"word\"".into()),
         Failure::Criterion("none".into()),
     ];

@@ -54,6 +54,12 @@ pub struct Happening {
     pub guard: Program,
     /// Gives the new values of these states.
     pub resets: (Vec<usize>, Program),
+    /// Gives the values of these states where its events accumulate; no states where nothing is known of a rest.
+    pub at_rest: (Vec<usize>, Program),
+    /// What is reported where it comes to rest.
+    pub rests: String,
+    /// What is reported where it leaves its rest.
+    pub leaves: String,
 }
 
 /// A compiled model.
@@ -61,6 +67,8 @@ pub struct Happening {
 pub struct Compiled {
     /// Number of states.
     pub states: usize,
+    /// Their typical sizes, where they are declared.
+    pub scales: Vec<Option<f64>>,
     /// Number of parameters of the equations, without those that only are start values.
     pub parameters: usize,
     /// Registers.
@@ -129,6 +137,7 @@ impl Compiled {
         for happening in &system.happenings {
             wanted.push(vec![happening.guard]);
             wanted.push(happening.resets.iter().map(|(_, id)| *id).collect());
+            wanted.push(happening.at_rest.iter().map(|(_, id)| *id).collect());
         }
         let starts: Vec<(usize, Id)> =
             system.starts.iter().enumerate().filter_map(|(s, start)| Some((s, (*start)?))).collect();
@@ -155,19 +164,16 @@ impl Compiled {
             slides: format!("{} slides", names[contact.position]),
         };
         let joints = system.contacts.iter().map(|contact| joint(contact, next())).collect();
-        let happening = |h: &super::system::Happening, guard, resets| Happening {
+        let states = |values: &[(usize, Id)]| values.iter().map(|(state, _)| *state).collect();
+        let happening = |h: &super::system::Happening| Happening {
             name: h.name.clone(),
-            guard,
-            resets: (h.resets.iter().map(|(state, _)| *state).collect(), resets),
+            guard: next(),
+            resets: (states(&h.resets), next()),
+            at_rest: (states(&h.at_rest), next()),
+            rests: format!("{}: at rest", h.name),
+            leaves: format!("{}: leaves its rest", h.name),
         };
-        let happenings = system
-            .happenings
-            .iter()
-            .map(|h| {
-                let guard = next();
-                happening(h, guard, next())
-            })
-            .collect();
+        let happenings = system.happenings.iter().map(happening).collect();
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
         let matrices = system.matrices.iter().map(|_| next()).collect();
         let signals = system
@@ -188,6 +194,7 @@ impl Compiled {
         let columns = grouped(&pattern, names.len());
         Ok(Self {
             states: names.len(),
+            scales: system.scales.clone(),
             parameters,
             layout,
             setup,

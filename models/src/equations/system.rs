@@ -43,6 +43,8 @@ pub struct Happening {
     pub guard: Id,
     /// New values of states.
     pub resets: Vec<(usize, Id)>,
+    /// Values of states at which its events end where they accumulate.
+    pub at_rest: Vec<(usize, Id)>,
 }
 
 /// What a state's derivative is multiplied with in its own equation.
@@ -63,6 +65,8 @@ pub struct System {
     pub switches: Vec<Switch>,
     /// Number of modes.
     pub modes: usize,
+    /// Typical sizes of the states, where they are declared.
+    pub scales: Vec<Option<f64>>,
     /// Derivatives of the states.
     pub derivatives: Vec<Id>,
     /// Signals: states, outputs, inputs.
@@ -169,12 +173,15 @@ impl System {
         for when in &d.when {
             let affine = l.text(&when.guard)?;
             let guard = with_rates(&mut l.graph, affine, &derivatives);
-            let mut resets = Vec::new();
-            for (name, text) in &when.resets {
-                let affine = l.text(text)?;
-                resets.push((state(name), with_rates(&mut l.graph, affine, &derivatives)));
-            }
-            happenings.push(Happening { name: when.name.clone(), guard, resets });
+            let mut values = |texts: &[(String, Text)]| {
+                let value = |(name, text): &(String, Text)| {
+                    let affine = l.text(text)?;
+                    Ok((state(name), with_rates(&mut l.graph, affine, &derivatives)))
+                };
+                texts.iter().map(value).collect::<Result<Vec<_>, Mistake>>()
+            };
+            let (resets, at_rest) = (values(&when.resets)?, values(&when.at_rest)?);
+            happenings.push(Happening { name: when.name.clone(), guard, resets, at_rest });
         }
         let start = |l: &mut Lowering<'_>, s: usize| {
             let name = &d.states[s].name;
@@ -193,6 +200,7 @@ impl System {
             graph,
             switches,
             modes,
+            scales: d.scales.clone(),
             derivatives,
             signals,
             contacts,
