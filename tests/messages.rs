@@ -408,6 +408,8 @@ fn demands_that_cannot_be_met_or_missed() {
             design("bad without good", "demand = 0.10", "bad = 0.10"),
             design("good and bad alike", "demand = 0.10", "good = 0.10, bad = 0.10"),
             design("a demand beside good and bad", "demand = 0.10", "demand = 0.1, good = 0.0, bad = 0.1"),
+            design("good and bad against the sense of the kind", "demand = 0.10", "good = 0.3, bad = \"10 %\""),
+            design("a value that the kind never has", "demand = 0.10", "good = -0.1, bad = 0.1"),
             design("a demand in a unit that does not fit", "\"15 s\"", "\"15 m\""),
             design("a weight of zero", "demand = 0.10", "demand = 0.10, weight = 0.0"),
             design("an option in a unit that does not fit", "target = 1.0 }, ", "target = \"1 rad/s\" }, "),

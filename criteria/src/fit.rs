@@ -1,12 +1,13 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Tangent, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Tangent, Unit, Value,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, compared_slopes, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, signal};
 
 /// `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
 ///
@@ -18,7 +19,7 @@ use crate::common::{compare, compared_slopes, signal};
 /// Several signals are fitted together by one such criterion each; `weight` balances them. It is evaluated in the
 /// experiments that measure the signal.
 ///
-/// Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
+/// Less is better. Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
 ///
 /// Source: Greybox Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section
 /// 4.5.1: there J is the sum over the arm's angle, with weight 2.5, and the pendulum's, with weight 1.
@@ -72,6 +73,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -1,13 +1,13 @@
 //! Fit to a measurement, in units of its noise.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Tangent, Unit,
-    Value,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Tangent,
+    Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, compared_slopes, positive, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
 
 /// `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 where nothing but the noise is left.
 ///
@@ -15,7 +15,7 @@ use crate::common::{compare, compared_slopes, positive, signal};
 /// says. The sum has the residuals `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that
 /// least-squares solvers use.
 ///
-/// It is evaluated in the experiments that measure the signal. Range: from 0 up; well below 1 the noise is overrated or
+/// It is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up; well below 1 the noise is overrated or
 /// the model fits the noise, well above 1 the model lacks something. Without a demand, it is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
@@ -62,6 +62,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn suits(&self, case: &Case) -> Result<(), Mistake> {

@@ -8,6 +8,7 @@ mod catalogue;
 mod conclude;
 mod criterion;
 pub mod data;
+mod demand;
 mod diagnostic;
 mod differences;
 mod effect;
@@ -49,7 +50,8 @@ pub use catalogue::{
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
+pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Sense, Tangent, Usage, Value};
+pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{

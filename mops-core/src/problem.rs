@@ -5,7 +5,8 @@ use std::sync::Arc;
 use rand::Rng;
 use rayon::prelude::*;
 
-use crate::criterion::{Demand, Tangent, Usage, Value};
+use crate::criterion::{Tangent, Usage, Value};
+use crate::demand::Demand;
 use crate::experiment::Role;
 use crate::known::{JobValues, Kept, KeptSlopes, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Failure, Job};
@@ -55,10 +56,12 @@ pub struct Evaluation {
 /// The value of a criterion in a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// In the criterion's unit.
+    /// In the criterion's unit; NaN where it was never reached.
     pub value: f64,
-    /// By its demand.
+    /// The scaled value, under its demand.
     pub scaled: f64,
+    /// Derivative of the scaled value with respect to the number of the criterion.
+    pub(crate) slope: f64,
     /// What a reader must know of it.
     pub note: Option<&'static str>,
 }
@@ -287,8 +290,7 @@ impl Problem {
                     for (row, value) in values {
                         match value {
                             Ok(value) => {
-                                let scaled = study.rows[row].demand.scale(value.number);
-                                readings[row] = Some(Reading { value: value.number, scaled, note: value.note });
+                                readings[row] = Some(study.rows[row].reading(&value));
                                 residuals[row] = value.residuals;
                             }
                             Err(why) => {
@@ -325,7 +327,7 @@ impl Problem {
     /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
     /// has no exact ones. `reach` is the distance within which they are to describe the problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
-        self.scaled_slopes(self.row_slopes(at, reach)?)
+        self.scaled_slopes(at, self.row_slopes(at, reach)?)
     }
 
     /// The same where the derivatives of the rows may be known already.
@@ -338,7 +340,7 @@ impl Problem {
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
         let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
         let learned = new.then(|| rows.clone());
-        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(rows)), learned }
+        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
     }
 
     /// Whether known derivatives are all that this problem asks for.
@@ -372,14 +374,13 @@ impl Problem {
     }
 
     /// Slopes of the scaled values and of the weighted residuals.
-    fn scaled_slopes(&self, of_rows: KnownSlopes) -> Option<Slopes> {
-        let study = &self.study;
-        let n = self.active.len();
-        let mut rows = vec![vec![0.0; n]; study.rows.len()];
-        let mut residuals = vec![vec![Vec::new(); study.rows.len()]; n];
+    fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes) -> Option<Slopes> {
+        let (count, n) = (self.study.rows.len(), self.active.len());
+        let mut rows = vec![vec![0.0; n]; count];
+        let mut residuals = vec![vec![Vec::new(); count]; n];
         for (row, slopes) in of_rows.into_iter().filter(|(row, _)| self.shape.rows[*row].0 != Usage::Monitor) {
             for (j, slope) in slopes.into_iter().enumerate() {
-                rows[row][j] = study.rows[row].demand.scale(slope.number) - study.rows[row].demand.scale(0.0);
+                rows[row][j] = slope.number * at.readings[row].map_or(f64::NAN, |reading| reading.slope);
                 residuals[j][row] = slope.residuals;
             }
         }
@@ -450,8 +451,8 @@ impl Problem {
             if *usage != Usage::Minimise {
                 continue;
             }
-            let Demand::Value(demand) = row.demand else { return Vec::new() };
-            if residuals.is_empty() {
+            let Demand::AtMost(demand) = row.demand else { return Vec::new() };
+            if residuals.is_empty() || row.reversed {
                 return Vec::new();
             }
             let factor = (weight / demand).sqrt();
@@ -483,7 +484,7 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
 /// Values of a job as they are kept where nobody needs the terms of sums of squares.
 fn without_residuals(values: &JobValues) -> JobValues {
     let bare = |(row, value): &RowValue| {
-        let value = value.as_ref().map(|v| Value { number: v.number, residuals: Vec::new(), note: v.note });
+        let value = value.as_ref().map(|v| Value { residuals: Vec::new(), ..v.clone() });
         (*row, value.map_err(Clone::clone))
     };
     values.as_ref().map(|values| values.iter().map(bare).collect()).map_err(Clone::clone)

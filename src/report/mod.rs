@@ -44,7 +44,7 @@ use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 use mops_discrepancy::Diagnosis;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
-pub(crate) use numbers::{FileNames, file_name, significant};
+pub(crate) use numbers::{FileNames, apart, file_name, significant};
 pub(crate) use page::document;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
 pub(crate) use sampling::points;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use mops_core::{Failure, JobValues, Known, RowSlopes, Study, Value};
+use mops_core::{Failure, JobValues, Known, Missed, RowSlopes, Study, Value};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
 use serde_json::json;
 
@@ -42,7 +42,7 @@ CREATE TABLE points (
     run INTEGER NOT NULL REFERENCES runs (id),
     tuners BLOB NOT NULL UNIQUE,       -- values of all tuners (and uncertain parameters), float64 little-endian
     criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN where there is none
-    notes TEXT,                        -- JSON: row -> what a reader must know of its value
+    notes TEXT,                        -- JSON: row -> note on its value, or [note, horizon] where it was never reached
     failures TEXT,                     -- JSON: jobs that failed, rows without a value
     residuals BLOB                     -- lists: row, length, float64; absent where none are needed or room is short
 );
@@ -363,8 +363,11 @@ fn columns(known: &Known, rows: usize) -> Columns {
                         Err(why) => failures.push(json!({ "row": row, "why": why })),
                         Ok(value) => {
                             criteria[*row] = value.number;
-                            if let Some(note) = value.note {
-                                notes.insert(row.to_string(), json!(note));
+                            let missed = value.missed.map(|missed| missed.horizon.map(|h| h.to_string()));
+                            match (value.note, missed) {
+                                (None, None) => {}
+                                (Some(note), None) => drop(notes.insert(row.to_string(), json!(note))),
+                                (note, Some(horizon)) => drop(notes.insert(row.to_string(), json!([note, horizon]))),
                             }
                             if !value.residuals.is_empty() {
                                 residuals.push((*row, &value.residuals));
@@ -408,8 +411,13 @@ fn known(row: &Row<'_>, study: &Study, intern: &mut dyn FnMut(&str) -> &'static 
                 return Some(Err(why["why"].as_str().unwrap_or_default().to_owned()));
             }
             let number = *criteria.get(index).filter(|number| number.is_finite())?;
-            let note = notes[index.to_string()].as_str().map(&mut *intern);
-            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note }))
+            // A note; or a note and a horizon, where nothing was reached.
+            let written = &notes[index.to_string()];
+            let missed = written
+                .is_array()
+                .then(|| Missed { horizon: written[1].as_str().and_then(|horizon| horizon.parse().ok()) });
+            let note = written.as_str().or(written[0].as_str()).map(&mut *intern);
+            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note, missed }))
         };
         let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
         let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();
