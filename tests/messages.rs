@@ -611,7 +611,6 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             called("no such study file", &["check", "loop/study.toml"]),
             Case::new("a folder without a study", DESIGN).with("empty/notes.txt", "").called(&["check", "empty"]),
             called("a setting that is no value", &["check", "study.toml", "--set", "tuners.Ti.start=fast"]),
-            called("a setting without its quotes", &["check", "study.toml", "--set", "study.name=other loop"]),
             called("a setting without a value", &["check", "study.toml", "--set", "tuners.Ti.start"]),
             called("a setting of an unknown key", &["check", "study.toml", "--set", "tuners.Ti.strat=2.0"]),
             called("a setting of an unknown tuner", &["check", "study.toml", "--set", "tuners.Tj.start=2.0"]),

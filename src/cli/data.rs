@@ -28,8 +28,8 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         print(&excitation(&file, column, &arguments.file.display().to_string())?);
         return Ok(ExitCode::SUCCESS);
     }
-    let time = names.iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
-    let times = time.map(|name| file.column(name)).transpose()?.map(|column| column.values);
+    let time = file.time_column();
+    let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
     let mut rows = Vec::new();
     let mut sampling = String::new();
     for name in &names {
@@ -37,7 +37,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         let finite: Vec<f64> = column.values.iter().copied().filter(|v| v.is_finite()).collect();
         let low = finite.iter().copied().fold(f64::INFINITY, f64::min);
         let high = finite.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if matches!(name.to_lowercase().as_str(), "t" | "time") {
+        if time.as_ref() == Some(name) {
             sampling = sample_time(name, &finite);
         }
         rows.push(vec![
@@ -72,7 +72,7 @@ fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagno
         return Err(Diagnostic::new(format!("`{name}` has a gap at row {}", gap + 1))
             .with_help("an input must be known throughout: fill the gap, or cut the file"));
     }
-    let time = file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
+    let time = file.time_column();
     let step = match time {
         Some(time) => spacing(file.column(&time)?.values).ok_or_else(|| {
             Diagnostic::new(format!("the samples are not equally spaced in `{time}`"))

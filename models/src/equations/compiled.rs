@@ -81,6 +81,8 @@ pub struct Compiled {
     pub signals: Vec<Signal>,
     /// Conditions.
     pub switches: Vec<Switch>,
+    /// What must rise for a message and whether strictly; gives pairs of low and high.
+    pub orders: (Vec<(String, bool)>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,
     /// Events.
@@ -131,6 +133,7 @@ impl Compiled {
         for switch in &system.switches {
             wanted.push(vec![graph.sub(switch.left, switch.right), switch.right]);
         }
+        wanted.push(system.orders.iter().flat_map(|order| [order.low, order.high]).collect());
         for c in &system.contacts {
             wanted.push(vec![c.torque, c.limit, c.coulomb, system.derivatives[c.velocity]]);
         }
@@ -157,6 +160,7 @@ impl Compiled {
         let switches =
             system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
         let switches = switches.collect();
+        let orders = (system.orders.iter().map(|order| (order.what.clone(), order.strict)).collect(), next());
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
@@ -201,6 +205,7 @@ impl Compiled {
             derivative,
             signals,
             switches,
+            orders,
             joints,
             happenings,
             starts,

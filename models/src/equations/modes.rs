@@ -128,6 +128,16 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
                 )));
             }
         }
+        let (orders, tape) = &self.model.orders;
+        let mut bank = self.bank.borrow_mut();
+        tape.run(&mut *bank);
+        for ((what, strict), pair) in orders.iter().zip(tape.results.chunks(2)) {
+            let [low, high] = [pair[0], pair[1]].map(|register| bank.get(register).value());
+            if low > high || *strict && low == high {
+                return Err(Failure::Undefined(format!("{what} must rise, but {high} follows {low}")));
+            }
+        }
+        drop(bank);
         let mut slope = x.clone();
         self.derivative(0.0, x, &mut slope);
         if slope.as_ref().iter().all(|d| d.value().is_finite()) {

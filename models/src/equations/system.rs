@@ -6,7 +6,7 @@ use mops_core::{Mistake, suggestion};
 
 use super::definition::{Definition, Target, Text, under};
 use super::graph::{Block, Graph, Id, Op};
-use super::lower::{Affine, Lowering, Switch};
+use super::lower::{Affine, Lowering, Order, Switch};
 
 /// One equation: `sum of coefficients * derivatives = force`.
 #[derive(Debug, Clone)]
@@ -63,6 +63,8 @@ pub struct System {
     pub graph: Graph,
     /// Conditions that switch branches.
     pub switches: Vec<Switch>,
+    /// Arguments that must rise.
+    pub orders: Vec<Order>,
     /// Number of modes.
     pub modes: usize,
     /// Typical sizes of the states, where they are declared.
@@ -189,16 +191,18 @@ impl System {
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
         // Definitions that nothing uses are checked too; what they would switch is forgotten.
-        let (switches, modes) = (l.switches.len(), l.modes);
+        let (switches, orders, modes) = (l.switches.len(), l.orders.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
         }
         l.switches.truncate(switches);
+        l.orders.truncate(orders);
         l.modes = modes;
-        let Lowering { graph, switches, modes, .. } = l;
+        let Lowering { graph, switches, orders, modes, .. } = l;
         Ok(Self {
             graph,
             switches,
+            orders,
             modes,
             scales: d.scales.clone(),
             derivatives,

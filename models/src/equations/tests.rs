@@ -6,6 +6,7 @@ use super::{Equations, EquationsOptions, Target};
 
 mod dry_friction;
 mod events;
+mod order;
 mod scales;
 
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";

@@ -93,7 +93,7 @@ impl<'f> Table<'f> {
         let place = node.child("time").unwrap_or_else(|| node.child("file").expect("it was just read"));
         let time = match &section.time {
             Some(time) => time.clone(),
-            None => guess_time(file).ok_or_else(|| {
+            None => file.time_column().ok_or_else(|| {
                 place
                     .diagnostic("no column of the file is called `t` or `time`".to_owned())
                     .with_help(format!("say which: time = \"...\"; the file has {}", file.column_names().join(", ")))
@@ -146,8 +146,8 @@ impl<'f> Table<'f> {
             signal: signal.to_owned(),
             times: self.times[self.rows.clone()].to_vec(),
             values: values[self.rows.clone()].to_vec(),
+            noise: table.noise.as_ref().map(|noise| in_unit_of_column(noise, unit.as_ref())),
             unit,
-            noise: table.noise.clone(),
         })
     }
 
@@ -215,9 +215,9 @@ impl<'f> Table<'f> {
     }
 }
 
-/// A column that is called `t` or `time`, in any case.
-fn guess_time(file: &DataFile) -> Option<String> {
-    file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"))
+/// A bare number of a channel counts in the unit of its column, as `offset` does.
+fn in_unit_of_column(quantity: &Quantity, unit: Option<&Unit>) -> Quantity {
+    Quantity { unit: quantity.unit.clone().or(unit.cloned()), ..quantity.clone() }
 }
 
 /// A column, with the study's place where the file does not have it.
