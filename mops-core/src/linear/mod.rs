@@ -2,6 +2,7 @@
 //!
 //! Pure computation on small dense matrices. What a user can ask for and has no answer is an error of one sentence.
 
+mod components;
 mod controllability;
 mod eigen;
 mod equilibrium;
@@ -9,6 +10,9 @@ mod lyapunov;
 mod margins;
 mod norms;
 mod place;
+mod qr_steps;
+#[cfg(test)]
+mod reference;
 mod response;
 mod riccati;
 mod schur;
@@ -21,7 +25,7 @@ mod zeros;
 use nalgebra::DMatrix;
 
 pub use controllability::check_controllable;
-pub use eigen::eigenvalues;
+pub use eigen::{eigenvalues, undecided};
 pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
 pub use lyapunov::{h2_norm, lyapunov};
 pub use margins::{Crossing, Loop, bandwidth};
