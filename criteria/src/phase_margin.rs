@@ -37,7 +37,7 @@ impl CriterionSpec for PhaseMargin {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        let value = |system| Ok(capped(feedback(system)?.phase_margin(), std::f64::consts::PI));
+        let value = |system| Ok(capped(feedback(system)?.phase_margin()?, std::f64::consts::PI));
         Ok(LinearCriterion::boxed(channel, Unit::known("rad"), value))
     }
 }

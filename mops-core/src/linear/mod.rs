@@ -5,10 +5,12 @@
 mod components;
 mod controllability;
 mod eigen;
+mod enclosure;
 mod equilibrium;
 mod lyapunov;
 mod margins;
 mod norms;
+mod peaks;
 mod place;
 mod qr_steps;
 #[cfg(test)]
@@ -16,6 +18,8 @@ mod reference;
 mod response;
 mod riccati;
 mod schur;
+mod search;
+mod stabilising;
 mod system;
 #[cfg(test)]
 mod testing;
@@ -28,8 +32,9 @@ pub use controllability::check_controllable;
 pub use eigen::{eigenvalues, undecided};
 pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
 pub use lyapunov::{h2_norm, lyapunov};
-pub use margins::{Crossing, Loop, bandwidth};
+pub use margins::{Crossing, Loop};
 pub use norms::{Peak, hinf_norm, peak_gain};
+pub use peaks::bandwidth;
 pub use place::place;
 pub use response::FrequencyResponse;
 pub use riccati::{lqr, riccati};
