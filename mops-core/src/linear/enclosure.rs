@@ -193,9 +193,10 @@ impl Closed {
     /// The gain at a value of L.
     pub fn gain(self, l: Complex) -> f64 {
         match self {
-            Self::Sensitivity => (l + 1.0).inv().norm(),
-            // Also where L is infinite.
+            // Where L is infinite.
+            Self::Sensitivity if !l.is_finite() => 0.0,
             Self::Complementary if !l.is_finite() => 1.0,
+            Self::Sensitivity => (l + 1.0).inv().norm(),
             Self::Complementary => (l / (l + 1.0)).norm(),
         }
     }

@@ -35,7 +35,7 @@ pub use lyapunov::{h2_norm, lyapunov};
 pub use margins::{Crossing, Loop};
 pub use norms::{Peak, hinf_norm, peak_gain};
 pub use peaks::bandwidth;
-pub use place::place;
+pub use place::{Placement, place};
 pub use response::FrequencyResponse;
 pub use riccati::{lqr, riccati};
 pub use schur::Schur;

@@ -25,11 +25,11 @@ impl Loop {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
         }
-        // With a delay L turns around a circle at infinite frequency.
+        // At infinite frequency L is D, and turns around a circle with a delay.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
-        let ends = [self.at(0.0), Complex::new(end, 0.0)].map(|l| if l.is_nan() { 0.0 } else { what.gain(l) });
-        Ok(highest(&self.response, what)?.max(ends[0]).max(ends[1]))
+        let (peak, _) = highest(&self.response, |l| what.gain(l), |span| span.closed(what))?;
+        Ok(peak.max(what.gain(Complex::new(end, 0.0))))
     }
 
     /// The lowest angular frequency, rad/s, at which the gain of the closed loop `T = L/(1 + L)` is 3 dB (a factor of

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::eigen::balance;
 use super::{Complex, StateSpace};
 
 /// A system made ready to be evaluated at many frequencies: its states scaled to one size.
@@ -28,12 +27,8 @@ impl StateSpace {
         if all.iter().any(|m| m.iter().any(|x| !x.is_finite())) || !self.delay.is_finite() {
             return Err("the system has an entry that is not finite".to_owned());
         }
-        let (mut a, mut b, mut c) = (self.a.clone(), self.b.clone(), self.c.clone());
-        for (i, scale) in balance(&mut a).into_iter().enumerate() {
-            b.row_mut(i).unscale_mut(scale);
-            c.column_mut(i).scale_mut(scale);
-        }
-        Ok(FrequencyResponse { a, b, c, d: self.d.clone(), delay: self.delay })
+        let Self { a, b, c, d, delay, .. } = self.balanced();
+        Ok(FrequencyResponse { a, b, c, d, delay })
     }
 }
 

@@ -1,8 +1,7 @@
 //! Frequencies at which a response does something, by dividing the axis until bounds exclude or pin it.
 
 use super::Complex;
-use super::enclosure::{Closed, Enclosure, Span};
-use super::norms::maximise;
+use super::enclosure::{Enclosure, Span};
 
 /// Ranges looked at until a search counts as hopeless: a delay that turns the response a hundred thousand times.
 const MOST: usize = 2_000_000;
@@ -61,14 +60,26 @@ pub(super) fn passes(
     Ok(())
 }
 
-/// The highest gain of the closed loop, from frequency 0 to the highest that matters.
+/// The highest value of the response over all frequencies from 0 to the highest that matters, and where it is. `bounds` are
+/// those of its logarithm over a range of frequencies: what they leave is at most a millionth above, and is made exact.
 ///
 /// # Errors
 /// More ranges than can be looked at.
-pub(super) fn highest(of: &Enclosure, what: Closed) -> Result<f64, String> {
+pub(super) fn highest(
+    of: &Enclosure,
+    value: impl Fn(Complex) -> f64,
+    bounds: impl Fn(&Span) -> [f64; 2],
+) -> Result<(f64, f64), String> {
     let lowest = 1e-12 * of.corners()[0];
+    let at = |omega: f64| value(of.at(omega));
+    let start = at(0.0);
+    let mut best = (if start.is_nan() { 0.0 } else { start }, 0.0);
+    let better = |best: &mut (f64, f64), here: f64, omega: f64| {
+        if here > best.0 {
+            *best = (here, omega);
+        }
+    };
     let mut open = of.spans();
-    let mut best = open.iter().map(|span| what.gain(span.response)).fold(0.0, f64::max);
     let mut tops: Vec<(f64, Span)> = Vec::new();
     let mut looked = 0;
     while !open.is_empty() {
@@ -76,16 +87,15 @@ pub(super) fn highest(of: &Enclosure, what: Closed) -> Result<f64, String> {
         if looked > MOST {
             return Err(too_many());
         }
+        open.iter().for_each(|span| better(&mut best, value(span.response), span.center()));
         let mut next = Vec::new();
         for span in open {
-            let here = what.gain(span.response);
-            best = best.max(here);
-            let most = span.closed(what)[1].exp();
-            if most <= best || span.high <= lowest {
+            let most = bounds(&span)[1].exp();
+            if most <= best.0 || span.high <= lowest {
                 continue;
             }
-            if most <= best * (1.0 + SURE) || span.high - span.low <= 1e-13 * span.high {
-                tops.push((here, span));
+            if most <= best.0 * (1.0 + SURE) || span.high - span.low <= 1e-13 * span.high {
+                tops.push((most, span));
             } else {
                 next.extend(span.split(of));
             }
@@ -93,18 +103,40 @@ pub(super) fn highest(of: &Enclosure, what: Closed) -> Result<f64, String> {
         open = next;
     }
     // Made exact where it may be reached.
-    tops.retain(|(_, span)| span.closed(what)[1].exp() > best);
-    tops.sort_by(|a, b| b.0.total_cmp(&a.0));
+    tops.retain(|(most, _)| *most > best.0);
+    tops.sort_by(|a, b| value(b.1.response).total_cmp(&value(a.1.response)));
     for (_, span) in tops.iter().take(16) {
         let width = span.high - span.low;
-        let top = maximise(|omega| what.gain(of.at(omega)), (span.low - width).max(0.0), span.high + width);
-        best = best.max(what.gain(of.at(top)));
+        let top = maximise(at, (span.low - width).max(0.0), span.high + width);
+        better(&mut best, at(top), top);
     }
     Ok(best)
 }
 
 fn too_many() -> String {
     "the response turns too often to be searched: its delay is very long beside its corners".to_owned()
+}
+
+/// The place of the maximum of a function with one maximum between `low` and `high`, by golden section.
+pub(super) fn maximise(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut fa, mut fb) = (f(a), f(b));
+    // Values next to the maximum differ by the square of the distance, beside the width of what is left.
+    let close = (1e-6 * (high - low)).min(1e-9 * (low.abs() + high.abs()));
+    let rounding = 4.0 * f64::EPSILON * (low.abs() + high.abs());
+    while high - low > close.max(rounding) {
+        if fa >= fb {
+            (high, b, fb) = (b, a, fa);
+            a = high - GOLDEN * (high - low);
+            fa = f(a);
+        } else {
+            (low, a, fa) = (a, b, fb);
+            b = low + GOLDEN * (high - low);
+            fb = f(b);
+        }
+    }
+    0.5 * (low + high)
 }
 
 /// Where `f` changes its sign between `low` and `high`.

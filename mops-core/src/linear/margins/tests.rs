@@ -1,4 +1,4 @@
-use crate::linear::norms::maximise;
+use crate::linear::search::maximise;
 use crate::linear::testing::assert_near;
 use crate::linear::{TransferFunction, bandwidth};
 
