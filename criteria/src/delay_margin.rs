@@ -35,7 +35,7 @@ impl CriterionSpec for DelayMargin {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        let value = |system| Ok(capped(feedback(system)?.delay_margin(), 1e6));
+        let value = |system| Ok(capped(feedback(system)?.delay_margin()?, 1e6));
         Ok(LinearCriterion::boxed(channel, Values::of(second(), Sense::More), value))
     }
 }
