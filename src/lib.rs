@@ -40,6 +40,8 @@
 mod bench;
 mod cli;
 mod diagnosis;
+mod files;
+mod plain;
 mod report;
 mod solve;
 mod store;

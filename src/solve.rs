@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Place, Problem, Record, Run,
-    Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
+    Budget, Cancellation, Effect, Ending, Evaluation, Halt, Mistake, Objective, Oracle, Outcome, Pareto, Place,
+    Problem, Quiet, Record, Run, RunState, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch,
+    conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -25,6 +26,8 @@ pub struct Options {
     pub effects: Vec<Arc<dyn Effect>>,
     /// Where points are kept, and what is known of them from before; it changes no bit of the result.
     pub keeping: Option<Keeping>,
+    /// Asks the run to end, within a simulation too.
+    pub cancellation: Cancellation,
 }
 
 /// A store, and the study whose points it knows.
@@ -65,6 +68,7 @@ impl Default for Options {
             jobs: None,
             effects: mops_models::effects::effects(),
             keeping: None,
+            cancellation: Cancellation::default(),
         }
     }
 }
@@ -105,9 +109,46 @@ impl std::error::Error for Unsuitable {}
 ///
 /// # Panics
 /// If the threads cannot be started.
-pub fn solve(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub fn solve(mut study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+    study.cancelled_by(&options.cancellation);
+    let watch = Cancellable { watch, cancellation: &options.cancellation };
     let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs.unwrap_or(0)).build();
-    threads.expect("threads can be started").install(|| tasks::perform(study, options, watch))
+    let mut solved = threads.expect("threads can be started").install(|| tasks::perform(study, options, &watch))?;
+    // What is drawn and told of the result from now on concludes the run.
+    solved.problem = solved.problem.concluding();
+    Ok(solved)
+}
+
+/// Looks on for somebody, and wants an end as soon as simulations are asked to end.
+struct Cancellable<'a> {
+    watch: &'a dyn Watch,
+    cancellation: &'a Cancellation,
+}
+
+impl Watch for Cancellable<'_> {
+    fn wants_stop(&self) -> bool {
+        self.cancellation.requested().is_some() || self.watch.wants_stop()
+    }
+
+    fn halt(&self) -> Halt {
+        self.cancellation.requested().unwrap_or_else(|| self.watch.halt())
+    }
+
+    fn evaluated(&self, state: &RunState) {
+        self.watch.evaluated(state);
+    }
+
+    fn improved(&self, best: &Evaluation) {
+        self.watch.improved(best);
+    }
+
+    fn stage(&self, what: &str, done: f64) {
+        self.watch.stage(what, done);
+    }
+
+    fn keeping(&self, trouble: Option<&str>) {
+        self.watch.keeping(trouble);
+    }
 }
 
 /// Whether a solver can do the task of a study, as far as that is known without a simulation.
@@ -145,11 +186,20 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
     let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch).keeping(store);
-    let stop = run.solve(solver.as_mut(), begin.unwrap_or(&problem.start()));
-    let pareto = pareto(&run, stop, store);
+    let start = begin.map_or_else(|| problem.start(), <[f64]>::to_vec);
+    let stop = run.solve(solver.as_mut(), &start);
+    if run.archive().is_empty() {
+        let known = store.and_then(|store| store.known(&problem.tuners_at(&start)));
+        let answer = problem.concluding().evaluate_keeping(&start, known);
+        if !answer.evaluation.is_cancelled() {
+            run.take_start(answer);
+        }
+    }
+    let quiet = Quiet(watch);
+    let pareto = pareto(&run, stop, (store, &quiet));
     let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
-    outcome.found.slopes = slopes(&run, stop, store);
+    outcome.found.slopes = slopes(&run, (store, &quiet));
     outcome.seconds = begun.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
@@ -161,17 +211,18 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
 pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
+    let concluding = problem.concluding();
     let mut run = Run::new(&problem, Budget { evaluations: 1 }, watch);
-    let halted = run.evaluate(&[problem.start()]).is_err() && run.best().is_none();
-    if halted {
-        // Nobody waits for this single point: it is needed to conclude.
-        run = Run::new(&problem, Budget { evaluations: 1 }, &());
-        run.evaluate(&[problem.start()]).expect("a budget of one point suffices for one");
+    if run.evaluate(&[problem.start()]).is_err() && run.best().is_none() {
+        // This single point is needed to conclude.
+        run = Run::new(&concluding, Budget { evaluations: 1 }, &());
+        let _ = run.evaluate(&[problem.start()]);
     }
     // N.B.: as if it were interrupted, so that no start value is estimated either.
     let ending = Ending { stop: Stop::Interrupted, pareto: Pareto::NotShown, seconds: 0.0 };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
-    (outcome.solver, outcome.stop) = ("none".to_owned(), Stop::Converged);
+    let stop = if watch.wants_stop() { watch.halt().into() } else { Stop::Converged };
+    (outcome.solver, outcome.stop) = ("none".to_owned(), stop);
     outcome.seconds = begun.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
@@ -183,25 +234,25 @@ pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved
 const NEAR: f64 = 1e-4;
 
 /// How the criteria of a design change with its tuners at the best point; nothing where the user does not want to wait.
-fn slopes(run: &Run<'_>, stop: Stop, store: Option<&dyn Store>) -> Option<SlopesReport> {
+fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Option<SlopesReport> {
     let problem = run.problem();
-    if problem.study().task != Task::Design || stop == Stop::Interrupted {
+    if problem.study().task != Task::Design || watch.wants_stop() {
         return None;
     }
-    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &()).keeping(store);
+    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(store);
     SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
 }
 
 /// Whether the best point is Pareto-optimal, as far as it can be told.
-fn pareto(run: &Run<'_>, stop: Stop, store: Option<&dyn Store>) -> Pareto {
+fn pareto(run: &Run<'_>, stop: Stop, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
     let problem = run.problem();
     match run.best().filter(|best| best.merit.is_feasible()) {
         None => Pareto::NotShown,
-        Some(_) if stop == Stop::Interrupted => Pareto::NotShown,
+        Some(_) if watch.wants_stop() => Pareto::NotShown,
         // A minimum of a sum with positive weights is Pareto-optimal.
         Some(_) if problem.shape().objective == Objective::Sum && stop == Stop::Converged => Pareto::CertifiedLocal,
         Some(best) => {
-            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &()).keeping(store);
+            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(store);
             mops_solvers::certify(&mut probe, &best.point)
         }
     }

@@ -131,7 +131,7 @@ fn interface(named: &[String], horizon: f64) -> Interface {
     let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
     let mut parameters = vec![
         Parameter::new("k", "1", "gain of the controller"),
-        positive("Ti", "s", "time of the integral"),
+        positive("Ti", "s", "time of the integral").or_infinite(),
         Parameter::new("Td", "s", "time of the derivative").within(0.0, f64::INFINITY),
         positive("Nd", "1", "filter ratio of the derivative").with_default(10.0),
         Parameter::new("wp", "1", "setpoint weight of the proportional part").with_default(1.0),

@@ -51,7 +51,7 @@ impl ModelOptions for PidOpenLoopOptions {
         let from_zero = |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY);
         let mut parameters = vec![
             Parameter::new("k", "1", "gain of the controller"),
-            positive("Ti", "s", "time of the integral"),
+            positive("Ti", "s", "time of the integral").or_infinite(),
             from_zero("Td", "s", "time of the derivative"),
             positive("Nd", "1", "filter ratio of the derivative").with_default(10.0),
             from_zero("delay", "s", "delay of the loop").with_default(0.0),

@@ -1,5 +1,6 @@
 //! A case: one situation in which every criterion is evaluated.
 
+use crate::cancellation::Cancellation;
 use crate::experiment::{Experiment, Input, Role};
 
 /// A set of parameter values, inputs and, in an identification, a measurement.
@@ -18,6 +19,8 @@ pub struct Case {
     pub horizon: Option<f64>,
     /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time.
     pub begins: f64,
+    /// Asks the simulations of this case to end.
+    pub cancellation: Cancellation,
 }
 
 impl Case {

@@ -30,18 +30,20 @@ pub struct Ending {
 /// Concludes a run: estimates the free start values of experiments that move no parameter, and fills in the outcome.
 /// Returns it with the evaluation it reports.
 ///
-/// # Panics
-/// If the run evaluated no point.
+/// Of a run that was asked to end it reports what is known, and the rest as far as the simulations of the conclusion are let
+/// go on ([`crate::Cancellation::insist`]); a warning says where something is missing.
 pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcome, Evaluation) {
-    let problem = run.problem();
+    let problem = &run.problem().concluding();
     let study = Arc::clone(problem.study());
-    let mut best = run.best().expect("a run evaluates its start").clone();
-    let start = problem.evaluate_at(&study.start());
+    let ended_early = run.problem().is_cancelled();
+    let first = || run.archive().first().map_or_else(|| problem.unknown(&study.start()), |_| run.evaluation(0).clone());
+    let mut best = run.best().cloned().unwrap_or_else(first);
+    let start = whole(problem, first(), ended_early);
     let mut simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
     let mut warnings = study.warnings.clone();
 
     for case in 0..study.cases.len() {
-        if study.cases[case].role() == Role::Calibration || ending.stop == Stop::Interrupted {
+        if study.cases[case].role() == Role::Calibration || ending.stop == Stop::Interrupted || ended_early {
             continue;
         }
         let part = Problem::of_case(Arc::clone(&study), case, &best.tuners);
@@ -50,12 +52,12 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         }
         let mut run = Run::new(&part, Budget { evaluations: 2000 }, &());
         run.solve(solver.make().as_mut(), &part.start());
-        if let Some(found) = run.best() {
+        if let Some(found) = run.best().filter(|_| !part.is_cancelled()) {
             best.tuners.clone_from(&found.tuners);
         }
         simulations += (run.archive().len() + run.linearisations()) * part.simulations();
     }
-    let best = problem.evaluate_at(&best.tuners);
+    let best = whole(problem, best, ended_early);
     warnings.extend(bound_warnings(&study, problem, &best));
 
     let calibration =
@@ -73,6 +75,11 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
                 excitation: identification::excitations(&study, &study.tasks.excitation.question),
             }
         });
+    if problem.is_cancelled() {
+        warnings.push(
+            "the run was ended before all of the result was computed: values, errors or plots are missing".to_owned(),
+        );
+    }
     let failures = run
         .failures()
         .iter()
@@ -91,6 +98,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         task: study.task,
         seed: study.seed,
         solver: solver.kind.to_owned(),
+        run: None,
         stop: ending.stop,
         evaluations: run.archive().len(),
         reused: None,
@@ -116,6 +124,16 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         warnings,
     };
     (outcome, best)
+}
+
+/// An evaluation in every case. Of a run that was asked to end: as it is known, where no more can be simulated.
+fn whole(problem: &Problem, known: Evaluation, ended_early: bool) -> Evaluation {
+    // Where nothing was simulated in time, nothing will be.
+    if ended_early && (known.readings.iter().all(Option::is_some) || known.readings.iter().all(Option::is_none)) {
+        return known;
+    }
+    let all = problem.evaluate_at(&known.tuners);
+    if all.is_cancelled() { known } else { all }
 }
 
 /// Points of a front in a result, at most.

@@ -1,6 +1,7 @@
 //! What is known of points before demands, usages and weights: what a run that was killed, or a study that asks for
 //! something else, need not simulate again.
 
+use crate::cancellation::Cancellation;
 use crate::criterion::Value;
 use crate::model::Failure;
 use crate::problem::Evaluation;
@@ -67,6 +68,16 @@ pub struct KeptSlopes<S> {
 pub trait Store: Send + Sync {
     /// What is known of a point.
     fn known(&self, tuners: &[f64]) -> Option<Known>;
+
+    /// Whether anything is known of a point.
+    fn is_known(&self, tuners: &[f64]) -> bool {
+        self.known(tuners).is_some()
+    }
+
+    /// Of a store that only looks back: who is asked to end at a point that is not known. `None`: such a point is simulated.
+    fn closed(&self) -> Option<&Cancellation> {
+        None
+    }
 
     /// A point of the run was answered; `learned` is what was simulated for it, `None` where nothing was.
     fn answered(&self, tuners: &[f64], learned: Option<Known>);

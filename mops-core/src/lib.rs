@@ -3,6 +3,7 @@
 //! This crate knows no concrete criterion, model or solver; they come in through a [`Catalogue`].
 
 pub mod band_limited;
+mod cancellation;
 mod case;
 mod catalogue;
 mod conclude;
@@ -44,6 +45,7 @@ mod tuner;
 mod uncertainty;
 mod unit;
 
+pub use cancellation::Cancellation;
 pub use case::Case;
 pub use catalogue::{
     Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, Shipped, SolverChoice, SolverKind,

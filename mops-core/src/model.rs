@@ -44,18 +44,28 @@ pub struct Parameter {
     pub default: Option<f64>,
     /// Smallest and largest meaningful value.
     pub range: [f64; 2],
+    /// Whether it may be infinite, which takes away what it stands for: an integral time, the stiffness of a rigid coupling.
+    pub infinite: bool,
 }
 
 impl Parameter {
-    /// A parameter that may take any value.
+    /// A parameter that may take any finite value.
     pub fn new(name: impl Into<String>, unit: &str, about: impl Into<String>) -> Self {
-        Self { variable: Variable::new(name, unit, about), default: None, range: [f64::NEG_INFINITY, f64::INFINITY] }
+        let range = [f64::NEG_INFINITY, f64::INFINITY];
+        Self { variable: Variable::new(name, unit, about), default: None, range, infinite: false }
     }
 
     /// Gives it a value where the study does not.
     #[must_use]
     pub fn with_default(mut self, value: f64) -> Self {
         self.default = Some(value);
+        self
+    }
+
+    /// Lets it be infinite.
+    #[must_use]
+    pub fn or_infinite(mut self) -> Self {
+        self.infinite = true;
         self
     }
 
@@ -132,7 +142,8 @@ pub trait Model: Send + Sync {
     /// Analyses one case.
     ///
     /// # Errors
-    /// A [`Failure`] is a value that loses against every success; it is counted and reported, and ends nothing.
+    /// A [`Failure`] is a value that loses against every success; it is counted and reported, and ends nothing. A simulation
+    /// that takes long looks at `job.case.cancellation` and fails with [`Failure::Cancelled`] once an end is requested.
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure>;
 
     /// The analysis and its derivative along each of the `seeds`, which have one number per parameter of the model. The
@@ -308,6 +319,10 @@ pub enum Failure {
     Undefined(String),
     /// A criterion has no value for this response.
     Criterion(String),
+    /// What is recorded takes more memory than a simulation may have, at this time, s.
+    RecordLimit(f64),
+    /// Whoever waits for the run asked it to end: nothing is known of the simulation.
+    Cancelled,
 }
 
 impl Failure {
@@ -320,6 +335,8 @@ impl Failure {
             Self::EventsAccumulate(..) => "events accumulate",
             Self::Undefined(_) => "model undefined",
             Self::Criterion(_) => "criterion undefined",
+            Self::RecordLimit(_) => "record limit",
+            Self::Cancelled => "cancelled",
         }
     }
 }
@@ -334,6 +351,13 @@ impl fmt::Display for Failure {
             Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
             Self::EventsAccumulate(t, why) => write!(f, "events accumulate at {t:.4} s: {why}"),
             Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
+            Self::RecordLimit(t) => {
+                write!(
+                    f,
+                    "records too much for memory, up to {t:.4} s: fewer steps or signals, or a shorter horizon, do"
+                )
+            }
+            Self::Cancelled => f.write_str("ended before it was done"),
         }
     }
 }

@@ -42,6 +42,9 @@ pub struct Outcome {
     pub seed: u64,
     /// Kind of the solver.
     pub solver: String,
+    /// Which run of the command line it is the result of: a digest of what it was asked, as its database has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run: Option<String>,
     /// Why the run stopped.
     pub stop: Stop,
     /// Points evaluated.

@@ -53,6 +53,13 @@ pub struct Evaluation {
     pub merit: Merit,
 }
 
+impl Evaluation {
+    /// Whether one of its simulations was asked to end before it was done: it says nothing of the point.
+    pub fn is_cancelled(&self) -> bool {
+        self.failures.iter().any(|(_, failure)| *failure == Failure::Cancelled)
+    }
+}
+
 /// The value of a criterion in a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
@@ -162,6 +169,19 @@ impl Problem {
         succeeds.map_or(0, |evaluation| evaluation.residuals.len())
     }
 
+    /// The problem as what concludes a run sees it: its simulations end only where that is insisted on.
+    #[must_use]
+    pub fn concluding(&self) -> Self {
+        let mut study = Study::clone(&self.study);
+        study.cases.iter_mut().for_each(|case| case.cancellation = case.cancellation.patient());
+        Self { study: Arc::new(study), ..self.clone() }
+    }
+
+    /// Whether its simulations were asked to end.
+    pub fn is_cancelled(&self) -> bool {
+        self.study.cases.iter().any(|case| case.cancellation.requested().is_some())
+    }
+
     /// The study.
     pub fn study(&self) -> &Arc<Study> {
         &self.study
@@ -207,6 +227,13 @@ impl Problem {
         self.evaluate_tuners(self.point_of(tuners), tuners.to_vec(), &self.jobs)
     }
 
+    /// Whether something is known of every simulation that the evaluation of a point takes, in `every` case or in those that
+    /// count.
+    pub fn has_met(&self, known: Option<&Known>, every: bool) -> bool {
+        let mut jobs = if every { self.jobs.iter() } else { self.counting.iter() };
+        jobs.all(|&job| known.is_some_and(|known| known.job(job).is_some()))
+    }
+
     /// Number of simulations that the evaluation of a point takes.
     pub fn simulations(&self) -> usize {
         self.counting.len()
@@ -226,6 +253,11 @@ impl Problem {
             signals: &signals,
             horizon: horizon.unwrap_or(plan.horizon),
         })
+    }
+
+    /// A point that was not simulated: no row has a value.
+    pub fn unknown(&self, tuners: &[f64]) -> Evaluation {
+        self.judge(self.point_of(tuners), tuners.to_vec(), std::iter::empty())
     }
 
     fn evaluate_tuners(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize]) -> Evaluation {
@@ -252,7 +284,8 @@ impl Problem {
             })
             .collect();
         let keeps_residuals = self.shape.residuals > 0;
-        let learned: Vec<(usize, JobValues)> = (values.iter().filter(|(.., new)| *new))
+        let is_new = |(_, values, new): &&(usize, JobValues, bool)| *new && *values != Err(Failure::Cancelled);
+        let learned: Vec<(usize, JobValues)> = (values.iter().filter(is_new))
             .map(|(job, values, _)| (*job, if keeps_residuals { values.clone() } else { without_residuals(values) }))
             .collect();
         let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
@@ -313,6 +346,9 @@ impl Problem {
         let study = &self.study;
         let plan = &study.jobs[job];
         let case = &study.cases[plan.case];
+        if case.cancellation.requested().is_some() {
+            return Err(Failure::Cancelled);
+        }
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let analysis = study.models[plan.model].1.analyse(&request)?;
@@ -339,7 +375,8 @@ impl Problem {
     ) -> KeptSlopes<Slopes> {
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
         let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
-        let learned = new.then(|| rows.clone());
+        // Of derivatives that were cut off nothing is known.
+        let learned = (new && (rows.is_some() || !self.is_cancelled())).then(|| rows.clone());
         KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
     }
 
@@ -405,6 +442,9 @@ impl Problem {
         let study = &self.study;
         let plan = &study.jobs[job];
         let case = &study.cases[plan.case];
+        if case.cancellation.requested().is_some() {
+            return None;
+        }
         let seed = |along: &Vec<f64>| study.parameter_slopes(plan, along);
         let seeds: Vec<Vec<f64>> = moves.iter().map(seed).collect();
         // Start values of other cases move nothing here.

@@ -29,6 +29,11 @@ pub trait Watch: Sync {
         false
     }
 
+    /// Why the run must end, where it must.
+    fn halt(&self) -> Halt {
+        Halt::Interrupted
+    }
+
     /// New points were evaluated.
     fn evaluated(&self, _state: &State) {}
 
@@ -38,6 +43,9 @@ pub trait Watch: Sync {
     /// Something that goes in stages, and counts no points, is in this one, such as `screening 412 candidates`; `done` is
     /// the share of the whole that lies behind it, from 0 to 1.
     fn stage(&self, _what: &str, _done: f64) {}
+
+    /// What the run learns cannot be kept at present, and why; `None` once it can be again, and all of it is.
+    fn keeping(&self, _trouble: Option<&str>) {}
 }
 
 /// Nobody looks on.
@@ -49,6 +57,10 @@ pub struct Quiet<'a>(pub &'a dyn Watch);
 impl Watch for Quiet<'_> {
     fn wants_stop(&self) -> bool {
         self.0.wants_stop()
+    }
+
+    fn halt(&self) -> Halt {
+        self.0.halt()
     }
 }
 
@@ -156,8 +168,11 @@ impl<'a, E: Evaluator> Run<'a, E> {
 
     /// Runs the solver from `start`, a point of the unit box, to its end.
     pub fn solve(&mut self, solver: &mut dyn Solver, start: &[f64]) -> Stop {
-        // The start is evaluated before all else: whatever happens, there is a point to report.
+        // The start is evaluated before all else, so that there is a point to report; none where even that is cut off.
         let first = self.answer(start);
+        if first.evaluation.is_cancelled() {
+            return self.watch.halt().into();
+        }
         self.keep(key(self.problem, start), first);
         self.tell();
         let mut iterate = || -> Result<Stop, Halt> {
@@ -170,12 +185,15 @@ impl<'a, E: Evaluator> Run<'a, E> {
                 }
             }
         };
-        let stop = iterate().unwrap_or_else(|halt| match halt {
-            Halt::Budget => Stop::Budget,
-            Halt::Interrupted => Stop::Interrupted,
-        });
+        let stop = iterate().unwrap_or_else(Stop::from);
         self.solved = solver.front().iter().map(|point| self.problem.tuners_at(point)).collect();
         stop
+    }
+
+    /// Takes an answer to the start that was simulated elsewhere: a run that was cut off before it had one can still report it.
+    pub fn take_start(&mut self, answer: Kept) {
+        let key = bits(&answer.evaluation.tuners);
+        self.keep(key, answer);
     }
 
     /// All points, in the order of their evaluation.
@@ -335,7 +353,13 @@ impl Hasher for Bits {
 fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) -> Kept {
     match store {
         None => Kept { evaluation: problem.evaluate(point), learned: None },
-        Some(store) => problem.evaluate_keeping(point, store.known(&problem.tuners_at(point))),
+        Some(store) => {
+            let known = store.known(&problem.tuners_at(point));
+            if let (None, Some(end)) = (&known, store.closed()) {
+                end.request(Halt::Interrupted);
+            }
+            problem.evaluate_keeping(point, known)
+        }
     }
 }
 
@@ -367,7 +391,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         // neither the batches nor the number of threads change a bit.
         for batch in new.chunks(4 * rayon::current_num_threads().max(1)) {
             if self.watch.wants_stop() {
-                return Err(Halt::Interrupted);
+                return Err(self.watch.halt());
             }
             let (problem, store) = (self.problem, self.store);
             // A single point is not worth the way to another thread.
@@ -375,10 +399,14 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
                 [i] => vec![answer(problem, store, &points[*i])],
                 _ => batch.par_iter().map(|&i| answer(problem, store, &points[i])).collect(),
             };
-            for (&i, answer) in batch.iter().zip(answers) {
+            let cut_off = answers.iter().position(|answer| answer.evaluation.is_cancelled());
+            for (&i, answer) in batch.iter().zip(answers).take(cut_off.unwrap_or(batch.len())) {
                 self.keep(keys[i].clone(), answer);
             }
             self.tell();
+            if cut_off.is_some() {
+                return Err(self.watch.halt());
+            }
         }
         if !within_budget {
             return Err(Halt::Budget);
@@ -399,7 +427,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         }
         if self.exact {
             if self.watch.wants_stop() {
-                return Err(Halt::Interrupted);
+                return Err(self.watch.halt());
             }
             // Slopes are no points, but a run that does nothing else must end as well.
             if self.linearisations >= self.budget.evaluations {

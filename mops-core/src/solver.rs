@@ -113,7 +113,7 @@ pub trait Oracle {
 /// The run is over before the solver is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Halt {
-    /// The budget is spent.
+    /// The budget, of evaluations or of time, is spent.
     Budget,
     /// The user ended it.
     Interrupted,
@@ -131,6 +131,15 @@ pub enum Stop {
     Stalled,
     /// The user ended it.
     Interrupted,
+}
+
+impl From<Halt> for Stop {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::Budget => Self::Budget,
+            Halt::Interrupted => Self::Interrupted,
+        }
+    }
 }
 
 /// Where a solver stands after an iteration.

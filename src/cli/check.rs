@@ -66,7 +66,7 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     for note in &study.notes {
         text += &format!("\nnote: {note}\n");
     }
-    print(&text);
+    print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 

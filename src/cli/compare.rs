@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 
 use super::past::Past;
 use super::tables::{number, table};
-use super::{Trouble, cannot_write, print};
+use super::{Trouble, cannot_write, print, print_json};
+use crate::files;
 use crate::report::{Responses, Rows, comparison_page, significant};
 
 /// What is compared.
@@ -36,40 +37,39 @@ struct Line {
 
 pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let runs = arguments.folders.iter().map(|folder| Past::of(folder)).collect::<Result<Vec<_>, _>>()?;
-    let results: Vec<&Value> = runs.iter().map(result).collect::<Result<_, _>>()?;
+    let results: Vec<&Value> = runs.iter().map(|run| run.ended().unwrap_or(&Value::Null)).collect();
+    if results.iter().all(|result| result.is_null()) {
+        return Err(Diagnostic::new("none of these runs has a result")
+            .with_help("`mops run --resume` takes a run to its end")
+            .into());
+    }
     let names: Vec<String> = runs.iter().map(|run| run.folder.display().to_string()).collect();
     let tuners = lines(&results, "tuners", |tuner| tuner["name"].as_str().unwrap_or_default().to_owned());
     let of_case =
         |criterion: &Value| [&criterion["case"], &criterion["name"]].map(|v| v.as_str().unwrap_or_default()).join("/");
     let criteria = lines(&results, "criteria", of_case);
     let whole = whole(&results);
+    let states: Vec<&str> = runs.iter().map(Past::state).collect();
     if arguments.json {
         let of = |lines: &[Line]| -> Vec<Value> { lines.iter().map(json_of).collect() };
-        let all = json!({ "runs": names, "outcome": of(&whole), "tuners": of(&tuners), "criteria": of(&criteria) });
-        print(&(serde_json::to_string_pretty(&all).expect("lines are JSON") + "\n"));
+        let all = json!({ "runs": names, "states": states, "outcome": of(&whole), "tuners": of(&tuners), "criteria": of(&criteria) });
+        print_json(&all)?;
     }
     let tables = [(["Results", "run"], whole), (["Tuners", "tuner"], tuners), (["Criteria", "criterion"], criteria)];
     let tables = tables.map(|(title, lines)| rows(title, names.len(), &lines));
     if !arguments.json {
-        print(&tables.iter().fold(legend(&names), |text, rows| text + "\n" + &in_words(rows)));
+        print(&tables.iter().fold(legend(&names, &states, &results), |text, rows| text + "\n" + &in_words(rows)))?;
     }
     if let Some(path) = &arguments.out {
         let (responses, silent) = responses(catalogue, &runs, &results);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
         let page = comparison_page(&names, &tables, &responses, &silent);
-        std::fs::write(path, page).map_err(cannot_write(path))?;
+        files::write(path, page).map_err(cannot_write(path))?;
         if !arguments.json {
-            print(&format!("\nthe responses are drawn in {}\n", path.display()));
+            print(&format!("\nthe responses are drawn in {}\n", path.display()))?;
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn result(run: &Past) -> Result<&Value, Diagnostic> {
-    run.ended().ok_or_else(|| {
-        Diagnostic::new(format!("the run in {} has no result", run.folder.display()))
-            .with_help("`mops run --resume` takes it to its end")
-    })
 }
 
 /// What the runs have under a key, by names in the order of their first appearance.
@@ -111,9 +111,13 @@ fn json_of(line: &Line) -> Value {
     json!({ "name": line.name, "unit": line.unit, "values": line.values, "differences_percent": differences(line) })
 }
 
-/// Which letter stands for which folder.
-fn legend(names: &[String]) -> String {
-    names.iter().enumerate().map(|(i, name)| format!("{}  {name}\n", letter(i))).collect()
+/// Which letter stands for which folder; and which of them have no result.
+fn legend(names: &[String], states: &[&str], results: &[&Value]) -> String {
+    let line = |(i, name): (usize, &String)| {
+        let state = if results[i].is_null() { format!(": {}, no result yet", states[i]) } else { String::new() };
+        format!("{}  {name}{state}\n", letter(i))
+    };
+    names.iter().enumerate().map(line).collect()
 }
 
 /// A, B, ... Z, then numbers.
@@ -159,6 +163,9 @@ fn responses(catalogue: &Catalogue, runs: &[Past], results: &[&Value]) -> (Vec<R
 
 /// The problem of a run, and the tuners of its result.
 fn at_result(catalogue: &Catalogue, run: &Past, result: &Value) -> Result<(Problem, Vec<f64>), Diagnostic> {
+    if result.is_null() {
+        return Err(Diagnostic::new(format!("the run in {} is {}", run.folder.display(), run.state())));
+    }
     let study = run.study(catalogue)?.study;
     let of = |name: &str| {
         let tuner = result["tuners"].as_array()?.iter().find(|tuner| tuner["name"] == name)?;

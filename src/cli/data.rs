@@ -25,31 +25,33 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let file = DataFile::read(&arguments.file)?;
     let names = file.column_names();
     if let Some(column) = &arguments.excitation {
-        print(&excitation(&file, column, &arguments.file.display().to_string())?);
+        print(&excitation(&file, column, &arguments.file.display().to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
     let time = file.time_column();
     let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
+    let longest = times.map_or(f64::INFINITY, longest_step);
     let mut rows = Vec::new();
     let mut sampling = String::new();
     for name in &names {
         let column = file.column(name)?;
-        let finite: Vec<f64> = column.values.iter().copied().filter(|v| v.is_finite()).collect();
-        let low = finite.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = finite.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // N.B.: a large file takes its memory once, so that nothing is gathered here.
+        let finite = || column.values.iter().copied().filter(|v| v.is_finite());
+        let (mut count, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
         if time.as_ref() == Some(name) {
-            sampling = sample_time(name, &finite);
+            sampling = sample_time(name, &finite().collect::<Vec<f64>>());
         }
         rows.push(vec![
             name.clone(),
             column.unit.unwrap_or("").to_owned(),
             column.values.len().to_string(),
-            (column.values.len() - finite.len()).to_string(),
+            (column.values.len() - count).to_string(),
             number(low),
             number(high),
-            finite.first().copied().map_or_else(String::new, number),
-            finite.last().copied().map_or_else(String::new, number),
-            noise(column.values, times).map_or_else(String::new, number),
+            finite().next().map_or_else(String::new, number),
+            finite().next_back().map_or_else(String::new, number),
+            noise(column.values, times, longest).map_or_else(String::new, number),
         ]);
     }
     let header = ["column", "unit", "rows", "gaps", "min", "max", "first", "last", "noise (est.)"];
@@ -61,7 +63,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
     for skipped in &file.skipped {
         text += &format!("skipped: {skipped}\n");
     }
-    print(&text);
+    print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -104,22 +106,29 @@ fn sample_time(name: &str, times: &[f64]) -> String {
 /// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
 /// Gaps, whether empty cells or rows that are missing, are not differenced across. `None` where fewer than 20 differences
 /// are left.
-fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+fn noise(values: &[f64], times: Option<&[f64]>, longest: f64) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
-    let mut steps: Vec<f64> = times.into_iter().flat_map(|t| t.windows(2)).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    let longest = steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 1.5 * median);
     let follows = |i: usize| times.is_none_or(|t| t[i..i + 4].windows(2).all(|pair| pair[1] - pair[0] <= longest));
     let windows = values.windows(4).enumerate().filter(|(i, w)| w.iter().all(|v| v.is_finite()) && follows(*i));
-    let squares: Vec<f64> = windows.map(|(_, w)| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2)).collect();
-    #[allow(clippy::cast_precision_loss)]
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    (squares.len() >= 20).then(|| (mean / 20.0).sqrt())
+    let squares = windows.map(|(_, w)| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2));
+    let (count, sum) = squares.fold((0_u32, 0.0), |(count, sum), square| (count + 1, sum + square));
+    (count >= 20).then(|| (sum / f64::from(count) / 20.0).sqrt())
+}
+
+/// The longest step between samples that is none over a gap: half as long again as the median.
+fn longest_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 1.5 * median)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::noise;
+    use super::longest_step;
+
+    fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+        super::noise(values, times, times.map_or(f64::INFINITY, longest_step))
+    }
 
     /// A steep ramp with an alternating error of 0.1, whose third differences are 0.8.
     fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {

@@ -23,23 +23,23 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let solvers = catalogue.solvers.iter().map(|k| (k.name, k.schema));
     let mut kinds = models.chain(criteria).chain(solvers);
     if let Some((table, schema)) = mops_core::file::tables().into_iter().find(|(table, _)| *table == name) {
-        print(&mops_core::file::describe(&format!("[{table}] of a study file"), &schema));
+        print(&mops_core::file::describe(&format!("[{table}] of a study file"), &schema))?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
         let model = catalogue.models.iter().find(|kind| kind.name == name).and_then(ModelKind::default_model);
         let places = model.map_or_else(String::new, |model| places(model.interface()));
         let places = if places.is_empty() { places } else { format!("\nPlaces for effects:\n  {places}\n") };
-        print(&(mops_core::file::describe(name, &schema()) + &places));
+        print(&(mops_core::file::describe(name, &schema()) + &places))?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {
-        print(&effect::page(effect.as_ref()));
+        print(&effect::page(effect.as_ref()))?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
         let file = |path| study.file(path).map(String::from_utf8_lossy).unwrap_or_default();
-        print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")));
+        print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")))?;
         return Ok(ExitCode::SUCCESS);
     }
     // A key of a table, such as `step` or `hold`: the page of the table tells of it.
@@ -49,7 +49,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         let pages =
             pages.map(|(table, schema)| mops_core::file::describe(&format!("[{table}] of a study file"), &schema));
         let named: Vec<String> = tables.iter().map(|table| format!("[{table}]")).collect();
-        print(&format!("`{name}` is a key of {}\n\n{}", named.join(", "), pages.collect::<Vec<_>>().join("\n")));
+        print(&format!("`{name}` is a key of {}\n\n{}", named.join(", "), pages.collect::<Vec<_>>().join("\n")))?;
         return Ok(ExitCode::SUCCESS);
     }
     let known: Vec<&str> = kinds

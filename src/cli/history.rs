@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::past::{Past, date};
 use super::tables::{number, table};
-use super::{Trouble, print};
+use super::{Trouble, print, print_json};
 
 /// Folders within folders that are looked into, at most.
 const DEPTH: usize = 8;
@@ -38,9 +38,9 @@ pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     runs.sort_by(|a, b| (a.date, &a.folder).cmp(&(b.date, &b.folder)));
     if arguments.json {
         let all: Vec<Value> = runs.iter().map(json_of).collect();
-        print(&(serde_json::to_string_pretty(&all).expect("runs are JSON") + "\n"));
+        print_json(&all)?;
     } else if runs.is_empty() {
-        print(&format!("no run left anything below {}\n", folder.display()));
+        print(&format!("no run left anything below {}\n", folder.display()))?;
     } else {
         let header = [
             "date (UTC)",
@@ -54,7 +54,7 @@ pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<E
             "mops",
             "folder",
         ];
-        print(&table(&header, &[4, 6, 7], runs.iter().map(row).collect()));
+        print(&table(&header, &[4, 6, 7], runs.iter().map(row).collect()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -76,18 +76,29 @@ fn collect(folder: &Path, depth: usize, runs: &mut Vec<Past>) {
 fn json_of(past: &Past) -> Value {
     let of = |key: &str| past.ended().map_or(Value::Null, |result| result[key].clone());
     let run = past.run.as_ref().map(|(run, _)| run);
+    // A diagnosis has a verdict, and no scaled values.
+    let counts = |value: Value| if judges(past) { value } else { Value::Null };
     let or = |key: &str, kept: Option<Value>| {
         kept.unwrap_or_else(|| past.result.as_ref().map_or(Value::Null, |r| r[key].clone()))
     };
     json!({
         "folder": past.folder.display().to_string(), "date": date(past.date),
         "study": or("study", run.map(|run| json!(run.name))), "task": or("task", run.map(|run| json!(run.task))),
-        "state": past.state(), "worst_scaled": of("worst_scaled"), "feasible": of("feasible"),
-        "evaluations": past.ended().map_or_else(|| json!(run.map(|run| run.evaluations)), |_| of("evaluations")),
+        "state": past.state(), "worst_scaled": counts(of("worst_scaled")), "feasible": counts(of("feasible")),
+        "evaluations": counts(
+            past.ended().map_or_else(|| json!(run.map(|run| run.evaluations)), |_| of("evaluations"))
+        ),
         "seconds": of("seconds"), "mops": or("mops", run.map(|run| json!(run.mops))),
         "seed": or("seed", run.map(|run| json!(run.seed))), "solver": or("solver", run.map(|run| json!(run.solver))),
         "command": run.map(|run| &run.command), "reused": of("reused"),
     })
+}
+
+/// Whether the task of a run gives values to criteria.
+fn judges(past: &Past) -> bool {
+    let of_result = || past.result.as_ref().and_then(|result| result["task"].as_str());
+    let task = past.run.as_ref().map(|(run, _)| run.task.as_str()).or_else(of_result);
+    !matches!(task, Some("diagnosis" | "excitation"))
 }
 
 /// A run as a row of the table.

@@ -49,7 +49,7 @@ impl From<Refusal> for Trouble {
 }
 
 /// Whether a study asks for points that can be kept: those of a search, a sweep, or samples of uncertain parameters.
-fn keeps(study: &Study) -> bool {
+pub(super) fn keeps(study: &Study) -> bool {
     solves(study) || study.task == Task::Sweep || samples(study)
 }
 
@@ -62,25 +62,23 @@ pub(super) fn samples(study: &Study) -> bool {
     }
 }
 
-/// The database of a run that is about to begin; none for a task that evaluates no points.
+/// Claims the folder of a run that is about to begin, and opens its database; a task that evaluates no points enters there that
+/// it ran.
 pub(super) fn open(
     (folder, start): (&Path, &Start),
     (file, study): (&StudyFile, &StudyArguments),
     home: &Home,
     options: &Options,
-) -> Result<Option<Keeper>, Trouble> {
-    if !keeps(&file.study) {
-        return match start {
-            Start::Fresh => Ok(None),
-            _ => Err(Diagnostic::new("this task keeps no evaluations that a later run could use")
-                .with_help("leave --resume and --reuse out: the same seed gives the same result")
-                .into()),
-        };
+) -> Result<Keeper, Trouble> {
+    if !keeps(&file.study) && *start != Start::Fresh {
+        return Err(Diagnostic::new("this task keeps no evaluations that a later run could use")
+            .with_help("leave --resume and --reuse out: the same seed gives the same result")
+            .into());
     }
     let identity = Identity::of(file, &file.study, options.solver.kind);
     let home = match home {
-        Home::Shipped(shipped) => shipped.name.to_owned(),
-        Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
+        Home::Shipped(shipped) => PathBuf::from(shipped.name),
+        Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
     };
     let task = serde_json::to_value(file.study.task).expect("a task is a word");
     let run = RunRow {
@@ -94,20 +92,18 @@ pub(super) fn open(
         max_evaluations: options.max_evaluations,
         ..row(&identity)
     };
-    Ok(Some(Keeper::open(folder, start, &file.study, &identity, &run)?))
+    Ok(Keeper::open(folder, start, &file.study, &identity, &run)?)
 }
 
 /// A solved study, and the database in which its points are.
-pub(super) type Done = (Result<Solved, Unsuitable>, Option<Opened>);
+pub(super) type Done = (Result<Solved, Unsuitable>, Opened);
 
-/// Solves the study; its points are kept where there is a keeper.
-pub(super) fn solve_keeping(study: &Study, options: &Options, keeper: Option<Keeper>, watch: &dyn Watch) -> Done {
-    let Some(keeper) = keeper else { return (solve(study.clone(), options, watch), None) };
+/// Solves the study; its points are kept.
+pub(super) fn solve_keeping(study: &Study, options: &Options, keeper: Keeper, watch: &dyn Watch) -> Done {
     let begin = keeper.begin.clone();
     let keeping = Some(Keeping { study: study.clone(), store: keeper.store(), begin });
     let options = Options { keeping, ..options.clone() };
-    let (solved, opened) = keeper.run(watch, |watch| solve(study.clone(), &options, watch));
-    (solved, Some(opened))
+    keeper.run(watch, |watch| solve(study.clone(), &options, watch))
 }
 
 /// How the table of runs names the end of a run.
@@ -123,7 +119,7 @@ pub(super) fn state(stop: Stop) -> RunState {
 /// What is said of points that were known.
 pub(super) fn told(start: &Start, known: usize, opened: &Opened) -> String {
     match start {
-        Start::Fresh | Start::Look => String::new(),
+        Start::Fresh => String::new(),
         Start::Resume | Start::Reuse(_) => format!(
             "\n{known} known points; {} evaluations met one of them and were not simulated, {} were simulated\n",
             opened.reused, opened.simulated

@@ -16,6 +16,7 @@ use super::families::folded;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, linear_plots, print};
+use crate::files;
 use crate::report::file_name;
 
 /// What is linearised, and what is done with it.
@@ -65,18 +66,18 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     let interface = study.models[model].1.interface();
     let system = narrowed(&found.system, arguments)?;
 
-    print(&format!("{name} in case {}\n", case.name));
+    print(&format!("{name} in case {}\n", case.name))?;
     let states = study.models[model].1.equation_states();
     if !states.is_empty() {
-        print(&format!("\n{}", operating_point(&states, &interface.inputs, &found)));
+        print(&format!("\n{}", operating_point(&states, &interface.inputs, &found)))?;
         for joint in &found.frictionless {
-            print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"));
+            print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"))?;
         }
     }
     let unit = |name: &str| unit_of(name, &states, &interface.inputs, &interface.signals);
-    print(&matrices(&system, &unit));
+    print(&matrices(&system, &unit))?;
     let poles = system.poles().map_err(Trouble::Failure)?;
-    print(&poles_table("pole", &poles));
+    print(&poles_table("pole", &poles))?;
     let mut channels = Vec::new();
     let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
     for (count, (i, o)) in pairs.enumerate() {
@@ -85,13 +86,13 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
         }
         let (text, value) = channel(&system.channel(i, o), &poles).map_err(Trouble::Failure)?;
         if count < MANY {
-            print(&text);
+            print(&text)?;
         }
         channels.push(value);
     }
     let unseen = (system.inputs.len() * system.outputs.len()).saturating_sub(MANY);
     if unseen > 0 {
-        print(&format!("\nand {unseen} more; --input and --output pick one, {WHERE} has all\n"));
+        print(&format!("\nand {unseen} more; --input and --output pick one, {WHERE} has all\n"))?;
     }
     let feedback = match design(&system, arguments)? {
         Some((heading, k)) => {
@@ -101,8 +102,8 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
             print(&format!(
                 "\n{heading}, u = -K x\n\n{}",
                 named("K", &shown, &labels(&system.inputs), &labels(&system.states))
-            ));
-            print(&poles_table("closed-loop pole", &closed));
+            ))?;
+            print(&poles_table("closed-loop pole", &closed))?;
             json!({ "k": rows(&k), "poles": complex(&closed) })
         }
         None => Value::Null,
@@ -115,7 +116,7 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
             "poles": complex(&system.poles().map_err(Trouble::Failure)?), "channels": channels, "feedback": feedback,
         });
         write(folder, &system, &content)?;
-        print(&format!("\nlinearised.json and plots are in {}\n", folder.display()));
+        print(&format!("\nlinearised.json and plots are in {}\n", folder.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -428,8 +429,8 @@ fn design(
                 })
             })
             .collect::<Result<_, _>>()?;
-        let k = place(&system.a, &system.b, &poles).map_err(|why| Diagnostic::new(format!("`--place`: {why}")))?;
-        return Ok(Some(("pole placement", k)));
+        let placed = place(&system.a, &system.b, &poles).map_err(|why| Diagnostic::new(format!("`--place`: {why}")))?;
+        return Ok(Some(("pole placement", placed.k)));
     }
     let Some(text) = &arguments.lqr else { return Ok(None) };
     let weights: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
@@ -454,14 +455,14 @@ fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<(), Trou
     std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
     let path = folder.join("linearised.json");
     let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
-    std::fs::write(&path, text).map_err(cannot_write(&path))?;
+    files::write(&path, text).map_err(cannot_write(&path))?;
     for i in 0..system.inputs.len() {
         for o in 0..system.outputs.len() {
             let channel = system.channel(i, o);
             let name = format!("{}/{}", channel.outputs[0], channel.inputs[0]);
             for (kind, plot) in linear_plots::plots(&channel, &name).map_err(Trouble::Failure)? {
                 let path = folder.join(file_name(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0])));
-                std::fs::write(path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
+                files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
                 plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
             }
         }

@@ -51,7 +51,7 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     print(&format!(
         "{}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver.\n",
         text.join("\n")
-    ));
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

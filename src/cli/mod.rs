@@ -12,6 +12,7 @@ mod families;
 mod findings;
 mod history;
 mod keep;
+mod limits;
 mod linear_plots;
 mod linearise;
 mod list;
@@ -30,13 +31,15 @@ mod simulate;
 mod sparkline;
 mod study;
 mod tables;
+mod terminal;
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use mops_core::{Catalogue, Diagnostic};
+
+use terminal::{print, print_json, say};
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
@@ -54,7 +57,8 @@ Begin with:
   mops new my-loop               write a commented study to start from
   mops describe settling-time    what a kind computes, and its options
 
-Exit status: 0 done; 1 done, but a constraint is violated; 2 the study, its data or the command line is wrong; 3 the run failed."
+Exit status: 0 done; 1 done, but a constraint is violated; 2 the study, its data or the command line is wrong; 3 the run
+failed; 4 a signal ended it, with the best so far written."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -122,11 +126,6 @@ fn cannot_write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Troubl
     move |error| Trouble::Failure(format!("{} cannot be written: {error}", path.display()))
 }
 
-/// Writes to standard output; a reader that closed its end early is no error.
-fn print(text: &str) {
-    let _ = std::io::stdout().write_all(text.as_bytes());
-}
-
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
@@ -148,8 +147,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "mops", &mut script);
-            print(&String::from_utf8_lossy(&script));
-            Ok(ExitCode::SUCCESS)
+            print(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
     };
     match outcome {
@@ -159,7 +157,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
             ExitCode::from(2)
         }
         Err(Trouble::Failure(message)) => {
-            let _ = writeln!(std::io::stderr(), "error: {message}");
+            say(&format!("error: {message}"));
             ExitCode::from(3)
         }
     }

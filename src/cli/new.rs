@@ -7,6 +7,7 @@ use clap::Args;
 use mops_core::{Catalogue, Diagnostic, suggestion};
 
 use super::{Trouble, cannot_write, print, schema};
+use crate::files;
 
 /// What is written.
 #[derive(Args)]
@@ -56,12 +57,12 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
         let path = folder.join(path);
         let parent = path.parent().expect("it lies in the folder");
         std::fs::create_dir_all(parent).map_err(cannot_write(parent))?;
-        std::fs::write(&path, bytes).map_err(cannot_write(&path))?;
+        files::write(&path, bytes).map_err(cannot_write(&path))?;
     }
     let study = folder.join("study.toml");
-    print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()));
+    print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()))?;
     if from.is_none() && catalogue.studies.iter().any(|study| study.name == called) {
-        print(&format!("it is the commented template; `--from {called}` copies the shipped study of that name\n"));
+        print(&format!("it is the commented template; `--from {called}` copies the shipped study of that name\n"))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -9,12 +9,13 @@ use mops_core::{Catalogue, Diagnostic};
 use serde_json::Value;
 
 use super::study::{read_at, without_settings};
+use crate::files;
 use crate::store::{self, RunRow, RunState};
 
 /// What a run left in its folder.
 pub(super) struct Past {
     pub folder: PathBuf,
-    /// The content of result.json.
+    /// The content of result.json, if it is that of the run in the database, or there is none.
     pub result: Option<Value>,
     /// The run, as its database has it, and whether it goes on.
     pub run: Option<(RunRow, bool)>,
@@ -26,9 +27,16 @@ impl Past {
     /// Reads a folder; `None` where no run left anything.
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join("result.json");
-        let result = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let result = files::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let result = result.filter(|result| result["format"].is_u64() && result["study"].is_string());
         let run = store::last_run(folder);
+        // A run that was killed leaves the result of an earlier one where it was.
+        let belongs = |result: &Value| match (&run, result["run"].as_str()) {
+            (Some((run, _)), Some(id)) => run.id() == id,
+            (Some((run, _)), None) => result["study"].as_str() == Some(&run.name),
+            (None, _) => true,
+        };
+        let result = result.filter(belongs);
         let written = || {
             let since = fs::metadata(&path).ok()?.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
             i64::try_from(since.as_secs()).ok()
@@ -59,7 +67,7 @@ impl Past {
         }
     }
 
-    /// The result, where it is that of the run in the database.
+    /// The result, where the run came to its end.
     pub fn ended(&self) -> Option<&Value> {
         self.result.as_ref().filter(|_| self.run.as_ref().is_none_or(|(run, _)| run.state != RunState::Running))
     }
@@ -71,7 +79,7 @@ impl Past {
     pub fn study(&self, catalogue: &Catalogue) -> Result<StudyFile, Diagnostic> {
         let Some((run, _)) = &self.run else {
             return Err(Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
-                .with_help("a run of this version of mops writes it; diagnoses have none"));
+                .with_help("a run of this version of mops writes it"));
         };
         let text = without_settings(&run.text, &run.settings);
         read_at(catalogue, &run.home, text, &run.settings)

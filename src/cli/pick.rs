@@ -15,6 +15,7 @@ use serde_json::Value;
 use super::study::{StudyArguments, open_as};
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, print};
+use crate::files;
 use crate::toml_text::{self, TomlText, key, quoted};
 
 /// What can be said to the choice of a point.
@@ -40,7 +41,8 @@ pub(super) struct Arguments {
     /// The study, where it is not study.toml in the folder.
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
-    /// The study file that is written; picked.toml in the folder where absent.
+    /// The study file that is written, which must not be there yet; picked.toml in the folder where absent, or picked-2.toml
+    /// and so on.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -60,6 +62,7 @@ fn demand(text: &str) -> Result<(String, String), String> {
 pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let front = front(&arguments.folder)?;
     let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
+    let out = target(arguments)?;
     let open = |settings: Vec<String>| {
         let study = StudyArguments { study: path.display().to_string(), settings };
         open_as(catalogue, &study, &["study.task=\"design\"".to_owned(), "study.objective=\"max\"".to_owned()])
@@ -73,13 +76,26 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
     let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
-    print(&told(&file.study, (index, front.len()), &at, refined.as_ref()));
+    print(&told(&file.study, (index, front.len()), &at, refined.as_ref()))?;
     let chosen = refined.as_ref().unwrap_or(&at);
-    let out = arguments.out.clone().unwrap_or_else(|| arguments.folder.join("picked.toml"));
     let text = fs::read_to_string(&path).map_err(|error| Trouble::Failure(format!("{}: {error}", path.display())))?;
-    fs::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(cannot_write(&out))?;
-    print(&format!("\na study that starts there is in {}\n", out.display()));
+    files::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(cannot_write(&out))?;
+    print(&format!("\na study that starts there is in {}\n", out.display()))?;
     Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The file to write: none that is there, which somebody may have worked on.
+fn target(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
+    match &arguments.out {
+        Some(out) if out.exists() => Err(Diagnostic::new(format!("`{}` is already there", out.display()))
+            .with_help("remove it, or choose another file with --out; nothing was written")),
+        Some(out) => Ok(out.clone()),
+        None => {
+            let names = std::iter::once("picked.toml".to_owned()).chain((2..).map(|i| format!("picked-{i}.toml")));
+            let free = names.map(|name| arguments.folder.join(name)).find(|path| !path.exists());
+            Ok(free.expect("some number is free"))
+        }
+    }
 }
 
 /// The points of a finished front.

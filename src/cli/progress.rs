@@ -1,20 +1,23 @@
-//! Shows how a run goes, and hears Ctrl-C.
+//! Shows how a run goes.
 
 use std::fmt::Write as _;
-use std::io::{IsTerminal, Write as _};
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mops_core::{CriterionReport, Evaluation, RunState, Study, Usage, Watch, criterion_reports};
+use mops_core::{Cancellation, CriterionReport, Evaluation, Halt, RunState, Study, Usage, Watch, criterion_reports};
 
+use super::limits::{Limit, listen};
 use super::sparkline::sparkline;
 use super::tables::number;
+use super::terminal::say;
+use crate::plain::plain;
 
-/// A progress bar on standard error, with the best objective so far; and the ear for Ctrl-C.
+/// A progress bar on standard error, with the best objective so far; it passes on that an end is wanted.
 pub(super) struct Progress {
     bar: ProgressBar,
-    interrupted: Arc<AtomicBool>,
+    cancellation: Cancellation,
     /// Whether the bar shows stages instead of points.
     staged: AtomicBool,
     /// The stage that was last said in a line of its own, and when, in seconds; `None` where a bar says it.
@@ -54,34 +57,26 @@ impl Below {
 const SPARKS: usize = 40;
 
 impl Progress {
-    /// Begins to listen, and, where `shown`, to show the bar; stages in lines where standard error is no terminal.
-    pub fn new(shown: bool, budget: usize) -> Self {
+    /// Shows the bar, where `shown`; stages in lines where standard error is no terminal.
+    pub fn new(shown: bool, budget: usize, cancellation: &Cancellation) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);
         let style = "{bar:30} {pos}/{len} evaluations, at most {eta} left, {msg}";
         bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
-        Self::with(bar, shown, "interrupted: writing the best point so far; again to end at once")
+        Self::with(bar, shown, cancellation.clone())
     }
 
     /// The same for a benchmark, which keeps the cases that are done.
     pub fn of_cases(shown: bool) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(None, target);
-        Self::with(bar, shown, "interrupted: the cases so far count; again to end at once")
+        let limit = Limit { time_limit: None };
+        Self::with(bar, shown, listen(limit, "interrupted: keeping the finished cases; press Ctrl-C again to quit now"))
     }
 
-    fn with(bar: ProgressBar, shown: bool, heard: &'static str) -> Self {
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interrupted);
-        // Where a handler cannot be set, Ctrl-C ends the program as usual.
-        let _ = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-            let _ = writeln!(std::io::stderr(), "{heard}");
-        });
+    fn with(bar: ProgressBar, shown: bool, cancellation: Cancellation) -> Self {
         let said = (shown && !std::io::stderr().is_terminal()).then(Mutex::default);
-        Self { bar, interrupted, staged: AtomicBool::new(false), said, study: None, below: Mutex::default() }
+        Self { bar, cancellation, staged: AtomicBool::new(false), said, study: None, below: Mutex::default() }
     }
 
     /// Shows the convergence, and the criteria of the best point, below the bar.
@@ -98,7 +93,11 @@ impl Progress {
 
 impl Watch for Progress {
     fn wants_stop(&self) -> bool {
-        self.interrupted.load(Ordering::Relaxed)
+        self.cancellation.requested().is_some()
+    }
+
+    fn halt(&self) -> Halt {
+        self.cancellation.requested().unwrap_or(Halt::Interrupted)
     }
 
     fn evaluated(&self, state: &RunState) {
@@ -115,7 +114,8 @@ impl Watch for Progress {
             below.better(state.evaluations, state.best.objective);
             lines = format!("\n  {}{}", sparkline(&below.curve, state.evaluations, SPARKS), below.criteria);
         }
-        self.bar.set_message(format!("best {:.6}{violation}{failed}{lines}", state.best.objective));
+        let best = format!("best {:.6}{violation}{failed}{lines}", state.best.objective);
+        self.bar.set_message(plain(&best).into_owned());
     }
 
     fn improved(&self, best: &Evaluation) {
@@ -134,17 +134,27 @@ impl Watch for Progress {
         }
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
-        self.bar.set_message(what.to_owned());
+        self.bar.set_message(plain(what).into_owned());
         if let Some(said) = &self.said {
             // A log has no bar to overwrite: the longer a run, the rarer the lines, but for stages of another kind.
             let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
             let now = self.bar.elapsed().as_secs_f64();
             let kind = what.split([';', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']).next().unwrap_or(what);
             if said.0 != kind || now - said.1 >= (0.05 * now).max(1.0) {
-                let _ = writeln!(std::io::stderr(), "{now:>7.1} s  {what}");
+                say(&format!("{now:>7.1} s  {what}"));
                 *said = (kind.to_owned(), now);
             }
         }
+    }
+
+    fn keeping(&self, trouble: Option<&str>) {
+        let text = match trouble {
+            Some(why) => {
+                format!("warning: evaluations cannot be written ({why}); they wait in memory and are tried again")
+            }
+            None => "note: evaluations are written again, and none is missing".to_owned(),
+        };
+        self.bar.suspend(|| say(&text));
     }
 }
 

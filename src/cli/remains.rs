@@ -10,6 +10,7 @@ use mops_discrepancy::Diagnosis;
 use super::study::Home;
 use super::{Trouble, cannot_write};
 use crate::diagnosis::{Original, predictions, repaired, source};
+use crate::files;
 use crate::toml_text::settled;
 
 /// Writes `predictions/<experiment>.csv`, and where something was found `repaired.toml` and, where asked for, `repaired.rs`.
@@ -55,7 +56,7 @@ pub(super) fn leave_study(folder: &Path, text: &str, settings: &[String], home: 
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Trouble> {
-    fs::write(path, bytes).map_err(cannot_write(path))
+    files::write(path, bytes).map_err(cannot_write(path))
 }
 
 /// The data of a shipped study: the repaired one needs them in its own folder.

@@ -1,6 +1,6 @@
 //! `mops report`: writes the page of a run again, from what the run left.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -10,7 +10,7 @@ use super::past::Past;
 use super::{Trouble, cannot_write, keep, print};
 use crate::report::Report;
 use crate::solve::{Options, Solved};
-use crate::store::{Identity, Keeper, RunRow, RunState, Start};
+use crate::store::{self, Identity, Keeper, RunRow, RunState};
 
 /// Which page is written.
 #[derive(Args)]
@@ -27,18 +27,20 @@ pub(super) struct Again {
 
 pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
     let folder = &arguments.folder;
-    let Again { solved, text } = again(catalogue, folder)?;
+    let past = Past::of(folder)?;
+    let Again { solved, text } = again(catalogue, &past)?;
+    let _claim = store::claim(folder)?;
     let Solved { outcome, problem, best, archive, front, .. } = &solved;
     let report = Report { outcome, problem, best, archive, front, diagnosis: None, text: &text };
     report.write(folder).map_err(cannot_write(folder))?;
     let count = outcome.evaluations;
-    print(&format!("report.html and the plots of {count} evaluations are in {}\n", folder.display()));
+    print(&format!("report.html and the plots of {count} evaluations are in {}\n", folder.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Goes through a run again: every point is answered from its database, and nothing is searched beyond them.
-pub(super) fn again(catalogue: &Catalogue, folder: &Path) -> Result<Again, Trouble> {
-    let past = Past::of(folder)?;
+fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, Trouble> {
+    let folder = &past.folder;
     let mut file = past.study(catalogue)?;
     let Some((run, goes_on)) = &past.run else { unreachable!("a study was found in it") };
     if *goes_on {
@@ -46,30 +48,54 @@ pub(super) fn again(catalogue: &Catalogue, folder: &Path) -> Result<Again, Troub
             .with_help("it writes its report when it ends; `mops run --watch` shows one that goes")
             .into());
     }
+    if !keep::keeps(&file.study) {
+        let task = &run.task;
+        return Err(Diagnostic::new(format!(
+            "the run in {} is a {task}, which keeps no evaluations",
+            folder.display()
+        ))
+        .with_help(format!("`{}` does it again", run.command))
+        .into());
+    }
     if cut_short(run) && keep::samples(&file.study) {
         return Err(Diagnostic::new(format!(
             "the run in {} came to no end, and what it found is not whole",
             folder.display()
         ))
-        .with_help(format!(
-            "`{} --resume` ends it, and simulates no known point again",
-            run.command.replace(" --resume", "")
-        ))
+        .with_help(format!("`{} --resume` ends it, and simulates no known point again", plainly(run)))
         .into());
     }
     file.study.seed = run.seed;
     let options = options(catalogue, &file.solver, run)?;
     let identity = Identity::of(&file, &file.study, options.solver.kind);
-    let keeper = Keeper::open(folder, &Start::Look, &file.study, &identity, run)?;
-    let (solved, _) = keep::solve_keeping(&file.study, &options, Some(keeper), &());
+    let keeper = Keeper::look(folder, &file.study, &identity, &options.cancellation)?;
+    let (solved, _) = keep::solve_keeping(&file.study, &options, keeper, &());
     let mut solved = solved.map_err(|why| Diagnostic::new(why.to_string()))?;
-    if cut_short(run) {
-        solved.outcome.stop = Stop::Interrupted;
+    let (outcome, result) = (&mut solved.outcome, past.ended());
+    let ended_with = result.and_then(|result| result["evaluations"].as_u64()).unwrap_or(0);
+    if (outcome.evaluations as u64) < ended_with {
+        let (there, folder) = (outcome.evaluations, folder.display());
+        return Err(Diagnostic::new(format!(
+            "the database in {folder} has {there} of the run's {ended_with} evaluations"
+        ))
+        .with_help(format!("`{} --resume` simulates the others again, and writes the report", plainly(run)))
+        .into());
     }
-    if let Some(seconds) = past.ended().and_then(|result| result["seconds"].as_f64()) {
-        solved.outcome.seconds = seconds;
+    outcome.stop = match run.state {
+        RunState::Converged => Stop::Converged,
+        RunState::Budget => Stop::Budget,
+        RunState::Stalled => Stop::Stalled,
+        RunState::Interrupted | RunState::Running => Stop::Interrupted,
+    };
+    if let Some(seconds) = result.and_then(|result| result["seconds"].as_f64()) {
+        outcome.seconds = seconds;
     }
     Ok(Again { solved, text: file.source.text.clone() })
+}
+
+/// The command line of a run, without `--resume`.
+fn plainly(run: &RunRow) -> String {
+    run.command.replace(" --resume", "")
 }
 
 /// Whether a run ended before its solver or its budget did.
@@ -89,5 +115,5 @@ fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRo
         kind.ok_or_else(unknown)?.default_choice()
     };
     let max_evaluations = if cut_short(run) { run.evaluations.max(1) } else { run.max_evaluations };
-    Ok(Options { solver, max_evaluations, jobs: None, effects: catalogue.effects.clone(), keeping: None })
+    Ok(Options { solver, max_evaluations, effects: catalogue.effects.clone(), ..Options::default() })
 }

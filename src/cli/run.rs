@@ -1,21 +1,26 @@
 //! `mops run`: solves a study and leaves the result behind.
 
-use std::io::Write;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Mistake, MonteCarloReport, Study, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Halt, Mistake, MonteCarloReport, Stop, Study, Task, Watch, suggestion};
 
+use super::limits::{Limit, listen};
 use super::progress::Progress;
 use super::remains::{leave, leave_study};
-use super::study::{StudyArguments, home, open_as, without_settings};
+use super::study::{Home, StudyArguments, home, open_as, without_settings};
+use super::terminal::{print_json, say};
 use super::{Trouble, cannot_write, diagnosis, findings, keep, print, tables};
 use crate::diagnosis::Original;
-use crate::report::Report;
+use crate::files::{self, Beside};
+use crate::report::{Report, file_name};
 use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solves};
-use crate::store::{Keeper, Opened, Start};
+use crate::store::Start;
 use crate::watch::{Both, Page};
 
 /// What `mops diagnose` sets.
@@ -38,6 +43,8 @@ pub(super) struct Common {
     /// Number of threads; all cores where absent. The result is the same, bit for bit.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    #[command(flatten)]
+    limit: Limit,
     /// Say nothing but errors.
     #[arg(long)]
     quiet: bool,
@@ -155,89 +162,129 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),
         keeping: None,
+        cancellation: listen(arguments.limit, "interrupted: saving the best point; press Ctrl-C again to quit now"),
     };
     let talks = !arguments.quiet && !arguments.json;
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(&file.study.name));
-    let mut progress = Progress::new(talks, options.max_evaluations);
+    // N.B.: the name of a study is no path, wherever the study comes from.
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(&file.study.name)));
+    let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
     if arguments.dashboard {
         progress = progress.with_criteria_of(&file.study);
     }
     if talks {
         for warning in &file.study.warnings {
-            let _ = writeln!(std::io::stderr(), "warning: {warning}");
+            say(&format!("warning: {warning}"));
         }
-        print(&introduction(&file.study, &options));
     }
+    let mut said = Said::default();
+    said.of(if talks { print(&introduction(&file.study, &options)) } else { Ok(()) });
     let home = home(catalogue, &arguments.study);
     let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
     // What the command sets is part of what was said: a report that is written again needs it.
-    let said = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
-    let keeper = keep::open((&folder, &start), (&file, &said), &home, &options)?;
-    if let Some(note) = keeper.as_ref().and_then(|keeper| keeper.note.as_ref()).filter(|_| talks) {
-        let _ = writeln!(std::io::stderr(), "note: {note}");
+    let asked = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
+    let keeper = keep::open((&folder, &start), (&file, &asked), &home, &options)?;
+    if let Some(note) = keeper.note.as_ref().filter(|_| talks) {
+        say(&format!("note: {note}"));
     }
-    let known = keeper.as_ref().map_or(0, Keeper::known);
+    let (known, id) = (keeper.known(), keeper.id.clone());
     let page = arguments.watch.then(|| watch(&file.study, &options)).transpose()?;
     let both = page.as_ref().map(|page| Both { page, other: &progress });
     let watch: &dyn Watch = both.as_ref().map_or(&progress, |both| both);
-    let (solved, opened) = keep::solve_keeping(&file.study, &options, keeper, watch);
+    let (solved, mut opened) = keep::solve_keeping(&file.study, &options, keeper, watch);
     progress.finish();
-    let solved = match solved {
+    let mut solved = match solved {
         Ok(solved) => solved,
         Err(why) => {
-            opened.into_iter().for_each(Opened::withdraw);
+            opened.withdraw();
             return Err(refused(&why.0, &file, options.solver.kind).into());
         }
     };
-    let told = opened.as_ref().map(|opened| keep::told(&start, known, opened)).unwrap_or_default();
+    let outcome = &mut solved.outcome;
+    outcome.run = Some(id);
+    if let (Stop::Budget, Some(limit), Some(Halt::Budget)) =
+        (outcome.stop, arguments.limit.time_limit, options.cancellation.requested())
+    {
+        let seconds = limit.as_secs_f64();
+        outcome.warnings.push(format!("the time limit of {seconds} s ended it; --resume continues it where it was"));
+    }
+    let told = keep::told(&start, known, &opened);
 
-    let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
-    write(&folder, &json, &solved, &file.source.text)?;
+    // What was found is shown whatever becomes of the files.
+    let held = opened.hold();
+    let result = match &held {
+        // A full disk was waited for already, where evaluations had to go.
+        Ok(_) => write_result(&folder, &solved, if opened.is_whole() { PATIENCE } else { Duration::ZERO }),
+        Err(why) => Err(Trouble::Failure(why.clone())),
+    };
+    if arguments.json {
+        said.of(print_json(&solved.outcome));
+    } else if talks {
+        said.of(print(&(shown(&solved) + &told)));
+    }
+    if let Ok(Some(note)) = &held {
+        say(&format!("warning: {note}"));
+    }
+    let plain = without_settings(&file.source.text, &settings);
+    let original = (plain, arguments.study.settings.as_slice(), settings.as_slice());
+    let written = result
+        .and_then(|()| leave_all(&folder, &solved, (&file, original), (&home, catalogue), arguments.export.is_some()));
     if let Some(page) = page {
         page.finish(&folder);
     }
-    if let Some(trouble) =
-        opened.and_then(|opened| opened.end(keep::state(solved.outcome.stop), solved.outcome.evaluations))
-    {
-        let _ = writeln!(std::io::stderr(), "warning: not every evaluation could be kept: {trouble}");
+    if let Some(trouble) = opened.end(keep::state(solved.outcome.stop), solved.outcome.evaluations) {
+        say(&format!("warning: not all of the run is in the database: {trouble}"));
     }
-    let plain = without_settings(&file.source.text, &settings);
-    if let Some(diagnosis) = &solved.diagnosis {
-        let (settings, study) = (&arguments.study.settings, solved.problem.study());
-        let original = Original { text: plain, settings, study, effects: &catalogue.effects };
-        leave(&folder, diagnosis, &original, &home, arguments.export.is_some())?;
+    if talks && written.is_ok() {
+        said.of(print(&format!("\nresult, report and plots are in {}\n", folder.display())));
     }
-    if solved.outcome.task == Task::Pareto {
-        leave_study(&folder, plain, &settings, &home)?;
-    }
-    if arguments.json {
-        print(&json);
-    } else if talks {
-        match &solved.diagnosis {
-            Some(found) => print(&diagnosis::text(found, solved.outcome.seconds)),
-            // Of inputs alone there are no criteria to show.
-            None if solved.outcome.task == Task::Excitation => {}
-            None => print(&tables::outcome(&solved.outcome)),
-        }
-        print(&findings::text(&solved.outcome));
-        print(&told);
-        print(&format!("\nresult, report and plots are in {}\n", folder.display()));
+    written?;
+    said.0?;
+    if solved.outcome.stop == Stop::Interrupted {
+        return Ok(ExitCode::from(4));
     }
     if solved.best.scaled.is_none() {
-        let why = solved.best.failures.first().map_or_else(String::new, |(_, failure)| format!(": {failure}"));
-        return Err(Trouble::Failure(format!(
-            "no point could be simulated{why}; the result is in {}",
-            folder.display()
-        )));
+        let failed = solved.best.failures.first().map(|(_, failure)| format!(": {failure}"));
+        let early = || if options.cancellation.requested().is_some() { " in time" } else { "" }.to_owned();
+        let why = failed.unwrap_or_else(early);
+        let folder = folder.display();
+        return Err(Trouble::Failure(format!("no point could be simulated{why}; the result is in {folder}")));
     }
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The first thing that could not be printed: a run goes on all the same.
+struct Said(Result<(), Trouble>);
+
+impl Default for Said {
+    fn default() -> Self {
+        Self(Ok(()))
+    }
+}
+
+impl Said {
+    fn of(&mut self, printed: Result<(), Trouble>) {
+        if self.0.is_ok() {
+            self.0 = printed;
+        }
+    }
+}
+
+/// A result in tables and sentences.
+fn shown(solved: &Solved) -> String {
+    let tables = match &solved.diagnosis {
+        Some(found) => diagnosis::text(found, solved.outcome.seconds),
+        // Without a verdict, or of inputs alone, there are no criteria to show.
+        None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => String::new(),
+        None => tables::outcome(&solved.outcome),
+    };
+    tables + &findings::text(&solved.outcome)
 }
 
 /// The live page of a run; its address is all that is said of it.
 fn watch(study: &Study, options: &Options) -> Result<Page, Trouble> {
     let cannot = |error| Trouble::Failure(format!("no page can be served for --watch: {error}"));
     let page = Page::open(study, options.solver.kind, options.max_evaluations).map_err(cannot)?;
-    let _ = writeln!(std::io::stderr(), "watch the run at {}", page.address());
+    say(&format!("watch the run at {}", page.address()));
     Ok(page)
 }
 
@@ -271,48 +318,85 @@ fn introduction(study: &Study, options: &Options) -> String {
     )
 }
 
-/// Everything a run leaves behind; result.json comes first, so that it is there whatever happens to the rest.
-fn write(folder: &Path, json: &str, solved: &Solved, text: &str) -> Result<(), Trouble> {
+/// How long a full disk is waited for.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Writes result.json; what was there before stays until all of it is on the disk.
+fn write_result(folder: &Path, solved: &Solved, patience: Duration) -> Result<(), Trouble> {
     std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-    let result = folder.join("result.json");
-    std::fs::write(&result, json).map_err(cannot_write(&result))?;
+    let path = folder.join("result.json");
+    let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
+    let until = Instant::now() + patience;
+    loop {
+        let written = Beside::create(&path).and_then(|mut file| {
+            std::io::Write::write_all(&mut file, json.as_bytes())?;
+            file.settle_on_disk()
+        });
+        match written {
+            Err(error)
+                if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+                    && Instant::now() < until =>
+            {
+                thread::sleep(Duration::from_millis(100));
+            }
+            written => return written.map_err(cannot_write(&path)),
+        }
+    }
+}
+
+/// Writes what a run leaves beside its result: evaluations, samples, report and plots, and what its task adds. `original` is the
+/// text of the study without settings, then the settings of the user and all of them.
+fn leave_all(
+    folder: &Path,
+    solved: &Solved,
+    (file, (plain, own, settings)): (&StudyFile, (&str, &[String], &[String])),
+    (home, catalogue): (&Home, &Catalogue),
+    export: bool,
+) -> Result<(), Trouble> {
     let evaluations = folder.join("evaluations.csv");
-    write_evaluations(&evaluations, solved).map_err(|e| cannot_write(&evaluations)(std::io::Error::other(e)))?;
+    write_evaluations(&evaluations, solved).map_err(cannot_write(&evaluations))?;
     if let Some(found) = &solved.outcome.found.monte_carlo {
         let samples = folder.join("samples.csv");
-        write_samples(&samples, found).map_err(|e| cannot_write(&samples)(std::io::Error::other(e)))?;
+        write_samples(&samples, found).map_err(cannot_write(&samples))?;
     }
     let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
-    Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text }
+    Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text: &file.source.text }
         .write(folder)
-        .map_err(cannot_write(folder))
+        .map_err(cannot_write(folder))?;
+    if let Some(diagnosis) = diagnosis {
+        let original = Original { text: plain, settings: own, study: problem.study(), effects: &catalogue.effects };
+        leave(folder, diagnosis, &original, home, export)?;
+    }
+    if outcome.task == Task::Pareto {
+        leave_study(folder, plain, settings, home)?;
+    }
+    Ok(())
 }
 
 /// One line per sample: uncertain parameters, criteria.
-fn write_samples(path: &Path, found: &MonteCarloReport) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_path(path)?;
-    let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
-    let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
-    writer.write_record(parameters.chain(criteria))?;
-    for (parameters, values) in &found.table {
-        writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
-    }
-    writer.flush()?;
-    Ok(())
+fn write_samples(path: &Path, found: &MonteCarloReport) -> std::io::Result<()> {
+    files::write_csv(path, |writer| {
+        let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
+        let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
+        writer.write_record(parameters.chain(criteria))?;
+        for (parameters, values) in &found.table {
+            writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
+        }
+        Ok(())
+    })
 }
 
 /// One line per point: tuners, criteria, objective, violation.
-fn write_evaluations(path: &Path, solved: &Solved) -> Result<(), csv::Error> {
+fn write_evaluations(path: &Path, solved: &Solved) -> std::io::Result<()> {
     let study = solved.problem.study();
-    let mut writer = csv::Writer::from_path(path)?;
-    let tuners = study.tuners.iter().map(|t| format!("{}[{}]", t.name, t.unit));
-    let rows = study.rows.iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
-    writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
-    for record in &solved.archive {
-        let numbers =
-            record.tuners.iter().chain(&record.values).chain([&record.merit.objective, &record.merit.violation]);
-        writer.write_record(numbers.map(f64::to_string))?;
-    }
-    writer.flush()?;
-    Ok(())
+    files::write_csv(path, |writer| {
+        let tuners = study.tuners.iter().map(|t| format!("{}[{}]", t.name, t.unit));
+        let rows = study.rows.iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
+        writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
+        for record in &solved.archive {
+            let merit = [&record.merit.objective, &record.merit.violation];
+            writer.write_record(record.tuners.iter().chain(&record.values).chain(merit).map(f64::to_string))?;
+        }
+        Ok(())
+    })
 }

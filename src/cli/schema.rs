@@ -12,6 +12,6 @@ pub(super) fn text(catalogue: &Catalogue) -> String {
 }
 
 pub(super) fn schema(catalogue: &Catalogue) -> Result<ExitCode, Trouble> {
-    print(&text(catalogue));
+    print(&text(catalogue))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -11,6 +11,7 @@ use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
 use super::{Trouble, cannot_write, print};
+use crate::files;
 use crate::report::{Curve, Ink, Plot, file_name, points};
 
 /// What is simulated.
@@ -53,14 +54,14 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         reports.retain(|report| wanted(&report.case));
         reports
     };
-    print(&criteria(&pick(&start), &pick(&here), "here"));
+    print(&criteria(&pick(&start), &pick(&here), "here"))?;
     let criteria = here
         .failures
         .iter()
         .filter(|(job, why)| matches!(why, Failure::Criterion(_)) && wanted(&study.cases[study.jobs[*job].case].name));
     let mut failed = here.scaled.is_none();
     for (job, why) in criteria {
-        print(&format!("no value in case {}: {why}\n", study.cases[study.jobs[*job].case].name));
+        print(&format!("no value in case {}: {why}\n", study.cases[study.jobs[*job].case].name))?;
     }
     for (job, plan) in study.jobs.iter().enumerate() {
         let (model, case) = (&study.models[plan.model].0, &study.cases[plan.case].name);
@@ -70,13 +71,13 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         match problem.analyse_all(job, &tuners, None) {
             Err(failure) => {
                 failed = true;
-                print(&format!("\n{model} in case {case}: {failure}\n"));
+                print(&format!("\n{model} in case {case}: {failure}\n"))?;
             }
             Ok(Analysis::Linear(system)) => {
-                print(&format!("\n{model} in case {case}: a linear system with {} states\n", system.states.len()));
+                print(&format!("\n{model} in case {case}: a linear system with {} states\n", system.states.len()))?;
             }
             Ok(Analysis::Time(response)) => {
-                print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)));
+                print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)))?;
                 if let Some(folder) = &arguments.out {
                     write(folder, &format!("{model}-{case}"), study, plan.model, &response, arguments.samples)?;
                 }
@@ -84,7 +85,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         }
     }
     if let Some(folder) = &arguments.out {
-        print(&format!("\nCSV files and plots are in {}\n", folder.display()));
+        print(&format!("\nCSV files and plots are in {}\n", folder.display()))?;
     }
     if failed {
         Err(Trouble::Failure("a simulation, or a criterion that counts, has no value".into()))
@@ -94,7 +95,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
 }
 
 /// Values of all tuners: the start values, and what the command line puts over them.
-fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Diagnostic> {
+fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Trouble> {
     let mut values = study.start();
     for text in given {
         let (name, value) = text.split_once('=').ok_or_else(|| {
@@ -121,7 +122,7 @@ fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Diagnostic> {
                 number(value),
                 number(low),
                 number(high)
-            ));
+            ))?;
         }
     }
     study.apply_ties(&mut values);
@@ -173,17 +174,15 @@ fn write(
     let units = &study.models[model].1.interface().signals;
     let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
     let path = folder.join(file_name(name) + ".csv");
-    let csv = || -> Result<(), csv::Error> {
-        let mut writer = csv::Writer::from_path(&path)?;
+    let written = files::write_csv(&path, |writer| {
         let names = response.traces.iter().zip(units).map(|((name, _), s)| format!("{name}[{}]", s.unit));
         writer.write_record(["t[s]".to_owned()].into_iter().chain(names))?;
         for (i, t) in times.iter().enumerate() {
             writer.write_record([t].into_iter().chain(columns.iter().map(|c| &c[i])).map(f64::to_string))?;
         }
-        writer.flush()?;
         Ok(())
-    };
-    csv().map_err(|error| cannot_write(&path)(std::io::Error::other(error)))?;
+    });
+    written.map_err(cannot_write(&path))?;
     let names: Vec<&str> = response.traces.iter().map(|(signal, _)| signal.as_str()).collect();
     for family in runs(&names) {
         let (first, last) = (family.start, family.end - 1);
@@ -203,7 +202,7 @@ fn write(
         };
         let file = if first == last { signal } else { names[first].split('[').next().unwrap_or_default().to_owned() };
         let path = folder.join(file_name(&format!("{name}-{file}")));
-        std::fs::write(path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
+        files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
         plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
     }
     Ok(())

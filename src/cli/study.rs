@@ -1,7 +1,9 @@
 //! Opens studies, and shows what is wrong with them.
 
+use std::borrow::Cow;
 use std::convert::Infallible;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Read, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,6 +11,8 @@ use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnost
 use mops_core::file::{Files, StudyFile};
 use mops_core::{Catalogue, Diagnostic, Shipped, Source, suggestion};
 
+use crate::files;
+use crate::plain::plain;
 use crate::toml_text::quoted;
 
 /// Which study, and what goes over it.
@@ -26,7 +30,7 @@ struct Folder(PathBuf);
 
 impl Files for Folder {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        std::fs::read(self.0.join(path))
+        files::read(&self.0.join(path))
     }
 
     fn show(&self, path: &str) -> String {
@@ -100,24 +104,38 @@ pub(super) fn open_as(
             return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &Inside(shipped));
         }
     };
-    let bytes = std::fs::read(&path).map_err(|error| no_study(catalogue, study, &error))?;
+    let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
 }
 
+/// Bytes of a study, at most: what has no end, such as a device, ends there.
+const LONGEST: u64 = 64 << 20;
+
+/// The bytes of a study; it may come out of a pipe.
+fn read_text(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LONGEST {
+        return Err(std::io::Error::other(format!("it is longer than {} MiB, and so no study", LONGEST >> 20)));
+    }
+    Ok(bytes)
+}
+
 /// Reads a study whose text is known; `home` is the file it was in, or the name of a shipped study.
 pub(super) fn read_at(
     catalogue: &Catalogue,
-    home: &str,
+    home: &Path,
     text: &str,
     settings: &[String],
 ) -> Result<StudyFile, Diagnostic> {
-    if let Some(shipped) = catalogue.studies.iter().find(|shipped| shipped.name == home) {
-        return mops_core::file::read(catalogue, &format!("{home}/study.toml"), text, settings, &Inside(*shipped));
+    let name = home.display().to_string();
+    if let Some(shipped) = catalogue.studies.iter().find(|shipped| home == Path::new(shipped.name)) {
+        return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, &Inside(*shipped));
     }
-    let folder = Path::new(home).parent().unwrap_or(Path::new("")).to_owned();
-    mops_core::file::read(catalogue, home, text, settings, &Folder(folder))
+    let folder = home.parent().unwrap_or(Path::new("")).to_owned();
+    mops_core::file::read(catalogue, &name, text, settings, &Folder(folder))
 }
 
 /// The text of a study file as it was before settings of the command line were put at its end.
@@ -144,25 +162,61 @@ fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagn
         .with_help(suggestion(study, names))
 }
 
+/// Characters of a line that are shown on either side of a mistake.
+const AROUND: usize = 200;
+
+/// A text as it is shown, with a place in it: without control characters, and of long lines what is near the place. The lines
+/// keep their numbers.
+fn shown(text: &str, place: Range<usize>) -> (String, Range<usize>) {
+    let (mut shown, mut start, mut end) = (String::new(), None, None);
+    let mut offset = 0;
+    for line in text.split_inclusive('\n') {
+        let after = offset + line.len();
+        let body = line.trim_end_matches('\n').trim_end_matches('\r');
+        let is_last = after == text.len() && body.len() == line.len();
+        // Of other lines the beginning is shown.
+        let is_here = (offset..after).contains(&place.start) || is_last && place.start == after;
+        let here = if is_here { (place.start - offset).min(body.len()) } else { 0 };
+        let from = body[..here].char_indices().rev().nth(AROUND - 1).map_or(0, |(i, _)| i);
+        let to = body[here..].char_indices().nth(AROUND).map_or(body.len(), |(i, _)| here + i);
+        shown.push_str(if from > 0 { "... " } else { "" });
+        for (i, c) in body[from..to].char_indices() {
+            let i = offset + from + i;
+            start = start.or((i >= place.start).then_some(shown.len()));
+            end = end.or((i >= place.end).then_some(shown.len()));
+            shown.push_str(&plain(c.encode_utf8(&mut [0; 4])));
+        }
+        start = start.or(is_here.then_some(shown.len()));
+        end = end.or((after > place.end || is_last).then_some(shown.len()));
+        shown.push_str(if to < body.len() { " ..." } else { "" });
+        shown.push_str(if is_last { "" } else { "\n" });
+        offset = after;
+    }
+    let start = start.unwrap_or(shown.len());
+    (shown, start..end.unwrap_or(start).max(start))
+}
+
 /// Shows a mistake on standard error: file, line and column, the fact, the source line, the way out.
 pub(super) fn show(diagnostic: &Diagnostic) {
-    let mut shown = MietteDiagnostic::new(diagnostic.message.clone());
-    shown.help.clone_from(&diagnostic.help);
+    let mut shown = MietteDiagnostic::new(plain(&diagnostic.message));
+    shown.help = diagnostic.help.as_deref().map(plain).map(Cow::into_owned);
     let report = match &diagnostic.place {
         Some((source, span)) if !source.text.is_empty() && *span != (0..0) => {
-            let label = diagnostic.label.clone().unwrap_or_else(|| "here".into());
+            let label =
+                diagnostic.label.as_deref().map_or_else(|| "here".to_owned(), |label| plain(label).into_owned());
             let (start, end) = (span.start.min(source.text.len()), span.end.min(source.text.len()));
             let (start, end) = (source.text.floor_char_boundary(start), source.text.floor_char_boundary(end));
             // A mistake spanning lines is pointed at by its first.
             let end = source.text[start..end].find('\n').map_or(end, |first| start + first);
-            shown.labels = Some(vec![LabeledSpan::at(start..end, label)]);
+            let (text, span) = self::shown(&source.text, start..end);
+            shown.labels = Some(vec![LabeledSpan::at(span, label)]);
             // N.B.: the line and the column are ours, since miette counts columns in bytes.
             let (line, column) = diagnostic.line_column().expect("it has a place");
-            let place = format!("{}:{line}:{column}", source.name);
-            Report::new(shown).with_source_code(NamedSource::new(place, source.text.clone()))
+            let place = format!("{}:{line}:{column}", plain(&source.name));
+            Report::new(shown).with_source_code(NamedSource::new(place, text))
         }
         Some((source, _)) => {
-            shown.message = format!("{}: {}", source.name, shown.message);
+            shown.message = format!("{}: {}", plain(&source.name), shown.message);
             Report::new(shown)
         }
         None => Report::new(shown),
@@ -172,7 +226,7 @@ pub(super) fn show(diagnostic: &Diagnostic) {
     let mut text = String::new();
     let handler = GraphicalReportHandler::new_themed(theme).without_primary_span_start().with_wrap_lines(false);
     if handler.render_report(&mut text, report.as_ref()).is_err() {
-        text = diagnostic.to_string();
+        text = plain(&diagnostic.to_string()).into_owned();
     }
     let _ = writeln!(stderr.lock(), "{text}");
 }

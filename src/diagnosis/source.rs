@@ -1,14 +1,18 @@
 //! The repaired study as a Rust program: tuners as values, models, experiments and criteria by their tables.
 
+use std::collections::HashSet;
+
 use mops_discrepancy::Diagnosis;
 use toml::{Table, Value};
 
 use super::words;
+use crate::plain::{acts, line};
 
 /// The program that does what the study file `text` says; its data are found from `folder`.
 pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String {
     let study: Table = text.parse().expect("the repaired study is right TOML");
-    let about = words::verdict(diagnosis).replace('`', "");
+    // N.B.: names come from a study of whoever wrote it. In comments they are one line, elsewhere literals.
+    let about = line(&words::verdict(diagnosis).replace('`', ""));
     let name = study.get("study").and_then(|s| s.get("name")).and_then(Value::as_str).unwrap_or_default();
     let mut imports = vec!["Draft", "Study", "Task", "TunerDraft"];
     let tuners = entries(&study, "tuners").map(|(name, tuner)| entry(name, &self::tuner(tuner)));
@@ -16,12 +20,12 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| tuners.contains(&format!("{name}::"))));
     imports.sort_unstable();
 
-    let mut constants = String::new();
+    let (mut constants, mut taken) = (String::new(), HashSet::new());
     let mut list = |section: &str, make: &dyn Fn(&str, &str) -> String| -> Vec<String> {
         let mut items = Vec::new();
         for (name, table) in entries(&study, section) {
-            let constant = constant(section, name);
-            constants += &format!("\n/// `{name}`.\nconst {constant}: &str = {};\n", raw(&written(table)));
+            let constant = unique(constant(section, name), &mut taken);
+            constants += &format!("\n/// `{}`.\nconst {constant}: &str = {};\n", line(name), raw(&written(table)));
             items.push(make(name, &constant));
         }
         items
@@ -121,8 +125,11 @@ fn written(table: &Value) -> String {
     table.as_table().map(|table| toml::to_string(table).expect("it was TOML")).unwrap_or_default()
 }
 
-/// A text as a raw literal of Rust.
+/// A text as a raw literal of Rust; with escapes, where it has characters that act.
 fn raw(text: &str) -> String {
+    if text.contains(acts) {
+        return format!("{:?}", text.trim_start());
+    }
     let hashes =
         (1..).map(|n| "#".repeat(n)).find(|hashes| !text.contains(&format!("\"{hashes}"))).expect("one is enough");
     format!("r{hashes}\"\n{}{}{hashes}", text.trim_start(), '"')
@@ -136,6 +143,12 @@ fn constant(section: &str, name: &str) -> String {
     };
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' };
     format!("{}_{}", kind.to_uppercase(), name.chars().map(letter).collect::<String>())
+}
+
+/// A name that is not taken yet: others may differ from it in what a constant cannot show.
+fn unique(name: String, taken: &mut HashSet<String>) -> String {
+    let names = std::iter::once(name.clone()).chain((2..).map(|i| format!("{name}_{i}")));
+    names.into_iter().find(|name| taken.insert(name.clone())).expect("some number is free")
 }
 
 /// A tuner as a value of Rust.

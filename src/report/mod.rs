@@ -16,6 +16,7 @@ mod legend;
 mod matrix;
 mod numbers;
 mod page;
+mod pictures;
 mod plot;
 mod png;
 mod range;
@@ -43,9 +44,12 @@ use std::path::Path;
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 use mops_discrepancy::Diagnosis;
 
+use crate::files;
+
 pub(crate) use bode::{Sweep, bode, frequencies};
 pub(crate) use numbers::{FileNames, apart, file_name, significant};
 pub(crate) use page::document;
+use pictures::Pictures;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
@@ -109,12 +113,16 @@ impl Report<'_> {
         let groups = groups.chain(pictures.robustness.iter().map(|section| &section.group));
         let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
         let mut names = FileNames::default();
-        for (name, plot) in groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots) {
-            let name = names.unique(name);
-            fs::write(plots.join(format!("{name}.svg")), plot.svg())?;
+        let pictures_of_all = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
+        let all: Vec<(String, &Plot)> = pictures_of_all.map(|(name, plot)| (names.unique(name), plot)).collect();
+        let earlier = Pictures::of(&plots);
+        earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
+        for (name, plot) in &all {
+            files::write(&plots.join(format!("{name}.svg")), plot.svg())?;
             plot.write_png(&plots.join(format!("{name}.png")))?;
         }
-        fs::write(folder.join("report.html"), page::page(self, &pictures).into_string())
+        earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
+        files::write(&folder.join("report.html"), page::page(self, &pictures).into_string())
     }
 
     /// Whether a search stands behind the result, and nothing but it.

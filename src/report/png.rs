@@ -12,6 +12,7 @@ use super::clip::{Point, distance};
 use super::plot::Ink;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
+use crate::files;
 
 /// Pixels per unit of the scene.
 const SCALE: f64 = 2.0;
@@ -27,12 +28,14 @@ pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
         let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
     });
     let size = SIZE.map(|length| (SCALE * length) as u32);
-    let mut paper = BitMapBackend::new(path, (size[0], size[1]));
-    paper.draw_rect((0, 0), (size[0] as i32, size[1] as i32), &WHITE, true).map_err(failed)?;
-    for mark in &scene.marks {
-        draw(&mut paper, mark)?;
-    }
-    paper.present().map_err(failed)
+    files::make(path, |path| {
+        let mut paper = BitMapBackend::new(path, (size[0], size[1]));
+        paper.draw_rect((0, 0), (size[0] as i32, size[1] as i32), &WHITE, true).map_err(failed)?;
+        for mark in &scene.marks {
+            draw(&mut paper, mark)?;
+        }
+        paper.present().map_err(failed)
+    })
 }
 
 fn failed(error: impl std::error::Error) -> io::Error {

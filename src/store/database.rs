@@ -1,14 +1,20 @@
 //! The tables of `evaluations.sqlite`, and every statement that reads or writes them.
 
 use std::collections::HashMap;
-use std::path::Path;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use mops_core::file::digest;
 use mops_core::{Failure, JobValues, Known, Missed, RowSlopes, Study, Value};
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
+use rusqlite::types::{ToSqlOutput, ValueRef};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, ToSql, params};
 use serde_json::json;
 
 use super::bytes;
+use crate::files::{beside, is_at};
 
 /// `PRAGMA application_id`: the letters of mops.
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
@@ -57,6 +63,17 @@ CREATE TABLE slopes (
 /// An open database.
 pub(crate) struct Database {
     connection: Connection,
+    /// Where it is, and the file that had this name when it was opened; none in memory.
+    ///
+    /// N.B.: not an open file: to close one takes the locks of all connections of this process to it.
+    place: Option<(PathBuf, Metadata)>,
+}
+
+/// A new database that is not yet at its place.
+pub(super) struct Draft {
+    beside: PathBuf,
+    path: PathBuf,
+    run: i64,
 }
 
 /// How a run stands.
@@ -88,7 +105,7 @@ impl RunState {
         Self::ALL.iter().find(|(state, _)| *state == self).map_or("running", |(_, name)| name)
     }
 
-    fn of(name: &str) -> Self {
+    pub(super) fn of(name: &str) -> Self {
         Self::ALL.iter().find(|(_, known)| *known == name).map_or(Self::Running, |(state, _)| *state)
     }
 }
@@ -100,7 +117,7 @@ pub(crate) struct RunRow {
     pub state: RunState,
     pub mops: String,
     pub command: String,
-    pub home: String,
+    pub home: PathBuf,
     pub settings: Vec<String>,
     pub name: String,
     pub task: String,
@@ -111,6 +128,13 @@ pub(crate) struct RunRow {
     pub max_evaluations: usize,
     pub begin: Option<Vec<f64>>,
     pub evaluations: usize,
+}
+
+impl RunRow {
+    /// What the run was asked, as a digest: a result with the same one belongs to it.
+    pub fn id(&self) -> String {
+        digest(self.identity.as_bytes())
+    }
 }
 
 /// A point as it is written.
@@ -126,19 +150,37 @@ pub(super) type Points = HashMap<Vec<u64>, Known>;
 pub(super) type Slopes = HashMap<(Vec<u64>, u64), Option<RowSlopes>>;
 
 impl Database {
-    /// Makes a new one.
+    /// An empty one in memory.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub(super) fn in_memory() -> rusqlite::Result<Self> {
+        let connection = Connection::open_in_memory()?;
+        prepare(&connection)?;
+        Ok(Self { connection, place: None })
+    }
+
+    /// Removes what a run left that was killed while it made its database.
+    pub(super) fn clear_draft(path: &Path) {
+        for left in with_companions(&beside(path)) {
+            let _ = fs::remove_file(left);
+        }
+    }
+
+    /// Makes a new one that holds this run and nothing else. Nobody sees a half of it: it is made beside its place, in one
+    /// transaction, and moved by [`Draft::settle`].
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn create(path: &Path) -> rusqlite::Result<Self> {
-        let connection = Connection::open(path)?;
-        // A killed process loses nothing that is committed; a machine without power, the last moments.
-        connection.pragma_update(None, "journal_mode", "WAL")?;
-        connection.pragma_update(None, "synchronous", "NORMAL")?;
-        connection.pragma_update(None, "application_id", APPLICATION)?;
-        connection.pragma_update(None, "user_version", FORMAT)?;
-        connection.execute_batch(&format!("BEGIN; {TABLES} COMMIT;"))?;
-        Ok(Self { connection })
+    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
+        let beside = beside(path);
+        let mut connection = Connection::open(&beside)?;
+        let transaction = connection.transaction()?;
+        prepare(&transaction)?;
+        let run = begin(&transaction, run)?;
+        transaction.commit()?;
+        connection.close().map_err(|(_, error)| error)?;
+        Ok(Draft { beside, path: path.to_owned(), run })
     }
 
     /// Opens one that is there, to write or only to read; `None` where the file is none of mops, or of another format.
@@ -146,18 +188,95 @@ impl Database {
     /// # Errors
     /// The file cannot be read.
     pub fn open(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
+        match Self::read(path, writes) {
+            Err(error) if error.sqlite_error_code() == Some(ErrorCode::NotADatabase) => Ok(None),
+            read => read,
+        }
+    }
+
+    fn read(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
         let mode = if writes { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
         let connection = Connection::open_with_flags(path, mode | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
-        connection.busy_timeout(Duration::from_secs(5))?;
+        connection.busy_timeout(WAITS)?;
         let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
         if pragma("application_id")? != APPLICATION || pragma("user_version")? != FORMAT {
             return Ok(None);
         }
-        if writes {
-            connection.pragma_update(None, "journal_mode", "WAL")?;
-            connection.pragma_update(None, "synchronous", "NORMAL")?;
+        let place = fs::metadata(path).ok().map(|file| (path.to_owned(), file));
+        Ok(Some(Self { connection, place }))
+    }
+
+    /// Whether no run was ever entered there: a run was killed while it began, in a version that made its database in parts.
+    pub(super) fn is_blank(path: &Path) -> bool {
+        let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
+        let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return false };
+        match count(&connection, "SELECT count(*) FROM sqlite_schema") {
+            Ok(0) => true,
+            Ok(_) => matches!(Self::open(path, false), Ok(Some(ours)) if matches!(ours.last_run(), Ok(None))),
+            Err(_) => false,
         }
-        Ok(Some(Self { connection }))
+    }
+
+    /// Prepares it for a run that writes often. A killed process loses nothing that is committed; a machine without power,
+    /// the last moments.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn write_ahead(&self) -> rusqlite::Result<()> {
+        self.connection.pragma_update(None, "journal_mode", "WAL")?;
+        self.connection.pragma_update(None, "synchronous", "NORMAL")
+    }
+
+    /// Whether a commit waits for others who have the file, instead of failing at once.
+    ///
+    /// # Errors
+    /// Never, as far as is known.
+    pub(super) fn waits(&self, waits: bool) -> rusqlite::Result<()> {
+        self.connection.busy_timeout(if waits { WAITS } else { Duration::ZERO })
+    }
+
+    /// Whether its file is still the one that has its name.
+    pub(super) fn is_in_place(&self) -> bool {
+        self.place.as_ref().is_none_or(|(path, file)| is_at(path, file))
+    }
+
+    /// Writes all of it again where its file was removed. `false` where another file has its place.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn restore(&mut self) -> io::Result<bool> {
+        let Some((path, _)) = self.place.as_ref().filter(|(path, file)| !is_at(path, file)) else { return Ok(true) };
+        if fs::symlink_metadata(path).is_ok() {
+            return Ok(false);
+        }
+        let path = path.clone();
+        let beside = beside(&path);
+        let _ = fs::remove_file(&beside);
+        let copied = beside.to_str().ok_or_else(|| io::Error::other("its path is no text"));
+        self.connection.execute("VACUUM INTO ?", [copied?]).map_err(io::Error::other)?;
+        fs::rename(&beside, &path)?;
+        if let Some(again) = Self::open(&path, true).map_err(io::Error::other)? {
+            *self = again;
+        }
+        Ok(true)
+    }
+
+    /// Brings all of it into one file, which can be moved. `false` where somebody else has it open.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn gather(&self) -> rusqlite::Result<bool> {
+        let until = Instant::now() + WAITS;
+        loop {
+            let mode: rusqlite::Result<String> =
+                self.connection.pragma_update_and_check(None, "journal_mode", "DELETE", |row| row.get(0));
+            match mode {
+                Ok(mode) if mode == "delete" => return Ok(true),
+                Err(error) if !is_passing(&error) => return Err(error),
+                _ if Instant::now() > until => return Ok(false),
+                _ => thread::sleep(Duration::from_millis(50)),
+            }
+        }
     }
 
     /// The run that began last.
@@ -181,27 +300,7 @@ impl Database {
 
     /// Enters a run that begins; its number.
     pub(super) fn begin(&self, run: &RunRow) -> rusqlite::Result<i64> {
-        self.connection.execute(
-            "INSERT INTO runs (begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
-             max_evaluations, begin, evaluations, reused) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0)",
-            params![
-                run.begun,
-                RunState::Running.name(),
-                run.mops,
-                run.command,
-                run.home,
-                json!(run.settings).to_string(),
-                run.name,
-                run.task,
-                run.text,
-                run.identity,
-                run.seed.cast_signed(),
-                run.solver,
-                integer(run.max_evaluations),
-                run.begin.as_deref().map(bytes::of_numbers),
-            ],
-        )?;
-        Ok(self.connection.last_insert_rowid())
+        begin(&self.connection, run)
     }
 
     /// Writes how a run ended; the number of its points where it told of none before.
@@ -214,14 +313,14 @@ impl Database {
         Ok(())
     }
 
-    /// Writes points and derivatives, and how many points the run has, all or nothing.
+    /// Writes points and derivatives, and how many points the run has where that is known, all or nothing.
     pub(super) fn write(
         &mut self,
         run: i64,
         rows: usize,
         points: &[PointRow],
         slopes: &[(Vec<u64>, f64, Option<RowSlopes>)],
-        evaluations: usize,
+        evaluations: Option<usize>,
     ) -> rusqlite::Result<()> {
         let transaction = self.connection.transaction()?;
         {
@@ -239,8 +338,10 @@ impl Database {
             for (tuners, reach, slopes) in slopes {
                 insert.execute(params![bytes::of_key(tuners), reach, slopes.as_ref().map(bytes::of_slopes)])?;
             }
-            let mut update = transaction.prepare("UPDATE runs SET evaluations = ? WHERE id = ?")?;
-            update.execute(params![integer(evaluations), run])?;
+            if let Some(evaluations) = evaluations {
+                let mut update = transaction.prepare("UPDATE runs SET evaluations = ? WHERE id = ?")?;
+                update.execute(params![integer(evaluations), run])?;
+            }
         }
         transaction.commit()
     }
@@ -301,6 +402,93 @@ impl Database {
     }
 }
 
+impl Drop for Draft {
+    fn drop(&mut self) {
+        Database::clear_draft(&self.path);
+    }
+}
+
+impl Draft {
+    /// Moves the database to its place and opens it there; with the number of its run.
+    ///
+    /// # Errors
+    /// It cannot be moved, or opened.
+    pub(super) fn settle(self) -> io::Result<(Database, i64)> {
+        fs::rename(&self.beside, &self.path)?;
+        let database = Database::open(&self.path, true).map_err(io::Error::other)?;
+        Ok((database.ok_or_else(|| io::Error::other("it was replaced at once"))?, self.run))
+    }
+}
+
+/// How long others who have the file are waited for.
+const WAITS: Duration = Duration::from_secs(5);
+
+/// Whether what went wrong may pass: somebody else has the file, or the disk is full.
+pub(super) fn is_passing(error: &rusqlite::Error) -> bool {
+    let passing = [ErrorCode::DatabaseBusy, ErrorCode::DatabaseLocked, ErrorCode::DiskFull];
+    error.sqlite_error_code().is_some_and(|code| passing.contains(&code))
+}
+
+/// A database with the files that SQLite keeps beside it.
+pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
+    ["", "-wal", "-shm", "-journal"].map(|end| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(end);
+        PathBuf::from(name)
+    })
+}
+
+/// Makes the tables.
+fn prepare(connection: &Connection) -> rusqlite::Result<()> {
+    connection.pragma_update(None, "application_id", APPLICATION)?;
+    connection.pragma_update(None, "user_version", FORMAT)?;
+    connection.execute_batch(TABLES)
+}
+
+/// Enters a run that begins; its number.
+fn begin(connection: &Connection, run: &RunRow) -> rusqlite::Result<i64> {
+    connection.execute(
+        "INSERT INTO runs (begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
+         max_evaluations, begin, evaluations, reused) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0)",
+        params![
+            run.begun,
+            RunState::Running.name(),
+            run.mops,
+            run.command,
+            Home(&run.home),
+            json!(run.settings).to_string(),
+            run.name,
+            run.task,
+            run.text,
+            run.identity,
+            run.seed.cast_signed(),
+            run.solver,
+            integer(run.max_evaluations),
+            run.begin.as_deref().map(bytes::of_numbers),
+        ],
+    )?;
+    Ok(connection.last_insert_rowid())
+}
+
+/// A path in a column: as text, or by its bytes where it is none.
+struct Home<'p>(&'p Path);
+
+impl ToSql for Home<'_> {
+    fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
+        let bytes = self.0.as_os_str().as_encoded_bytes();
+        Ok(ToSqlOutput::Borrowed(self.0.to_str().map_or(ValueRef::Blob(bytes), |text| ValueRef::Text(text.as_bytes()))))
+    }
+}
+
+fn home_of(value: ValueRef<'_>) -> rusqlite::Result<PathBuf> {
+    #[cfg(unix)]
+    if let ValueRef::Blob(bytes) = value {
+        use std::os::unix::ffi::OsStrExt;
+        return Ok(PathBuf::from(std::ffi::OsStr::from_bytes(bytes)));
+    }
+    Ok(PathBuf::from(value.as_str()?))
+}
+
 /// Seconds since 1970-01-01 UTC.
 pub(super) fn now() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
@@ -313,7 +501,7 @@ fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
         state: RunState::of(&row.get::<_, String>(1)?),
         mops: row.get(2)?,
         command: row.get(3)?,
-        home: row.get(4)?,
+        home: home_of(row.get_ref(4)?)?,
         settings: serde_json::from_str(&row.get::<_, String>(5)?).unwrap_or_default(),
         name: row.get(6)?,
         task: row.get(7)?,
@@ -352,7 +540,9 @@ fn columns(known: &Known, rows: usize) -> Columns {
                     Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
                     Failure::EventsAccumulate(t, why) => ("events-accumulate", Some(t), Some(why)),
                     Failure::Undefined(why) => ("undefined", None, Some(why)),
+                    Failure::RecordLimit(t) => ("record-limit", Some(t), None),
                     Failure::Criterion(why) => ("criterion", None, Some(why)),
+                    Failure::Cancelled => continue,
                 };
                 // As text, which keeps every bit and what is no number.
                 failures.push(json!({ "job": job, "kind": kind, "at": at.map(f64::to_string), "why": why }));
@@ -436,6 +626,7 @@ fn failure_of(written: &serde_json::Value) -> Failure {
         Some("step-limit") => Failure::StepLimit(at),
         Some("step-too-small") => Failure::StepTooSmall(at),
         Some("events-accumulate") => Failure::EventsAccumulate(at, why),
+        Some("record-limit") => Failure::RecordLimit(at),
         Some("criterion") => Failure::Criterion(why),
         _ => Failure::Undefined(why),
     }

@@ -6,15 +6,19 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, PoisonError, RwLock};
+use std::thread;
+use std::time::{Duration, Instant};
 
-use mops_core::{Diagnostic, Merit, Problem, Store, Study, Watch};
+use mops_core::{Cancellation, Diagnostic, Merit, Problem, Store, Study, Watch};
 
+use super::aside::make_room;
 use super::bytes;
-use super::database::{Database, Points, RunRow, RunState, Slopes, now};
+use super::claim::Claim;
+use super::database::{Database, Points, RunRow, RunState, Slopes, is_passing, now};
+use super::ending::Ending;
 use super::identity::Identity;
-use super::lock::Lock;
 use super::memory::{Memory, Message, ROOM};
-use super::writer::{Behind, write};
+use super::writer::{Behind, Unwritten, write};
 use super::{FILE, file};
 
 /// Messages that wait for the writer, at most: a run that is faster than the disk waits for it.
@@ -29,9 +33,10 @@ pub(crate) enum Start {
     Resume,
     /// What a run of a study with the same models left in this folder.
     Reuse(PathBuf),
-    /// As [`Start::Resume`], to look at: nothing is written.
-    Look,
 }
+
+/// How long a lock or a full disk is waited for once the run is over.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Why a database is not opened.
 pub(crate) enum Refusal {
@@ -54,14 +59,17 @@ pub(crate) struct Keeper {
     rows: usize,
     memory: Arc<Memory>,
     messages: Receiver<Message>,
-    folder: PathBuf,
     /// Whether there was no database before.
     new: bool,
     /// What the user may want to know.
     pub note: Option<String>,
+    /// What the run was asked, as a digest; and when it began.
+    pub id: String,
+    begun: i64,
     /// The point of the unit box where the run begins, if not at the start values.
     pub begin: Option<Vec<f64>>,
-    lock: Option<Lock>,
+    /// The folder; none where it is only looked at.
+    claim: Option<Claim>,
 }
 
 /// The database of a run that is over.
@@ -72,11 +80,10 @@ pub(crate) struct Opened {
     pub reused: usize,
     /// Points that were simulated.
     pub simulated: usize,
-    /// Why points were not written.
-    pub trouble: Option<String>,
-    folder: PathBuf,
+    unwritten: Option<Unwritten>,
+    begun: i64,
     new: bool,
-    lock: Option<Lock>,
+    claim: Option<Claim>,
 }
 
 impl Keeper {
@@ -91,27 +98,17 @@ impl Keeper {
         identity: &Identity,
         run: &RunRow,
     ) -> Result<Self, Refusal> {
-        if *start == Start::Look {
-            return Self::look(folder, study, identity);
-        }
-        let cannot =
-            |error: std::io::Error| Refusal::Failure(format!("{} cannot be written: {error}", folder.display()));
-        fs::create_dir_all(folder).map_err(cannot)?;
-        let lock = Lock::take(folder).map_err(cannot)?.ok_or_else(|| {
-            Diagnostic::new(format!("another run is writing in {}", folder.display()))
-                .with_help("wait for it, or choose another folder with --out")
-        })?;
+        let claim = claim(folder)?;
+        Database::clear_draft(&file(folder));
+        Ending::clear(folder);
         let (mut note, mut known) = (None, None);
         let kept = match start {
-            Start::Fresh => {
-                note = put_away(folder)?;
-                None
-            }
-            Start::Look | Start::Resume if !file(folder).is_file() => {
+            Start::Fresh => None,
+            Start::Resume if holds_nothing(folder) => {
                 note = Some(format!("{} holds no evaluations yet: the run begins anew", folder.display()));
                 None
             }
-            Start::Look | Start::Resume => Some(continued(folder, identity)?),
+            Start::Resume => Some(continued(folder, identity)?),
             Start::Reuse(from) => {
                 let source = reused(from, identity)?;
                 if same_folder(from, folder) {
@@ -127,46 +124,59 @@ impl Keeper {
                     Some(database)
                 } else {
                     known = Some(source);
-                    note = put_away(folder)?;
                     None
                 }
             }
         };
-        let new = kept.is_none();
-        let database = match kept {
-            Some(database) => database,
-            None => Database::create(&file(folder)).map_err(|error| trouble(folder, &error))?,
+        let cannot = |error: rusqlite::Error| trouble(folder, &error);
+        let (points, slopes) = match known.as_ref().or(kept.as_ref()) {
+            Some(source) => read(source, study, identity).map_err(cannot)?,
+            None => (Points::new(), Slopes::new()),
         };
-        let (points, slopes) =
-            read(known.as_ref().unwrap_or(&database), study, identity).map_err(|e| trouble(folder, &e))?;
-        let taken = database.room_taken().map_err(|error| trouble(folder, &error))?;
-        let begin = match start {
-            Start::Fresh => None,
-            // A run that is continued begins where it began.
-            Start::Look | Start::Resume => {
-                database.last_run().map_err(|e| trouble(folder, &e))?.and_then(|run| run.begin)
-            }
-            Start::Reuse(_) => {
+        let begin = match (start, &kept) {
+            (Start::Reuse(_), _) => {
                 let problem = Problem::new(Arc::new(study.clone()));
                 Some(best(&points, &problem).unwrap_or_else(|| problem.start()))
             }
+            // A run that is continued begins where it began.
+            (_, Some(kept)) => kept.last_run().map_err(cannot)?.and_then(|run| run.begin),
+            (_, None) => None,
         };
         let run = RunRow { begin: begin.clone(), ..run.clone() };
-        let run = database.begin(&run).map_err(|error| trouble(folder, &error))?;
-        let (memory, messages) = memory(points, slopes, known.is_some(), taken);
-        let (rows, folder) = (study.rows.len(), folder.to_owned());
-        Ok(Self { database, run, rows, memory, messages, folder, new, note, begin, lock: Some(lock) })
+        let (new, id, begun) = (kept.is_none(), run.id(), run.begun);
+        let (database, run) = match kept {
+            Some(database) => {
+                let run = database.begin(&run).map_err(cannot)?;
+                (database, run)
+            }
+            None => {
+                let draft = Database::draft(&file(folder), &run).map_err(cannot)?;
+                note = make_room(folder)?.or(note);
+                let cannot = |error| Refusal::Failure(format!("{} cannot be written: {error}", file(folder).display()));
+                draft.settle().map_err(cannot)?
+            }
+        };
+        let taken = database.room_taken().map_err(cannot)?;
+        database.write_ahead().and_then(|()| database.waits(false)).map_err(cannot)?;
+        let (memory, messages) = memory((points, slopes), known.is_some(), taken, None);
+        let rows = study.rows.len();
+        Ok(Self { database, run, rows, memory, messages, new, note, id, begun, begin, claim: Some(claim) })
     }
 
-    /// What is known in a folder, with nothing written there.
-    fn look(folder: &Path, study: &Study, identity: &Identity) -> Result<Self, Refusal> {
+    /// What is known in a folder, with nothing written there. At a point that is not known `end` is asked to end the run.
+    ///
+    /// # Errors
+    /// It holds something else, or cannot be read.
+    pub fn look(folder: &Path, study: &Study, identity: &Identity, end: &Cancellation) -> Result<Self, Refusal> {
         let source = reused(folder, identity)?;
-        let (points, slopes) = read(&source, study, identity).map_err(|error| trouble(folder, &error))?;
-        let (memory, messages) = memory(points, slopes, false, 0);
-        let begin = source.last_run().map_err(|error| trouble(folder, &error))?.and_then(|run| run.begin);
-        let database = Database::create(Path::new(":memory:")).map_err(|error| trouble(folder, &error))?;
-        let (rows, folder) = (study.rows.len(), folder.to_owned());
-        Ok(Self { database, run: 0, rows, memory, messages, folder, new: false, note: None, begin, lock: None })
+        let cannot = |error: rusqlite::Error| trouble(folder, &error);
+        let known = read(&source, study, identity).map_err(cannot)?;
+        let (memory, messages) = memory(known, false, 0, Some(end.clone()));
+        let begin = source.last_run().map_err(cannot)?.and_then(|run| run.begin);
+        let database = Database::in_memory().map_err(cannot)?;
+        let rows = study.rows.len();
+        let id = String::new();
+        Ok(Self { database, run: 0, rows, memory, messages, new: false, note: None, id, begun: 0, begin, claim: None })
     }
 
     /// Where the run finds and keeps its points.
@@ -181,16 +191,16 @@ impl Keeper {
 
     /// Does `task`, which is watched by `watch`: it is told only of points that are written.
     pub fn run<T>(self, watch: &dyn Watch, task: impl FnOnce(&dyn Watch) -> T) -> (T, Opened) {
-        let Self { database, run, rows, memory, messages, folder, new, lock, .. } = self;
-        std::thread::scope(|scope| {
-            let writer = scope.spawn(move || write((database, run, rows), &messages, watch));
+        let Self { database, run, rows, memory, messages, begun, new, claim, .. } = self;
+        thread::scope(|scope| {
+            let writer = scope.spawn(move || write((database, run, rows), &messages, watch, PATIENCE));
             let end = End(&memory);
             let done = task(&Behind { memory: &memory, watch });
             drop(end);
-            let (database, trouble) = writer.join().expect("the writer does not panic");
+            let (database, unwritten) = writer.join().expect("the writer does not panic");
             let count = |counter: &AtomicUsize| counter.load(Ordering::Relaxed);
             let (reused, simulated) = (count(&memory.reused), count(&memory.simulated));
-            (done, Opened { database, run, reused, simulated, trouble, folder, new, lock })
+            (done, Opened { database, run, reused, simulated, unwritten, begun, new, claim })
         })
     }
 }
@@ -205,31 +215,109 @@ impl Drop for End<'_> {
 }
 
 impl Opened {
-    /// Enters how the run ended, and how many points it has.
+    /// Makes sure that the folder is still that of this run, and that its database is there, before its result is written:
+    /// somebody may have removed them while the run went. What the user must know.
+    ///
+    /// # Errors
+    /// Another run has the folder by now, or it cannot be made again.
+    pub fn hold(&mut self) -> Result<Option<String>, String> {
+        let Some(claim) = &mut self.claim else { return Ok(None) };
+        let folder = claim.folder().display().to_string();
+        match claim.renew() {
+            Ok(true) => {}
+            Ok(false) => {
+                return Err(format!("{folder} was removed while the run went, and another run writes there now"));
+            }
+            Err(error) => {
+                return Err(format!("{folder} was removed while the run went, and cannot be made again: {error}"));
+            }
+        }
+        if self.database.is_in_place() {
+            return Ok(None);
+        }
+        Ok(Some(match self.database.restore() {
+            Ok(true) => format!("{folder}/{FILE} was removed while the run went; it is written again"),
+            Ok(false) => format!("{folder}/{FILE} is another file now: the evaluations of this run are not kept"),
+            Err(error) => {
+                format!("{folder}/{FILE} was removed while the run went, and cannot be written again: {error}")
+            }
+        }))
+    }
+
+    /// Whether every point of the run is written.
+    pub fn is_whole(&self) -> bool {
+        self.unwritten.is_none()
+    }
+
+    /// Enters how the run ended, and how many points it has; why not all of it is kept, if it is not.
     pub fn end(self, state: RunState, evaluations: usize) -> Option<String> {
-        let ended = self.database.end(self.run, state, self.reused, evaluations).err().map(|error| error.to_string());
-        self.trouble.or(ended)
+        let until = Instant::now() + PATIENCE;
+        let ended = loop {
+            match self.database.end(self.run, state, self.reused, evaluations) {
+                Err(error) if is_passing(&error) && Instant::now() < until && self.unwritten.is_none() => {
+                    thread::sleep(Duration::from_millis(50));
+                }
+                ended => break ended,
+            }
+        };
+        if let (Err(_), Some(claim)) = (&ended, &self.claim) {
+            Ending::note(claim.folder(), self.begun, state, evaluations);
+        }
+        match (self.unwritten, ended) {
+            (Some(Unwritten { points, why }), _) => Some(format!("{points} evaluations could not be kept: {why}")),
+            (None, Err(error)) => Some(format!("the end of the run could not be entered: {error}")),
+            (None, Ok(())) => None,
+        }
     }
 
     /// Takes back what was made for a run that did not begin.
     pub fn withdraw(self) {
-        let Self { database, folder, new, lock, .. } = self;
+        let Self { database, new, claim, .. } = self;
         drop(database);
+        let Some(claim) = claim else { return };
+        let folder = claim.folder().to_owned();
         if new {
             let _ = fs::remove_file(file(&folder));
         }
-        drop(lock);
+        drop(claim);
         // A folder with something in it stays.
         let _ = fs::remove_dir(&folder);
     }
 }
 
-fn memory(points: Points, slopes: Slopes, foreign: bool, taken: usize) -> (Arc<Memory>, Receiver<Message>) {
+/// Claims the folder of a run.
+///
+/// # Errors
+/// Another run has it, or nothing can be written there.
+pub(crate) fn claim(folder: &Path) -> Result<Claim, Refusal> {
+    let cannot = |error: std::io::Error| Refusal::Failure(format!("{} cannot be written: {error}", folder.display()));
+    Claim::take(folder).map_err(cannot)?.ok_or_else(|| {
+        Diagnostic::new(format!("another run is writing in {}", folder.display()))
+            .with_help("wait for it, or choose another folder with --out")
+            .into()
+    })
+}
+
+/// Whether a folder has no database, or one in which no run was ever entered.
+fn holds_nothing(folder: &Path) -> bool {
+    let path = file(folder);
+    match fs::symlink_metadata(&path) {
+        Err(_) => true,
+        Ok(_) => Database::is_blank(&path),
+    }
+}
+
+fn memory(
+    (points, slopes): (Points, Slopes),
+    foreign: bool,
+    taken: usize,
+    closed: Option<Cancellation>,
+) -> (Arc<Memory>, Receiver<Message>) {
     let (sender, messages) = sync_channel(QUEUE);
     let (reused, simulated) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let room = AtomicUsize::new(ROOM.saturating_sub(taken));
     let (points, slopes) = (RwLock::new(points), RwLock::new(slopes));
-    (Arc::new(Memory { points, slopes, foreign, sender, room, reused, simulated }), messages)
+    (Arc::new(Memory { points, slopes, foreign, closed, sender, room, reused, simulated }), messages)
 }
 
 /// The points and derivatives of a database that hold for a study.
@@ -296,33 +384,6 @@ fn opened(folder: &Path, writes: bool) -> Result<Database, Refusal> {
     })
 }
 
-/// Makes room for a new database; one of a run that came to no end is kept beside it.
-fn put_away(folder: &Path) -> Result<Option<String>, Refusal> {
-    let path = file(folder);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let unfinished = Database::open(&path, true).ok().flatten().and_then(|old| {
-        let run = old.last_run().ok().flatten()?;
-        let count = old.count().ok().filter(|count| *count > 0)?;
-        matches!(run.state, RunState::Running | RunState::Interrupted).then_some(count)
-    });
-    let cannot = |error: std::io::Error| Refusal::Failure(format!("{} cannot be replaced: {error}", path.display()));
-    for end in ["-wal", "-shm"] {
-        let _ = fs::remove_file(folder.join(format!("{FILE}{end}")));
-    }
-    let Some(count) = unfinished else {
-        fs::remove_file(&path).map_err(cannot)?;
-        return Ok(None);
-    };
-    let aside = folder.join("evaluations.previous.sqlite");
-    fs::rename(&path, &aside).map_err(cannot)?;
-    Ok(Some(format!(
-        "the {count} evaluations of an unfinished run are now in {}; --resume would have continued it",
-        aside.display()
-    )))
-}
-
 fn same_folder(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
@@ -377,8 +438,8 @@ pub(crate) fn row(identity: &Identity) -> RunRow {
         begun: now(),
         state: RunState::Running,
         mops: env!("CARGO_PKG_VERSION").to_owned(),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
-        home: String::new(),
+        command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" "),
+        home: PathBuf::new(),
         settings: Vec::new(),
         name: String::new(),
         task: String::new(),

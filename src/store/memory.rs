@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{PoisonError, RwLock};
 
-use mops_core::{Evaluation, Known, RowSlopes, RunState, Store, Value};
+use mops_core::{Cancellation, Evaluation, Known, RowSlopes, RunState, Store, Value};
 
 use super::bytes;
 use super::database::{PointRow, Points, Slopes};
@@ -34,6 +34,8 @@ pub(super) struct Memory {
     /// What is known from before, and what the run learns: a certificate asks again what a search asked.
     pub points: RwLock<Points>,
     pub slopes: RwLock<Slopes>,
+    /// Where nothing new is looked for: who is asked to end at a point that is not known.
+    pub closed: Option<Cancellation>,
     /// Whether what is known stands in another database, from which it is taken over point by point.
     pub foreign: bool,
     pub sender: SyncSender<Message>,
@@ -60,6 +62,14 @@ impl Memory {
 impl Store for Memory {
     fn known(&self, tuners: &[f64]) -> Option<Known> {
         self.points.read().unwrap_or_else(PoisonError::into_inner).get(&bytes::key(tuners)).cloned()
+    }
+
+    fn is_known(&self, tuners: &[f64]) -> bool {
+        self.points.read().unwrap_or_else(PoisonError::into_inner).contains_key(&bytes::key(tuners))
+    }
+
+    fn closed(&self) -> Option<&Cancellation> {
+        self.closed.as_ref()
     }
 
     fn answered(&self, tuners: &[f64], learned: Option<Known>) {

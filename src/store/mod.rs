@@ -1,11 +1,13 @@
 //! The evaluations of a run, kept as they come in `evaluations.sqlite` in its folder: a run that was killed goes on where it
 //! was, and a study that asks for something else simulates no known point again. `docs/store.md` has the tables.
 
+mod aside;
 mod bytes;
+mod claim;
 mod database;
+mod ending;
 mod identity;
 mod keeper;
-mod lock;
 mod memory;
 #[cfg(test)]
 mod tests;
@@ -13,15 +15,16 @@ mod writer;
 
 use std::path::{Path, PathBuf};
 
+pub(crate) use claim::Claim;
 use database::Database;
 pub(crate) use database::{RunRow, RunState};
 pub(crate) use identity::Identity;
-pub(crate) use keeper::{Keeper, Opened, Refusal, Start, row};
+pub(crate) use keeper::{Keeper, Opened, Refusal, Start, claim, row};
 
 /// The run that last wrote in a folder, and whether it goes on; `None` where there is none, or it cannot be read.
 pub(crate) fn last_run(folder: &Path) -> Option<(RunRow, bool)> {
     let run = Database::open(&file(folder), false).ok()??.last_run().ok()??;
-    Some((run, lock::Lock::is_held(folder)))
+    Some((ending::Ending::complete(folder, run), Claim::is_held(folder)))
 }
 
 /// Name of the database in the folder of a run.

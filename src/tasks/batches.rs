@@ -30,7 +30,12 @@ pub(super) fn each<T: Sync, R: Send>(
             &format!("{}, {} of {}", stage.what, done.len(), items.len()),
             stage.from + share * (stage.to - stage.from),
         );
-        done.extend(batch.par_iter().map(&work).collect::<Vec<R>>());
+        let results: Vec<R> = batch.par_iter().map(&work).collect();
+        // Some of them may have been cut off.
+        if watch.wants_stop() {
+            break;
+        }
+        done.extend(results);
     }
     done
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Evaluation, Kept, Known, Problem, RowSlopes, Scenario, Store, Study};
+use mops_core::{Cancellation, Evaluation, Halt, Kept, Known, Problem, RowSlopes, Scenario, Store, Study};
 
 use crate::solve::Options;
 
@@ -98,10 +98,14 @@ impl Store for Copies {
         for part in 0..self.parts.len() {
             let (key, learned) = (self.key(tuners, part), learned.as_ref().and_then(|l| self.original(part, l)));
             // Nothing may have been asked of a part.
-            if learned.is_some() || self.store.known(&key).is_some() {
+            if learned.is_some() || self.store.is_known(&key) {
                 self.store.answered(&key, learned);
             }
         }
+    }
+
+    fn closed(&self) -> Option<&Cancellation> {
+        self.store.closed()
     }
 
     fn known_slopes(&self, tuners: &[f64], reach: f64) -> Option<Option<RowSlopes>> {
@@ -134,16 +138,25 @@ impl Store for Copies {
 
 /// Evaluates given values of all tuners in every case, as far as they are not known.
 pub(super) fn evaluate_at(problem: &Problem, tuners: &[f64], store: Option<&Copies>) -> Evaluation {
-    kept(tuners, store, |known| problem.evaluate_at_keeping(tuners, known))
+    kept((problem, true), tuners, store, |known| problem.evaluate_at_keeping(tuners, known))
 }
 
 /// Evaluates a point of the unit box, as far as it is not known.
 pub(super) fn evaluate(problem: &Problem, point: &[f64], store: Option<&Copies>) -> Evaluation {
-    kept(&problem.tuners_at(point), store, |known| problem.evaluate_keeping(point, known))
+    kept((problem, false), &problem.tuners_at(point), store, |known| problem.evaluate_keeping(point, known))
 }
 
-fn kept(tuners: &[f64], store: Option<&Copies>, evaluate: impl FnOnce(Option<Known>) -> Kept) -> Evaluation {
-    let Kept { evaluation, learned } = evaluate(store.and_then(|store| store.known(tuners)));
+fn kept(
+    (problem, every): (&Problem, bool),
+    tuners: &[f64],
+    store: Option<&Copies>,
+    evaluate: impl FnOnce(Option<Known>) -> Kept,
+) -> Evaluation {
+    let known = store.and_then(|store| store.known(tuners));
+    if let Some(end) = store.and_then(|store| store.closed()).filter(|_| !problem.has_met(known.as_ref(), every)) {
+        end.request(Halt::Interrupted);
+    }
+    let Kept { evaluation, learned } = evaluate(known);
     if let Some(store) = store {
         store.answered(tuners, learned);
     }

@@ -11,8 +11,11 @@ use crate::solve::{Options, Solved, Unsuitable, look};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();
-    let diagnosis = search(&study, options, watch)?;
-    let mut solved = of(study, options, diagnosis);
+    let mut solved = match search(&study, options, watch) {
+        Ok(diagnosis) => of(study, options, diagnosis),
+        Err(_) if watch.wants_stop() => ended(study, options, watch),
+        Err(why) => return Err(why),
+    };
     solved.outcome.seconds = begun.elapsed().as_secs_f64();
     Ok(solved)
 }
@@ -38,6 +41,18 @@ fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn 
         return Err(Unsuitable(mistake.within("diagnosis")));
     }
     Ok(left)
+}
+
+/// The outcome of a diagnosis that was ended: nothing was found out.
+fn ended(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    study.rows.clear();
+    study.jobs.clear();
+    let mut solved = look(study, options, watch);
+    let outcome = &mut solved.outcome;
+    (outcome.solver, outcome.evaluations, outcome.calibration) = ("discrepancy".to_owned(), 0, None);
+    outcome.front.clear();
+    outcome.warnings.push("the diagnosis was ended before it came to a verdict".to_owned());
+    solved
 }
 
 /// The outcome of a diagnosis: its tuners are those of the repaired model.

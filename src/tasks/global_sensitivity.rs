@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use mops_core::statistics::{MOST_DIMENSIONS, elementary_effects, radial, trajectories, variance_shares};
 use mops_core::{
-    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Stop, Study,
-    Subject, Watch, stream, uncertain_reports,
+    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Study, Subject,
+    Watch, stream, uncertain_reports,
 };
 
 use super::batches::{Stage, each};
@@ -50,7 +50,7 @@ pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
     let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
     let answers = each(&points, stage, watch, |of_sample| of_sample.iter().map(evaluate).collect::<Vec<_>>());
     if answers.len() < points.len() {
-        solved.outcome.stop = Stop::Interrupted;
+        solved.outcome.stop = watch.halt().into();
     }
     let nominal = evaluate_at(&problem, &over.start(), store.as_ref());
     let simulations = (answers.iter().map(Vec::len).sum::<usize>() + 1) * over.jobs.len();

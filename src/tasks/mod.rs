@@ -15,7 +15,7 @@ mod worst_case;
 
 use std::time::Instant;
 
-use mops_core::{Place, Study, Task, Watch};
+use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
 use crate::solve::{Options, Solved, Unsuitable, look, search};
 
@@ -41,6 +41,10 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::WorstCase => worst_case::perform(study, options, watch)?,
         Task::MonteCarlo => monte_carlo::perform(study, options, watch)?,
     };
+    // A search may have come to its end before; what follows it has not.
+    if watch.wants_stop() && watch.halt() == Halt::Interrupted {
+        solved.outcome.stop = Stop::Interrupted;
+    }
     solved.outcome.seconds = begun.elapsed().as_secs_f64();
     Ok(solved)
 }

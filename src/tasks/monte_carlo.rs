@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mops_core::statistics::{Sampling, Summary, draw, quantile, quantile_interval, share_interval};
 use mops_core::{
     Demand, DistributionReport, Evaluation, MonteCarloReport, MonteCarloTask, Problem, QuantileReport, Row,
-    ShareReport, Stop, Study, Subject, Usage, Watch, stream, uncertain_reports,
+    ShareReport, Study, Subject, Usage, Watch, stream, uncertain_reports,
 };
 
 use super::at;
@@ -36,7 +36,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
     let answers = each(&samples, stage, watch, evaluate);
     if answers.len() < samples.len() {
-        solved.outcome.stop = Stop::Interrupted;
+        solved.outcome.stop = watch.halt().into();
     }
     if answers.is_empty() {
         return Ok(solved);

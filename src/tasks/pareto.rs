@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Stop, Study, TradeOffs, Watch};
+use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
 use mops_solvers::certificate;
 
 use crate::report::significant;
@@ -15,10 +15,10 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     // Certificates ask for points of their own, which are no part of the search that is looked at.
     let quiet = Quiet(watch);
     let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &quiet);
-    let interrupted = solved.outcome.stop == Stop::Interrupted;
+    let concluding = problem.concluding();
     let certified = |point: &serde_json::Value| {
-        let at = problem.evaluate_at(&tuners(problem, point));
-        let (pareto, weights) = match interrupted {
+        let at = concluding.evaluate_at(&tuners(problem, point));
+        let (pareto, weights) = match watch.wants_stop() {
             true => (Pareto::NotShown, None),
             false => {
                 let shown = certificate(&mut run, &at.point);
@@ -32,6 +32,9 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     solved.outcome.evaluations += run.archive().len();
     solved.outcome.simulations += (run.archive().len() + run.linearisations()) * problem.simulations();
     drop(run);
+    if front.iter().any(|point| point.at.is_cancelled()) {
+        return Ok(solved);
+    }
     if let Some(mut found) = TradeOffs::of(problem, &front) {
         found.words = words(problem, &front, &found);
         solved.outcome.pareto = found.points[found.nearest].pareto;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mops_core::{
-    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Oracle, Pareto, Problem, Record, RobustReport, RobustTask,
+    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Problem, Record, RobustReport, RobustTask,
     RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
@@ -35,12 +35,11 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         left = left.saturating_sub(solved.outcome.evaluations);
         simulations += solved.outcome.simulations;
         archive.extend(solved.archive.iter().cloned());
-        let interrupted = solved.outcome.stop == Stop::Interrupted || watch.wants_stop();
-        let more = !interrupted && solved.best.scaled.is_some() && rounds.search(&solved, options, watch);
+        let more = !watch.wants_stop() && solved.best.scaled.is_some() && rounds.search(&solved, options, watch);
         simulations += rounds.done.last().map_or(0, |round| round.simulations);
         last = Some(solved);
-        if interrupted || watch.wants_stop() {
-            stop = Stop::Interrupted;
+        if watch.wants_stop() {
+            stop = watch.halt().into();
             break;
         }
         if !more {
@@ -78,6 +77,10 @@ struct Designing<'a> {
 impl Watch for Designing<'_> {
     fn wants_stop(&self) -> bool {
         self.watch.wants_stop()
+    }
+
+    fn halt(&self) -> Halt {
+        self.watch.halt()
     }
 
     fn improved(&self, best: &Evaluation) {
@@ -219,9 +222,12 @@ impl Rounds {
         let Some(chosen) = self.chosen() else { return Solved { archive: Vec::new(), ..last } };
         let settled = self.done.last().is_some_and(|round| round.added.is_empty());
         let design = &self.done[chosen].tuners;
-        let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios)));
+        let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios))).concluding();
         let mut run = Run::new(&problem, Budget { evaluations: 1 }, &());
-        run.evaluate(&[problem.point_of(design)]).expect("a budget of one point suffices for one");
+        if run.evaluate(&[problem.point_of(design)]).is_err() {
+            // Nobody waits for it any more: the result is that of the last round.
+            return Solved { archive: Vec::new(), ..last };
+        }
         let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
         let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, pareto, seconds: 0.0 });
         drop(run);

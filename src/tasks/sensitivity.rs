@@ -17,7 +17,9 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     // A calibration has found it already.
     let known = solved.outcome.calibration.as_mut().and_then(|calibration| calibration.sensitivity.take());
     let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, task.zero));
-    if found.is_none() {
+    if found.is_none() && watch.wants_stop() {
+        solved.outcome.stop = watch.halt().into();
+    } else if found.is_none() {
         let why =
             "the sensitivities could not be computed: a simulation failed, or nothing that counts depends on a tuner";
         solved.outcome.warnings.push(why.to_owned());

@@ -1,6 +1,6 @@
 //! `task = "sweep"`: the objective over one tuner, or over two.
 
-use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Stop, Study, SweepAxis, SweepReport, Watch};
+use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Study, SweepAxis, SweepReport, Watch};
 
 use super::at;
 use crate::report::significant;
@@ -40,7 +40,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         match run.evaluate(&points) {
             Ok(answers) => merits.push(answers.into_iter().map(|e| e.merit).collect()),
             Err(_) => {
-                solved.outcome.stop = Stop::Interrupted;
+                solved.outcome.stop = watch.halt().into();
                 merits.resize(rows.len(), vec![Merit::FAILED; values[0].len()]);
                 break;
             }

@@ -4,20 +4,30 @@ use super::entries::{Entry, Form, entries, header_of, last_line, own_end};
 use super::{TomlText, keys, owned};
 
 impl TomlText {
-    /// Puts `value`, written as TOML, under these keys: instead of the value that is there, or where it belongs.
+    /// Puts `value`, written as TOML, under these keys: instead of the value or the table that is there, or where it belongs.
     pub(crate) fn set(&mut self, path: &[&str], value: &str) {
-        let entries = entries(&self.0);
-        let at = |path: &[&str]| entries.iter().find(|entry| entry.path == path);
-        if let Some(Form::Value(span) | Form::Inline(span)) = at(path).map(|entry| &entry.form) {
-            self.0.replace_range(span.clone(), value);
-            return;
+        let mut entries = entries(&self.0);
+        match entries.iter().find(|entry| entry.path == path).map(|entry| &entry.form) {
+            Some(Form::Value(span) | Form::Inline(span)) => {
+                self.0.replace_range(span.clone(), value);
+                return;
+            }
+            Some(Form::Header(_) | Form::Implied) => {
+                self.clear(path);
+                entries = self::entries(&self.0);
+            }
+            None => {}
         }
+        let at = |path: &[&str]| entries.iter().find(|entry| entry.path == path);
         for depth in (1..path.len()).rev() {
             let (above, below) = path.split_at(depth);
             let Some(entry) = at(above) else { continue };
             let last = last_line(&entries, above);
             match &entry.form {
-                Form::Value(_) => break,
+                Form::Value(span) => {
+                    self.0.replace_range(span.clone(), &format!("{{ {} = {value} }}", keys(below)));
+                    return;
+                }
                 Form::Inline(span) => {
                     let comma = if entry.empty { " " } else { ", " };
                     let inside = self.0[..span.end - 1].trim_end_matches([' ', '\t', '\n', ',']).len();
@@ -54,7 +64,32 @@ impl TomlText {
             }
         }
         let (table, key) = path.split_at(path.len() - 1);
-        self.0.push_str(&format!("\n[{}]\n{} = {value}\n", keys(table), keys(key)));
+        if table.is_empty() {
+            // What belongs to no table stands before all of them.
+            let headers =
+                entries.iter().filter_map(|e| if let Form::Header(span) = &e.form { Some(span.start) } else { None });
+            let first =
+                headers.min().map_or(self.0.len(), |start| self.0[..start].rfind('\n').map_or(0, |end| end + 1));
+            self.0.insert_str(first, &format!("{} = {value}\n", keys(key)));
+        } else {
+            self.0.push_str(&format!("\n[{}]\n{} = {value}\n", keys(table), keys(key)));
+        }
+    }
+
+    /// Takes a table away, however it is written.
+    fn clear(&mut self, path: &[&str]) {
+        let path = owned(path);
+        let below = |text: &Self| {
+            let leaf = |entry: &Entry| matches!(entry.form, Form::Value(_) | Form::Inline(_));
+            let below = entries(&text.0).into_iter().find(|entry| entry.path.starts_with(&path) && leaf(entry));
+            below.map(|entry| entry.path)
+        };
+        while let Some(leaf) = below(self) {
+            let before = self.0.clone();
+            self.remove(&leaf.iter().map(String::as_str).collect::<Vec<_>>(), "replaced");
+            assert!(self.0 != before, "an entry that is there can be taken away");
+        }
+        self.remove(&path.iter().map(String::as_str).collect::<Vec<_>>(), "replaced");
     }
 
     /// Takes an entry away: within braces it is cut out, elsewhere its lines become comments.

@@ -1,5 +1,8 @@
 //! Edits leave all else as it is.
 
+use proptest::prelude::*;
+use toml::{Table, Value};
+
 use super::*;
 
 const TEXT: &str = "\
@@ -29,7 +32,7 @@ file = 'swing.csv'
 fn edited(edit: impl FnOnce(&mut TomlText)) -> String {
     let mut text = TomlText::new(TEXT);
     edit(&mut text);
-    let read: toml::Table = toml::from_str(&text.0).unwrap_or_else(|e| panic!("{e}\n{}", text.0));
+    let read: Table = toml::from_str(&text.0).unwrap_or_else(|e| panic!("{e}\n{}", text.0));
     assert!(read.contains_key("study"));
     text.0
 }
@@ -89,4 +92,81 @@ fn keys_and_texts_are_quoted_where_they_must_be() {
     let text = TomlText::new(TEXT);
     assert_eq!(text.words(&["experiments", "swing", "file"]).as_deref(), Some("swing.csv"));
     assert_eq!(text.keys(&["tuners"]), ["b", "bp", "d"]);
+}
+
+/// A document, or what a setting says: numbers and tables under a few keys.
+fn tables() -> impl Strategy<Value = Value> {
+    let number = (0i64..100).prop_map(Value::Integer);
+    let keys = prop::sample::select(vec!["a", "b", "c d"]);
+    let table = move |inner: BoxedStrategy<Value>| prop::collection::btree_map(keys.clone(), inner, 0..3);
+    let named = |table: std::collections::BTreeMap<&str, Value>| {
+        Value::Table(table.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+    };
+    let inner = number.prop_recursive(3, 16, 3, move |inner| table(inner.boxed()).prop_map(named).boxed());
+    inner.prop_map(|value| if value.is_table() { value } else { Value::Table(Table::from_iter([("a".into(), value)])) })
+}
+
+/// A table as text, its tables in braces, with dots or under headers as `forms` has it in turn.
+fn rendered(table: &Table, [header, above]: [&[String]; 2], forms: &mut impl Iterator<Item = u8>) -> String {
+    let (mut own, mut later) = (String::new(), String::new());
+    for (key, value) in table {
+        let path = [above, &[self::key(key)]].concat();
+        match (value.as_table(), forms.next().unwrap_or(0)) {
+            (Some(below), 1) if !below.is_empty() => own += &rendered(below, [header, &path], forms),
+            (Some(below), 2) if above.is_empty() => {
+                let header = [header, &path].concat();
+                later += &format!("\n[{}]\n{}", header.join("."), rendered(below, [&header, &[]], forms));
+            }
+            (Some(_), _) => own += &format!("{} = {}\n", path.join("."), inline(value)),
+            (None, _) => own += &format!("{} = {value} # {key}\n", path.join(".")),
+        }
+    }
+    own + &later
+}
+
+fn inline(value: &Value) -> String {
+    match value.as_table() {
+        Some(table) => {
+            let entries: Vec<String> =
+                table.iter().map(|(key, v)| format!("{} = {}", self::key(key), inline(v))).collect();
+            format!("{{ {} }}", entries.join(", "))
+        }
+        None => value.to_string(),
+    }
+}
+
+/// What a study is with a setting over it.
+fn merged(into: &mut Table, from: &Table) {
+    for (key, value) in from {
+        match (into.get_mut(key), value) {
+            (Some(Value::Table(old)), Value::Table(new)) if !new.is_empty() => merged(old, new),
+            _ => drop(into.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(mops_tiers::property(20_000))]
+
+    #[test]
+    fn a_text_with_its_settings_says_what_the_study_was_read_as(
+        document in tables(),
+        settings in prop::collection::vec(tables(), 0..3),
+        forms in prop::collection::vec(0u8..3, 12),
+    ) {
+        let mut expected = document.as_table().unwrap().clone();
+        let text = rendered(&expected, [&[], &[]], &mut forms.into_iter().cycle().take(200));
+        prop_assert_eq!(&text.parse::<Table>().unwrap(), &expected);
+        let mut lines = Vec::new();
+        for setting in &settings {
+            for (key, value) in setting.as_table().unwrap() {
+                merged(&mut expected, &Table::from_iter([(key.clone(), value.clone())]));
+                lines.push(format!("{} = {}", self::key(key), inline(value)));
+            }
+        }
+        let with = settled(&text, &lines, &str::to_owned).into_text();
+        let read = with.parse::<Table>();
+        prop_assert!(read.is_ok(), "{text}\n---\n{lines:?}\n---\n{with}");
+        prop_assert_eq!(read.unwrap(), expected, "{}\n---\n{:?}\n---\n{}", text, lines, with);
+    }
 }

@@ -12,7 +12,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use mops_core::{Evaluation, RunState, Study, Watch};
+use mops_core::{Evaluation, Halt, RunState, Study, Watch};
 
 use server::Server;
 use state::Live;
@@ -56,6 +56,10 @@ impl Watch for Both<'_> {
         self.other.wants_stop()
     }
 
+    fn halt(&self) -> Halt {
+        self.other.halt()
+    }
+
     fn evaluated(&self, state: &RunState) {
         self.page.live.evaluated(state);
         self.other.evaluated(state);
@@ -69,5 +73,10 @@ impl Watch for Both<'_> {
     fn stage(&self, what: &str, done: f64) {
         self.page.live.stage(what, done);
         self.other.stage(what, done);
+    }
+
+    fn keeping(&self, trouble: Option<&str>) {
+        self.page.live.keeping(trouble);
+        self.other.keeping(trouble);
     }
 }

@@ -129,7 +129,8 @@ function verdict(state) {
   const where = state.over !== null ? `. The run is over; its result and report.html are in ${state.over}` : "";
   const stage = state.stage ? ` (${state.stage})` : "";
   at("verdict").className = `verdict ${tone}`;
-  text("verdict", sentence + stage + where);
+  const trouble = state.trouble ? `. Evaluations cannot be written (${state.trouble}): newer ones wait in memory` : "";
+  text("verdict", sentence + stage + trouble + where);
 }
 
 function show(state) {

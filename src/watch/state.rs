@@ -26,6 +26,8 @@ struct Newest {
     best: Option<Evaluation>,
     /// Evaluations, objective and violation where the best point changed.
     curve: Vec<(usize, Merit)>,
+    /// Why evaluations cannot be written at present.
+    trouble: Option<String>,
     /// Seconds, and where the result is, once the run is over.
     over: Option<(f64, String)>,
 }
@@ -33,7 +35,7 @@ struct Newest {
 impl Live {
     pub fn new(study: Study, solver: &str, budget: usize) -> Self {
         let run = RunState { evaluations: 0, budget, failed: 0, best: Merit::FAILED };
-        let state = Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), over: None };
+        let state = Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), trouble: None, over: None };
         Self {
             study,
             solver: solver.to_owned(),
@@ -82,6 +84,10 @@ impl Live {
         self.change(|newest| newest.stage = Some((what.to_owned(), done)));
     }
 
+    pub fn keeping(&self, trouble: Option<&str>) {
+        self.change(|newest| newest.trouble = trouble.map(str::to_owned));
+    }
+
     pub fn finish(&self, folder: &str) {
         let seconds = self.begun.elapsed().as_secs_f64();
         self.change(|newest| newest.over = Some((seconds, folder.to_owned())));
@@ -120,6 +126,7 @@ impl Live {
             "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
             "seconds": seconds, "left": left, "share": share,
             "stage": newest.stage.as_ref().map(|(what, _)| what),
+            "trouble": &newest.trouble,
             "over": newest.over.as_ref().map(|(_, folder)| folder),
             "best": newest.best.as_ref().map(|best| json!({
                 "objective": best.merit.objective, "violation": best.merit.violation, "feasible": best.merit.is_feasible(),

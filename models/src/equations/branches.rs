@@ -26,7 +26,7 @@ impl Lowering<'_> {
         for argument in arguments {
             let affine = self.node(text, argument, inner)?;
             let place = format!("in `{}`", function.name());
-            values.push(self.without_rates(text, argument, affine, &place)?);
+            values.push(self.without_rates(text, &argument.span, affine, &place)?);
         }
         self.in_order(text, function, arguments, &values)?;
         let x = values[0];
@@ -132,7 +132,7 @@ impl Lowering<'_> {
     fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
         let branch = |lowering: &mut Self, node: &Node| {
             let affine = lowering.node(text, node, kinks)?;
-            lowering.without_rates(text, node, affine, "in `if`")
+            lowering.without_rates(text, &node.span, affine, "in `if`")
         };
         let (otherwise, pairs) = arguments.split_last().expect("the reader asks for three arguments");
         let mut value = branch(self, otherwise)?;
@@ -149,20 +149,14 @@ impl Lowering<'_> {
             Form::Compare(comparison, left, right) => {
                 let mut side = |node: &Node| {
                     let affine = self.node(text, node, Kinks::ByMode)?;
-                    self.without_rates(text, node, affine, "in a condition")
+                    self.without_rates(text, &node.span, affine, "in a condition")
                 };
                 let (left, right) = (side(left)?, side(right)?);
                 let condition = self.condition(*comparison, left, right, true, Kinks::ByMode);
                 Ok(self.graph.choose(condition, a, b))
             }
-            Form::And(first, second) => {
-                let inner = self.decide(text, second, a, b)?;
-                self.decide(text, first, inner, b)
-            }
-            Form::Or(first, second) => {
-                let inner = self.decide(text, second, a, b)?;
-                self.decide(text, first, a, inner)
-            }
+            Form::All(conditions) => conditions.iter().rev().try_fold(a, |a, of| self.decide(text, of, a, b)),
+            Form::Any(conditions) => conditions.iter().rev().try_fold(b, |b, of| self.decide(text, of, a, b)),
             Form::Not(inner) => self.decide(text, inner, b, a),
             _ => unreachable!("the reader asks for a condition"),
         }

@@ -188,12 +188,15 @@ impl Graph {
         self.mul(minus, a)
     }
 
-    /// `a b`: factors that only depend on parameters are brought together, the others stand in one order, those with
-    /// most work in them first, so that products share what they have in common.
+    /// `a b`, as [`Graph::product`] has it.
     pub fn mul(&mut self, a: Id, b: Id) -> Id {
-        let mut factors = Vec::new();
-        self.factors(a, &mut factors);
-        self.factors(b, &mut factors);
+        self.product(a, &[b])
+    }
+
+    /// The product of all: factors that only depend on parameters are brought together, the others stand in one order,
+    /// those with most work in them first, so that products share what they have in common.
+    pub fn product(&mut self, first: Id, rest: &[Id]) -> Id {
+        let factors: Vec<Id> = std::iter::once(&first).chain(rest).flat_map(|&id| self.factors(id)).collect();
         let (mut variable, fixed): (Vec<Id>, Vec<Id>) =
             factors.into_iter().partition(|&f| self.level(f) == Level::Variable);
         let (numbers, mut fixed): (Vec<Id>, Vec<Id>) =
@@ -217,14 +220,21 @@ impl Graph {
         if self.constant(a).or(self.constant(b)).is_some() { self.mul(a, b) } else { self.add_op(Op::Mul(a, b)) }
     }
 
-    fn factors(&self, id: Id, into: &mut Vec<Id>) {
-        match self.op(id) {
-            Op::Mul(a, b) => {
-                self.factors(a, into);
-                self.factors(b, into);
+    /// The factors of a product, in their order; what is none is its only factor.
+    fn factors(&self, id: Id) -> Vec<Id> {
+        let (mut found, mut stack) = (Vec::new(), vec![id]);
+        while let Some(id) = stack.pop() {
+            match self.op(id) {
+                Op::Mul(a, b) => stack.extend([b, a]),
+                _ => found.push(id),
             }
-            _ => into.push(id),
         }
+        found
+    }
+
+    /// The node that computes this, if there is one.
+    pub fn find(&self, op: Op) -> Option<Id> {
+        self.known.get(&op).copied()
     }
 
     /// `a / b`: by a number or a parameter it is a product with the inverse, which is computed once.

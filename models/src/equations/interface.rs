@@ -25,6 +25,7 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
         },
         default: p.default,
         range: p.range,
+        infinite: false,
     };
     let mut parameters: Vec<Parameter> = d.parameters.iter().map(declared).collect();
     let mut starts = Vec::new();
@@ -54,6 +55,7 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
             variable: Variable { name, unit: state.unit.clone(), about },
             default: Some(value.unwrap_or(f64::NAN)),
             range: [f64::NEG_INFINITY, f64::INFINITY],
+            infinite: false,
         });
     }
     Ok((parameters, starts))

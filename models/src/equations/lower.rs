@@ -1,6 +1,7 @@
 //! From expressions to the graph: names looked up, derivatives kept apart, kinks and jumps made into switches.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use mops_core::expression::{Form, Node, Operator};
 use mops_core::{Mistake, suggestion};
@@ -55,6 +56,10 @@ pub struct Order {
 /// Definitions within definitions that one may lead to: each takes a part of the stack.
 const DEEPEST: usize = 200;
 
+/// Functions, powers and sums within each other, over all definitions on the way: each takes some 2 kB of the stack, of which a
+/// thread has 2 MB.
+const DEEPEST_NODE: usize = 600;
+
 #[derive(Debug, Clone, Copy)]
 enum Meaning {
     State(usize),
@@ -93,6 +98,8 @@ pub struct Lowering<'d> {
     pub modes: usize,
     /// What stands for each input.
     inputs: Vec<Id>,
+    /// Nodes of expressions within which the present one stands, over all definitions.
+    depth: usize,
 }
 
 impl<'d> Lowering<'d> {
@@ -136,6 +143,7 @@ impl<'d> Lowering<'d> {
             orders: Vec::new(),
             modes: 0,
             inputs: Vec::new(),
+            depth: 0,
         };
         lowering.inputs = (0..d.inputs.len()).map(|i| lowering.graph.add_op(Op::Input(i))).collect();
         Ok(lowering)
@@ -165,7 +173,7 @@ impl<'d> Lowering<'d> {
     /// An expression without derivatives.
     pub fn value(&mut self, text: &Text) -> Result<Id, Mistake> {
         let affine = self.text(text)?;
-        self.without_rates(text, &text.equation.right, affine, "here")
+        self.without_rates(text, &text.equation.right.span, affine, "here")
     }
 
     /// An expression of parameters alone; `what` it gives, for the message.
@@ -194,7 +202,13 @@ impl<'d> Lowering<'d> {
         ))
     }
 
-    pub(super) fn without_rates(&self, text: &Text, node: &Node, affine: Affine, place: &str) -> Result<Id, Mistake> {
+    pub(super) fn without_rates(
+        &self,
+        text: &Text,
+        span: &Range<usize>,
+        affine: Affine,
+        place: &str,
+    ) -> Result<Id, Mistake> {
         if affine.rates.is_empty() {
             return Ok(affine.rest);
         }
@@ -202,7 +216,7 @@ impl<'d> Lowering<'d> {
             &text.path,
             Mistake::here(format!("a derivative cannot stand {place}"))
                 .with_help("equations must be linear in the derivatives; write what is meant without them")
-                .at(node.span.clone()),
+                .at(span.clone()),
         ))
     }
 
@@ -223,6 +237,18 @@ impl<'d> Lowering<'d> {
     }
 
     pub(super) fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
+        if self.depth == DEEPEST_NODE {
+            let fact = format!("expressions are nested more than {DEEPEST_NODE} deep, counted over their definitions");
+            let mistake = Mistake::here(fact).with_help("take them in parts that nest less");
+            return Err(under(&text.path, mistake.at(node.span.clone())));
+        }
+        self.depth += 1;
+        let found = self.form(text, node, kinks);
+        self.depth -= 1;
+        found
+    }
+
+    fn form(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
         let wrong = |fact: String, help: String| {
             Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
         };
@@ -259,47 +285,74 @@ impl<'d> Lowering<'d> {
                 let a = self.node(text, a, kinks)?;
                 self.scaled(a, Graph::negative)
             }
-            Form::Binary(operator, a, b) => return self.binary(text, *operator, [a, b], kinks),
+            Form::Chain(first, rest) => self.chain(text, first, rest, kinks)?,
+            Form::Power(a, b) => self.power(text, [a, b], kinks)?,
             Form::Call(function, arguments) => Affine::of(self.call(text, *function, arguments, kinks)?),
-            Form::Compare(..) | Form::And(..) | Form::Or(..) | Form::Not(_) => {
+            Form::Compare(..) | Form::All(_) | Form::Any(_) | Form::Not(_) => {
                 unreachable!("the reader lets conditions stand in `if` only")
             }
         })
     }
 
-    fn binary(&mut self, text: &Text, operator: Operator, [a, b]: [&Node; 2], kinks: Kinks) -> Result<Affine, Mistake> {
-        let inner = if matches!(operator, Operator::Divide) { Kinks::AsTheyStand } else { kinks };
-        Ok(match operator {
-            Operator::Add | Operator::Subtract => {
-                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, kinks)?);
-                self.sum(x, y, if operator == Operator::Add { 1.0 } else { -1.0 })
-            }
-            Operator::Multiply => {
-                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, kinks)?);
-                let (x, y) = if y.rates.is_empty() {
-                    (x, y.rest)
-                } else {
-                    (y, self.without_rates(text, a, x, "in both factors of a product")?)
-                };
-                self.scaled(x, |graph, x| graph.mul(x, y))
-            }
-            Operator::Divide => {
-                let (x, y) = (self.node(text, a, kinks)?, self.node(text, b, inner)?);
-                let y = self.without_rates(text, b, y, "in a divisor")?;
-                self.scaled(x, |graph, x| graph.div(x, y))
-            }
-            Operator::Power => {
-                let exponent = self.node(text, b, kinks)?;
-                let exponent = self.without_rates(text, b, exponent, "in an exponent")?;
-                let whole = self.graph.constant(exponent).is_some_and(|e| e.fract() == 0.0 && e > 0.0);
-                let base = self.node(text, a, if whole { kinks } else { Kinks::AsTheyStand })?;
-                if self.graph.is(exponent, 1.0) {
-                    return Ok(base);
+    /// A sum, or a product, from left to right. Factors are gathered and multiplied at once, which takes one node of the
+    /// graph for each; one by one, every product would be sorted into the order of its factors anew.
+    fn chain(&mut self, text: &Text, first: &Node, rest: &[(Operator, Node)], kinks: Kinks) -> Result<Affine, Mistake> {
+        let mut result = self.node(text, first, kinks)?;
+        let mut read = first.span.clone();
+        let mut factors: Vec<Id> = Vec::new();
+        let mut varies = self.varies(&result);
+        for (operator, node) in rest {
+            let kinks = if *operator == Operator::Divide { Kinks::AsTheyStand } else { kinks };
+            let operand = self.node(text, node, kinks)?;
+            match operator {
+                Operator::Add => result = self.sum(result, operand, 1.0),
+                Operator::Subtract => result = self.sum(result, operand, -1.0),
+                Operator::Multiply => {
+                    varies |= self.varies(&operand);
+                    if operand.rates.is_empty() {
+                        factors.push(operand.rest);
+                    } else {
+                        factors.push(self.without_rates(text, &read, result, "in both factors of a product")?);
+                        result = operand;
+                    }
                 }
-                let base = self.without_rates(text, a, base, "in a power")?;
-                Affine::of(self.graph.power(base, exponent))
+                Operator::Divide => {
+                    let fixed = !self.varies(&operand);
+                    let divisor = self.without_rates(text, &node.span, operand, "in a divisor")?;
+                    if varies && fixed {
+                        let one = self.graph.number(1.0);
+                        factors.push(self.graph.div(one, divisor));
+                    } else {
+                        result = self.product(result, std::mem::take(&mut factors));
+                        result = self.scaled(result, |graph, x| graph.div(x, divisor));
+                        varies = self.varies(&result);
+                    }
+                }
             }
-        })
+            read.end = node.span.end;
+        }
+        Ok(self.product(result, factors))
+    }
+
+    fn product(&mut self, of: Affine, factors: Vec<Id>) -> Affine {
+        if factors.is_empty() { of } else { self.scaled(of, |graph, x| graph.product(x, &factors)) }
+    }
+
+    /// Whether it depends on more than parameters.
+    fn varies(&self, affine: &Affine) -> bool {
+        affine.rates.values().chain([&affine.rest]).any(|&id| self.graph.level(id) == Level::Variable)
+    }
+
+    fn power(&mut self, text: &Text, [a, b]: [&Node; 2], kinks: Kinks) -> Result<Affine, Mistake> {
+        let exponent = self.node(text, b, kinks)?;
+        let exponent = self.without_rates(text, &b.span, exponent, "in an exponent")?;
+        let whole = self.graph.constant(exponent).is_some_and(|e| e.fract() == 0.0 && e > 0.0);
+        let base = self.node(text, a, if whole { kinks } else { Kinks::AsTheyStand })?;
+        if self.graph.is(exponent, 1.0) {
+            return Ok(base);
+        }
+        let base = self.without_rates(text, &a.span, base, "in a power")?;
+        Ok(Affine::of(self.graph.power(base, exponent)))
     }
 
     fn index(&self, text: &Text, node: &Node) -> Result<i64, Mistake> {

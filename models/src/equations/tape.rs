@@ -101,22 +101,23 @@ impl<'g> Tape<'g> {
     }
 
     /// Counts how often each node is used.
-    fn count(&mut self, id: Id) {
-        let uses = self.uses.entry(id).or_insert(0);
-        *uses += 1;
-        let first = *uses == 1;
-        let leaf = matches!(self.home(id), Ok(Some(_)));
-        if !first || leaf {
-            return;
-        }
-        if let Op::Solution(block, _) = self.graph.op(id) {
-            if self.solved.contains(&block) {
-                return;
+    fn count(&mut self, root: Id) {
+        let mut stack = vec![root];
+        while let Some(id) = stack.pop() {
+            let uses = self.uses.entry(id).or_insert(0);
+            *uses += 1;
+            let first = *uses == 1;
+            let leaf = matches!(self.home(id), Ok(Some(_)));
+            if !first || leaf {
+                continue;
             }
-            self.solved.push(block);
-        }
-        for operand in self.graph.operands(id) {
-            self.count(operand);
+            if let Op::Solution(block, _) = self.graph.op(id) {
+                if self.solved.contains(&block) {
+                    continue;
+                }
+                self.solved.push(block);
+            }
+            stack.extend(self.graph.operands(id));
         }
     }
 
@@ -157,15 +158,53 @@ impl<'g> Tape<'g> {
         matches!(self.graph.op(id), Op::Mul(a, _) if self.graph.is(a, -1.0))
     }
 
+    /// The register of a node, where it has one by now.
+    fn register(&mut self, id: Id) -> Result<Option<Register>, TooLarge> {
+        Ok(self.home(id)?.or_else(|| self.done.get(&id).copied()))
+    }
+
     /// Computes a node; the register is released by whoever uses it.
+    ///
+    /// What a node needs is computed before it from a stack of its own: a sum is as deep as it is long.
     fn emit(&mut self, id: Id) -> Result<Register, TooLarge> {
+        let mut stack = vec![(id, self.needs(id).into_iter())];
+        while let Some((top, needs)) = stack.last_mut() {
+            let top = *top;
+            if self.register(top)?.is_some() {
+                stack.pop();
+                continue;
+            }
+            match needs.next() {
+                Some(need) => stack.push((need, self.needs(need).into_iter())),
+                None => {
+                    stack.pop();
+                    if stack.is_empty() {
+                        return self.make(top);
+                    }
+                    self.make(top)?;
+                }
+            }
+        }
+        Ok(self.register(id)?.expect("it had one before"))
+    }
+
+    /// The nodes whose registers an instruction for this node reads, in the order in which they are computed.
+    fn needs(&mut self, id: Id) -> Vec<Id> {
+        match self.graph.op(id) {
+            Op::Add(a, b) | Op::Sub(a, b) => match (self.product(a), self.product(b)) {
+                (Some(a), Some(b)) => [a, b].concat(),
+                (Some([p, q]), None) => vec![p, q, b],
+                (None, Some([p, q])) => vec![p, q, a],
+                (None, None) => vec![a, b],
+            },
+            Op::Mul(_, b) if self.is_minus(id) => vec![b],
+            _ => self.graph.operands(id),
+        }
+    }
+
+    /// Computes a node from what it needs.
+    fn make(&mut self, id: Id) -> Result<Register, TooLarge> {
         use Instruction as I;
-        if let Some(register) = self.home(id)? {
-            return Ok(register);
-        }
-        if let Some(&register) = self.done.get(&id) {
-            return Ok(register);
-        }
         let register = match self.graph.op(id) {
             Op::Constant(bits) => {
                 let place = register(self.program.numbers.len())?;
@@ -236,8 +275,8 @@ impl<'g> Tape<'g> {
             Function::Cos => Some(Function::Sin),
             _ => None,
         };
-        let other =
-            other.and_then(|other| self.uses.keys().copied().find(|&id| self.graph.op(id) == Op::Function(other, a)));
+        let other = other.and_then(|other| self.graph.find(Op::Function(other, a)));
+        let other = other.filter(|id| self.uses.contains_key(id));
         let Some(other) = other else {
             return self.instruction(&[a], |o, r| match function {
                 Function::Sin => I::Sin(o, r[0]),

@@ -1,5 +1,7 @@
 //! Models from text against an independent integration, closed forms and compiled models.
 
+mod large;
+
 use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
 
 use super::{Equations, EquationsOptions, Target};

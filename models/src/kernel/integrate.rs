@@ -95,6 +95,9 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         if work.steps + work.rejected >= tolerance.max_steps {
             return Err(Failure::StepLimit(t));
         }
+        if let Some(failure) = sink.ends(t) {
+            return Err(failure);
+        }
         let stop = dynamics.next_break(t).min(end);
         proposed = proposed.min(longest);
         // A step that would leave a sliver before the stop is made to reach it. It is cut, and what was proposed stands.

@@ -24,7 +24,7 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 pub use integrate::integrate;
 pub use local::{Equations, local, rates_and_signals, rests};
 pub use opened::{Holds, Opened};
-pub use record::{Recording, Simulate, analyse, record, tangents, tangents_of, wanted};
+pub use record::{Recording, Simulate, Wanted, analyse, record, tangents, tangents_of, wanted};
 pub use step::Step;
 pub use written::{Kernel, Written};
 
@@ -149,6 +149,10 @@ pub trait Sink<S: Scalar, D: Dynamics<S>> {
     /// Whether it reads states within steps; if not, they are not prepared.
     fn reads_steps(&self) -> bool {
         true
+    }
+    /// Why the simulation must end at this time, s, if it must; asked before every step.
+    fn ends(&self, _t: f64) -> Option<Failure> {
+        None
     }
     /// The mode changed.
     fn event(&mut self, _t: f64, _what: &str) {}

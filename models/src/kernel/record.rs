@@ -1,6 +1,8 @@
 //! From steps to traces: the signals of a model along its dense output, with their tangents.
 
-use mops_core::{Along, Analysis, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents};
+use mops_core::{
+    Along, Analysis, Cancellation, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
+};
 
 use super::weights::SHARE;
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
@@ -65,9 +67,37 @@ pub fn tangents_of(
     Ok((Analysis::Time(analysis.expect("there is a seed")), tangents))
 }
 
+/// What is recorded of a simulation, and who may end it.
+pub struct Wanted {
+    /// Signals, by index and name.
+    pub signals: Vec<(usize, String)>,
+    /// Asks the simulation to end.
+    pub cancellation: Cancellation,
+}
+
+impl From<Vec<(usize, String)>> for Wanted {
+    fn from(signals: Vec<(usize, String)>) -> Self {
+        Self { signals, cancellation: Cancellation::default() }
+    }
+}
+
+/// Bytes that a simulation may record, tangents included: 100,000 steps, the limit of steps where nothing else is said, of a
+/// hundred signals.
+const ROOM: usize = 512 << 20;
+
+/// Bytes that traces are made with room for, at most: most simulations take few steps.
+const FIRST_ROOM: usize = 16 << 20;
+
+/// Bytes of a segment of a trace: its end and five coefficients.
+const SEGMENT: usize = 6 * size_of::<f64>();
+
 /// Records signals along the steps.
 struct Recorder<'a, X, F> {
     signals: &'a [(usize, String)],
+    cancellation: &'a Cancellation,
+    /// Bytes recorded so far, and how many may be.
+    taken: usize,
+    room: usize,
     /// The value of a signal, by its index, at a time and a state.
     output: &'a F,
     /// Traces of the signals, then of their tangents along every direction in turn.
@@ -125,6 +155,7 @@ const WEIGHTS: [f64; 5] = {
 impl<X: Clone, F> Recorder<'_, X, F> {
     /// Adds a segment that ends at `end` to the traces of a signal.
     fn push<S: Scalar>(&mut self, index: usize, end: f64, values: &[S; 5]) {
+        self.taken += SEGMENT * (1 + S::DIRECTIONS);
         self.traces[0][index].push(end, values.map(Scalar::value));
         for direction in 0..S::DIRECTIONS {
             self.traces[1 + direction][index].push(end, std::array::from_fn(|node| values[node].tangents()[direction]));
@@ -176,7 +207,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
             signal(step.start + s * step.taken, &state)
         };
         let values = Trace::NODES.map(&mut at);
-        if halvings == 0 || self.agrees(index, &values, &mut at) {
+        if halvings == 0 || self.taken > self.room || self.agrees(index, &values, &mut at) {
             self.push(index, step.start + to * step.taken, &values);
             return;
         }
@@ -233,15 +264,23 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
         }
     }
 
+    fn ends(&self, t: f64) -> Option<Failure> {
+        match self.cancellation.requested() {
+            Some(_) => Some(Failure::Cancelled),
+            None => (self.taken > self.room).then_some(Failure::RecordLimit(t)),
+        }
+    }
+
     fn event(&mut self, t: f64, what: &str) {
         // Events without a name are between branches of an expression, nothing that happens to the plant.
         if !what.is_empty() {
+            self.taken += size_of::<Event>() + what.len();
             self.events.push(Event { time: t, what: what.to_owned() });
         }
     }
 }
 
-/// Simulates from 0 to `end` and records `signals`, by index and name; `output` gives the value of one.
+/// Simulates from 0 to `end` and records signals; `output` gives the value of one.
 ///
 /// # Errors
 /// The failure of the simulation.
@@ -250,13 +289,31 @@ pub fn record<S: Scalar, D: Dynamics<S>>(
     start: D::State,
     end: f64,
     tolerance: &Tolerance,
-    signals: &[(usize, String)],
+    wanted: &Wanted,
     output: &impl Fn(&D, usize, f64, &D::State) -> S,
 ) -> Result<Recording, Failure> {
+    record_within(ROOM, dynamics, (start, end), tolerance, wanted, output)
+}
+
+/// [`record`] with the bytes that it may take.
+fn record_within<S: Scalar, D: Dynamics<S>>(
+    room: usize,
+    dynamics: &mut D,
+    (start, end): (D::State, f64),
+    tolerance: &Tolerance,
+    wanted: &Wanted,
+    output: &impl Fn(&D, usize, f64, &D::State) -> S,
+) -> Result<Recording, Failure> {
+    let Wanted { signals, cancellation } = wanted;
+    let traces = (1 + S::DIRECTIONS) * signals.len();
+    let segments = (FIRST_ROOM / SEGMENT / traces.max(1)).min(256);
     let mut recorder = Recorder {
         signals,
+        cancellation,
+        taken: 0,
+        room,
         output,
-        traces: vec![vec![Trace::starting_at(0.0, 256); signals.len()]; 1 + S::DIRECTIONS],
+        traces: vec![vec![Trace::starting_at(0.0, segments); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
         states: std::array::from_fn(|_| start.clone()),
         resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
@@ -271,9 +328,12 @@ pub fn record<S: Scalar, D: Dynamics<S>>(
     Ok(Recording { response, tangents })
 }
 
-/// Indices and names of the signals that a job wants.
-pub fn wanted(job: &Job<'_>, signals: &[mops_core::Variable]) -> Vec<(usize, String)> {
-    job.signals.iter().map(|&i| (i, signals[i].name.clone())).collect()
+/// What a job wants of a model with these signals.
+pub fn wanted(job: &Job<'_>, signals: &[mops_core::Variable]) -> Wanted {
+    Wanted {
+        signals: job.signals.iter().map(|&i| (i, signals[i].name.clone())).collect(),
+        cancellation: job.case.cancellation.clone(),
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The linear system along a simulation: how small forces at the ports move the states and signals of a model with effects.
 
-use mops_core::{Along, DIRECTIONS, Dual, Failure, Job, Opening, Port, Scalar};
+use mops_core::{Along, Cancellation, DIRECTIONS, Dual, Failure, Job, Opening, Port, Scalar};
 use nalgebra::DMatrix;
 
 use super::WithEffects;
@@ -35,6 +35,7 @@ pub struct Moment {
 /// The state at chosen times, the mode of the step included.
 struct Looks<'t> {
     times: &'t [f64],
+    cancellation: &'t Cancellation,
     next: usize,
     found: Vec<Look>,
 }
@@ -49,6 +50,10 @@ struct Look {
 }
 
 impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
+    fn ends(&self, _: f64) -> Option<Failure> {
+        self.cancellation.requested().map(|_| Failure::Cancelled)
+    }
+
     fn step(&mut self, step: &Step<Vec<f64>>, dynamics: &Driven<'a, f64>) {
         let end = step.start + step.taken;
         let mut x = vec![0.0; dynamics.size()];
@@ -79,7 +84,8 @@ impl WithEffects {
         let plant = f64::open(open, &job.parameters[..self.own()])?;
         let mut dynamics = self.driven(plant, &acting, job, job.parameters);
         let start = dynamics.start(job.parameters)?;
-        let mut looks = Looks { times, next: 0, found: Vec::with_capacity(times.len()) };
+        let mut looks =
+            Looks { times, cancellation: &job.case.cancellation, next: 0, found: Vec::with_capacity(times.len()) };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
         integrate(&mut dynamics, 0.0, end, start, &self.tolerance(open), &mut looks)?;
 

@@ -83,7 +83,12 @@ impl WithEffects {
                     return Err(Mistake::new(name, fact).with_help("give the effect another name"));
                 }
                 let default = strength.neutral;
-                interface.parameters.push(Parameter { variable, default, range: strength.bounds });
+                interface.parameters.push(Parameter {
+                    variable,
+                    default,
+                    range: strength.bounds,
+                    infinite: default == Some(f64::INFINITY),
+                });
             }
             let starts = (!effect.free_starts().is_empty()).then_some(interface.parameters.len());
             for (k, &dimension) in effect.free_starts().iter().enumerate() {
@@ -94,7 +99,7 @@ impl WithEffects {
                     about: "start value of a state of the effect, over where it would rest".to_owned(),
                 };
                 let range = [f64::NEG_INFINITY, f64::INFINITY];
-                interface.parameters.push(Parameter { variable, default: Some(0.0), range });
+                interface.parameters.push(Parameter { variable, default: Some(0.0), range, infinite: false });
                 let name = format!("{name}.{}", k + 1);
                 interface.states.push(State { name, start: parameter, signal: None, rate_of: None });
             }
@@ -146,7 +151,7 @@ impl WithEffects {
         let signals = wanted(job, &self.interface.signals);
         let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
         let recording = record(&mut dynamics, start, job.horizon, &self.tolerance(open), &signals, &output)?;
-        Ok(dynamics.remembered(recording, &signals))
+        Ok(dynamics.remembered(recording, &signals.signals))
     }
 }
 

@@ -7,10 +7,10 @@ mod matlab;
 #[cfg(test)]
 mod tests;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -69,6 +69,8 @@ pub struct DataFile {
     /// What is not, as `name: reason`.
     pub skipped: Vec<String>,
     layout: csv::Layout,
+    /// Variables by their names.
+    index: HashMap<String, usize>,
 }
 
 /// One column of numbers.
@@ -90,13 +92,16 @@ impl DataFile {
     /// a column of numbers is neither a finite number nor a gap, when rows differ in length, or when names repeat.
     pub fn read(path: &Path) -> Result<Self, Diagnostic> {
         let name = path.display().to_string();
-        match fs::read(path) {
+        match read_regular(path) {
             Ok(bytes) => Self::parse(&name, bytes),
             Err(error) => {
                 let source = Arc::new(Source { name, text: String::new() });
                 let (fact, way_out) = match error.kind() {
                     ErrorKind::NotFound => ("there is no such file".to_owned(), "check the path"),
                     ErrorKind::IsADirectory => ("this is a folder".to_owned(), "name a file in it"),
+                    ErrorKind::InvalidInput => {
+                        (error.to_string(), "name a file; what a pipe gives can be saved in one")
+                    }
                     _ => (format!("the file cannot be read: {error}"), "check its permissions"),
                 };
                 Err(Diagnostic::new(fact).with_help(way_out).at(&source, 0..0))
@@ -126,7 +131,8 @@ impl DataFile {
                 .with_help("save real, full matrices as variables of their own")
                 .at(&source, 0..0));
         }
-        Ok(Self { source, format, variables, skipped, layout: csv::Layout::default() })
+        let index = index_of(&variables);
+        Ok(Self { source, format, variables, skipped, layout: csv::Layout::default(), index })
     }
 
     fn parse_text(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
@@ -138,7 +144,8 @@ impl DataFile {
                 .at(&source, 0..0));
         }
         let (variables, skipped, layout) = read?;
-        Ok(Self { source, format: Format::Csv, variables, skipped, layout })
+        let index = index_of(&variables);
+        Ok(Self { source, format: Format::Csv, variables, skipped, layout, index })
     }
 
     /// The column that is the time where nobody says which: the one called `t`, or `time` in any case; or `T` if its unit is one
@@ -187,7 +194,7 @@ impl DataFile {
 
     /// Index of the variable and of the column in it.
     fn find(&self, name: &str) -> Option<(usize, usize)> {
-        let index_of = |name: &str| self.variables.iter().position(|variable| variable.name == name);
+        let index_of = |name: &str| self.index.get(name).copied();
         if let Some(variable) = index_of(name).filter(|&i| self.variables[i].columns == 1) {
             return Some((variable, 0));
         }
@@ -212,6 +219,30 @@ impl DataFile {
         Diagnostic::new(format!("no column `{name}` in {file}"))
             .with_help(suggestion(name, names.iter().map(String::as_str)))
     }
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// The file cannot be read. A device or a pipe, which may have no end or nobody at its other end, is `InvalidInput`.
+pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let kind = fs::metadata(path)?;
+    if kind.is_dir() {
+        return Err(ErrorKind::IsADirectory.into());
+    }
+    if !kind.is_file() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "this is a device or a pipe, not a file"));
+    }
+    fs::read(path)
+}
+
+/// Variables by their names; of several with one name the first.
+fn index_of(variables: &[Variable]) -> HashMap<String, usize> {
+    let mut index = HashMap::with_capacity(variables.len());
+    for (i, variable) in variables.iter().enumerate() {
+        index.entry(variable.name.clone()).or_insert(i);
+    }
+    index
 }
 
 /// MATLAB, too, lets the last of several variables with one name win.

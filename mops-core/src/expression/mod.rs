@@ -5,8 +5,10 @@ mod parse;
 mod tree;
 
 pub use functions::{FUNCTIONS, Function};
-pub use parse::{Equation, SyntaxError, equation};
+pub use parse::{DEEPEST, Equation, SyntaxError, equation};
 pub use tree::{Comparison, Form, Node, Operator};
+
+use std::collections::HashSet;
 
 use crate::scalar::Scalar;
 
@@ -27,10 +29,10 @@ impl Expression {
     /// A text that is not an expression, with the place of the first mistake.
     pub fn parse(text: &str) -> Result<Self, SyntaxError> {
         let root = parse::expression(text)?;
-        let mut names: Vec<String> = Vec::new();
+        let (mut names, mut seen): (Vec<String>, HashSet<&str>) = Default::default();
         let mut foreign = None;
         root.walk(&mut |node| match &node.form {
-            Form::Name(name) if !names.contains(name) => names.push(name.clone()),
+            Form::Name(name) if seen.insert(name) => names.push(name.clone()),
             Form::Rate(_) | Form::Member(..) => foreign = foreign.take().or(Some(node.span.clone())),
             _ => {}
         });
@@ -67,13 +69,10 @@ impl Node {
             Form::Number(number) => S::from(*number),
             Form::Name(name) => lookup(name),
             Form::Negative(a) => -value(a),
-            Form::Binary(operator, a, b) => match operator {
-                Operator::Add => value(a) + value(b),
-                Operator::Subtract => value(a) - value(b),
-                Operator::Multiply => value(a) * value(b),
-                Operator::Divide => value(a) / value(b),
-                Operator::Power => functions::power(value(a), value(b)),
-            },
+            Form::Chain(first, rest) => {
+                rest.iter().fold(value(first), |result, (operator, node)| operator.of(result, value(node)))
+            }
+            Form::Power(a, b) => functions::power(value(a), value(b)),
             Form::Call(Function::If, arguments) => {
                 let pairs = arguments.chunks_exact(2);
                 let otherwise = &pairs.remainder()[0];
@@ -92,8 +91,8 @@ impl Node {
     fn holds<S: Scalar>(&self, lookup: &impl Fn(&str) -> S) -> bool {
         match &self.form {
             Form::Compare(comparison, a, b) => comparison.holds(a.evaluate(lookup).value(), b.evaluate(lookup).value()),
-            Form::And(a, b) => a.holds(lookup) && b.holds(lookup),
-            Form::Or(a, b) => a.holds(lookup) || b.holds(lookup),
+            Form::All(conditions) => conditions.iter().all(|condition| condition.holds(lookup)),
+            Form::Any(conditions) => conditions.iter().any(|condition| condition.holds(lookup)),
             Form::Not(a) => !a.holds(lookup),
             _ => unreachable!("the reader has checked what stands where a condition is expected"),
         }
@@ -169,6 +168,70 @@ mod tests {
         assert_eq!(wrong("1 + (a > b)").span, 5..10);
         assert_eq!(wrong("1 + clip(a, 2)").span, 4..14);
         assert_eq!(wrong("1 + x'").span, 4..6);
+    }
+
+    #[test]
+    fn a_chain_may_have_any_number_of_operands() {
+        let n = 100_000;
+        let repeated = |first: &str, more: &str| format!("{first}{}", more.repeat(n));
+        let count = f64::from(u32::try_from(n).unwrap());
+        assert_eq!(value(&repeated("x", " + x"), &[0.5]), 0.5 * (count + 1.0));
+        assert_eq!(value(&repeated("x", "-x"), &[0.5]), 0.5 * (1.0 - count));
+        assert_eq!(value(&repeated("x", "-x+x"), &[0.25]), 0.25);
+        assert_eq!(value(&repeated("x", "*2/2"), &[3.0]), 3.0);
+        assert_eq!(value(&repeated("x", "+2*x^2"), &[1.0]), 1.0 + 2.0 * count);
+        assert_eq!(value(&repeated("x", "+(x)"), &[1.0]), count + 1.0);
+        assert_eq!(value(&format!("if({}, 1, 2)", repeated("x > 0", " or x < 0")), &[-1.0]), 1.0);
+        assert_eq!(value(&format!("if({}, 1, 2)", repeated("x > 0", " and x < 1")), &[0.5]), 1.0);
+        assert_eq!(value(&format!("max({})", repeated("x", ", 2*x")), &[3.0]), 6.0);
+        let names: String = (0..n).map(|i| format!("+x{i}")).collect();
+        assert_eq!(Expression::parse(&names[1..]).unwrap().names().len(), n);
+    }
+
+    #[test]
+    fn what_is_nested_too_deeply_is_refused_at_its_place() {
+        let nests: [(&str, &str); 12] = [
+            ("(", ")"),
+            ("sin(", ")"),
+            ("max(1, ", ")"),
+            ("min(", ", 2)"),
+            ("-(", ")"),
+            ("1 + 2*(", ")"),
+            ("x^", ""),
+            ("x^-", ""),
+            ("x ^ -(", ")"),
+            ("if(x > 0, ", ", 1)"),
+            ("if(", " > 0, 1, 0)"),
+            ("if(not (x > 0 and 1 > ", "), 1, 0)"),
+        ];
+        for (open, close) in nests {
+            let nested = |depth: usize| format!("{}x{}", open.repeat(depth), close.repeat(depth));
+            // One of these opens two brackets a level.
+            let levels = open.matches(['(', '^']).count();
+            assert!(Expression::parse(&nested(DEEPEST / levels)).is_ok(), "{open}");
+            for depth in [DEEPEST / levels + 1, 1000, 10_000, 40_000] {
+                let wrong = Expression::parse(&nested(depth)).unwrap_err();
+                assert_eq!(wrong.message, format!("nested more than {DEEPEST} deep"), "{open} {depth}");
+                let place = (open.len() * DEEPEST / levels).saturating_sub(open.len());
+                assert!((place..=place + 2 * open.len()).contains(&wrong.span.start), "{open}: {:?}", wrong.span);
+            }
+        }
+        // What stands beside each other is not nested.
+        assert_eq!(value(&format!("x{}", " + (x)^(2)".repeat(1000)), &[1.0]), 1001.0);
+        let wrong = equation(&format!("x' = {}x", "x[".repeat(300))).unwrap_err();
+        assert_eq!(wrong.message, format!("nested more than {DEEPEST} deep"));
+    }
+
+    #[test]
+    fn a_text_longer_than_a_megabyte_and_a_number_beyond_all_numbers_are_refused() {
+        let wrong = |text: &str| Expression::parse(text).unwrap_err();
+        let long = format!("x{}", "+x".repeat(600_000));
+        let found = wrong(&long);
+        assert!(found.message.contains("1048576") && found.span == (1 << 20..long.len()), "{found:?}");
+        for (text, span) in [("2 + 1e400", 4..9), ("x*1e999", 2..7), ("-1e309", 1..6)] {
+            assert_eq!(wrong(text), SyntaxError { span, message: "the number is too large".into() });
+        }
+        assert_eq!(value("1e308 + 1e-400", &[]), 1e308);
     }
 
     #[test]

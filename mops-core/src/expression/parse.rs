@@ -17,9 +17,9 @@ use std::ops::Range;
 
 use winnow::ascii::{float, multispace0};
 use winnow::combinator::{alt, cut_err, delimited, fail, opt, peek, preceded, repeat, separated};
-use winnow::error::{StrContext, StrContextValue};
+use winnow::error::{ContextError, ErrMode, StrContext, StrContextValue};
 use winnow::prelude::*;
-use winnow::stream::LocatingSlice;
+use winnow::stream::{LocatingSlice, Stateful};
 use winnow::token::{one_of, take_while};
 
 use super::functions::{FUNCTIONS, Function};
@@ -43,7 +43,17 @@ pub struct Equation {
     pub right: Node,
 }
 
-type Input<'t> = LocatingSlice<&'t str>;
+/// Brackets, functions, indices and exponents within each other, at most: each takes a part of the stack.
+pub const DEEPEST: usize = 200;
+
+/// Bytes of a text, at most. A sum of half a million terms fits in, and what is read of it into some 100 MB.
+const LONGEST: usize = 1 << 20;
+
+/// Marks the error of a text that is nested too deeply.
+const TOO_DEEP: StrContext = StrContext::Label("too deep");
+
+/// The text, and how deeply the reader is nested in it.
+type Input<'t> = Stateful<LocatingSlice<&'t str>, usize>;
 
 /// As read: functions by their names, conditions anywhere.
 enum Raw {
@@ -52,10 +62,11 @@ enum Raw {
     Member(String, Box<Spanned>),
     Rate(Box<Spanned>),
     Negative(Box<Spanned>),
-    Binary(Operator, Box<Spanned>, Box<Spanned>),
+    Chain(Box<Spanned>, Vec<(Operator, Spanned)>),
+    Power(Box<Spanned>, Box<Spanned>),
     Compare(Comparison, Box<Spanned>, Box<Spanned>),
-    And(Box<Spanned>, Box<Spanned>),
-    Or(Box<Spanned>, Box<Spanned>),
+    All(Vec<Spanned>),
+    Any(Vec<Spanned>),
     Not(Box<Spanned>),
     Call(String, Range<usize>, Vec<Spanned>),
 }
@@ -91,13 +102,17 @@ pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
     })
 }
 
-fn run<'t, T>(
-    text: &'t str,
-    mut parser: impl Parser<Input<'t>, T, winnow::error::ErrMode<winnow::error::ContextError>>,
-) -> Result<T, SyntaxError> {
-    parser.parse(LocatingSlice::new(text)).map_err(|error| {
+fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<ContextError>>) -> Result<T, SyntaxError> {
+    if text.len() > LONGEST {
+        let message = format!("{} bytes are more than the {LONGEST} that one expression may have", text.len());
+        return Err(SyntaxError { span: text.floor_char_boundary(LONGEST)..text.len(), message });
+    }
+    parser.parse(Stateful { input: LocatingSlice::new(text), state: 0 }).map_err(|error| {
         let from = error.offset();
         let to = (from + 1..=text.len()).find(|&end| text.is_char_boundary(end)).unwrap_or(from);
+        if error.inner().context().any(|context| *context == TOO_DEEP) {
+            return SyntaxError { span: from..to, message: format!("nested more than {DEEPEST} deep") };
+        }
         let rest: String = text[from..].chars().take(12).collect();
         let wanted: Vec<String> = error
             .inner()
@@ -136,19 +151,26 @@ fn condition_of(raw: Spanned) -> Result<Node, SyntaxError> {
 
 fn checked(Spanned { raw, span }: Spanned) -> Result<Node, SyntaxError> {
     let number = |raw: Box<Spanned>| number_of(*raw).map(Box::new);
-    let condition = |raw: Box<Spanned>| condition_of(*raw).map(Box::new);
+    let conditions = |raw: Vec<Spanned>| raw.into_iter().map(condition_of).collect::<Result<_, _>>();
     let form = match raw {
+        Raw::Number(value) if value.is_infinite() => {
+            return Err(SyntaxError { span, message: "the number is too large".to_owned() });
+        }
         Raw::Number(value) => Form::Number(value),
         Raw::Name(name) if name == "pi" => Form::Number(std::f64::consts::PI),
         Raw::Name(name) => Form::Name(name),
         Raw::Member(name, index) => Form::Member(name, number(index)?),
         Raw::Rate(of) => Form::Rate(number(of)?),
         Raw::Negative(a) => Form::Negative(number(a)?),
-        Raw::Binary(operator, a, b) => Form::Binary(operator, number(a)?, number(b)?),
+        Raw::Chain(first, rest) => {
+            let rest = rest.into_iter().map(|(operator, operand)| Ok((operator, number_of(operand)?)));
+            Form::Chain(number(first)?, rest.collect::<Result<_, SyntaxError>>()?)
+        }
+        Raw::Power(a, b) => Form::Power(number(a)?, number(b)?),
         Raw::Compare(comparison, a, b) => Form::Compare(comparison, number(a)?, number(b)?),
-        Raw::And(a, b) => Form::And(condition(a)?, condition(b)?),
-        Raw::Or(a, b) => Form::Or(condition(a)?, condition(b)?),
-        Raw::Not(a) => Form::Not(condition(a)?),
+        Raw::All(all) => Form::All(conditions(all)?),
+        Raw::Any(any) => Form::Any(conditions(any)?),
+        Raw::Not(a) => Form::Not(condition_of(*a).map(Box::new)?),
         Raw::Call(name, place, arguments) => call(&name, place, &span, arguments)?,
     };
     Ok(Node { form, span })
@@ -213,7 +235,7 @@ fn expected(what: &'static str) -> StrContext {
     StrContext::Expected(StrContextValue::Description(what))
 }
 
-fn word<'t>(word: &'static str) -> impl Parser<Input<'t>, (), winnow::error::ErrMode<winnow::error::ContextError>> {
+fn word<'t>(word: &'static str) -> impl Parser<Input<'t>, (), ErrMode<ContextError>> {
     move |input: &mut Input<'t>| {
         (multispace0, word, peek(winnow::combinator::not(one_of(is_letter))), multispace0).void().parse_next(input)
     }
@@ -223,16 +245,37 @@ fn is_letter(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
+/// What stands within something else: one level deeper.
+fn nested<'t>(
+    inner: fn(&mut Input<'t>) -> ModalResult<Spanned>,
+) -> impl Parser<Input<'t>, Spanned, ErrMode<ContextError>> {
+    move |input: &mut Input<'t>| {
+        if input.state == DEEPEST {
+            return cut_err(fail.context(TOO_DEEP)).parse_next(input);
+        }
+        input.state += 1;
+        let found = cut_err(inner).parse_next(input);
+        input.state -= 1;
+        found
+    }
+}
+
 fn disjunction(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let first = conjunction(input)?;
     let rest: Vec<Spanned> = repeat(0.., preceded(word("or"), cut_err(conjunction))).parse_next(input)?;
-    Ok(rest.into_iter().fold(first, |a, b| Spanned::binary(a, b, Raw::Or)))
+    Ok(joined(first, rest, Raw::Any))
 }
 
 fn conjunction(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let first = negation(input)?;
     let rest: Vec<Spanned> = repeat(0.., preceded(word("and"), cut_err(negation))).parse_next(input)?;
-    Ok(rest.into_iter().fold(first, |a, b| Spanned::binary(a, b, Raw::And)))
+    Ok(joined(first, rest, Raw::All))
+}
+
+fn joined(first: Spanned, rest: Vec<Spanned>, make: fn(Vec<Spanned>) -> Raw) -> Spanned {
+    let Some(last) = rest.last() else { return first };
+    let span = first.span.start..last.span.end;
+    Spanned { raw: make(std::iter::once(first).chain(rest).collect()), span }
 }
 
 fn negation(input: &mut Input<'_>) -> ModalResult<Spanned> {
@@ -277,15 +320,16 @@ fn chain(
 ) -> ModalResult<Spanned> {
     let rest: Vec<(char, Spanned)> =
         repeat(0.., (delimited(multispace0, one_of(operators), multispace0), cut_err(operand))).parse_next(input)?;
-    Ok(rest.into_iter().fold(first, |a, (symbol, b)| {
-        let operator = match symbol {
-            '+' => Operator::Add,
-            '-' => Operator::Subtract,
-            '*' => Operator::Multiply,
-            _ => Operator::Divide,
-        };
-        Spanned::binary(a, b, |a, b| Raw::Binary(operator, a, b))
-    }))
+    let Some((_, last)) = rest.last() else { return Ok(first) };
+    let span = first.span.start..last.span.end;
+    let operator = |symbol: char| match symbol {
+        '+' => Operator::Add,
+        '-' => Operator::Subtract,
+        '*' => Operator::Multiply,
+        _ => Operator::Divide,
+    };
+    let rest = rest.into_iter().map(|(symbol, operand)| (operator(symbol), operand)).collect();
+    Ok(Spanned { raw: Raw::Chain(Box::new(first), rest), span })
 }
 
 /// `-x^2` is `-(x^2)`.
@@ -300,9 +344,9 @@ fn signed(input: &mut Input<'_>) -> ModalResult<Spanned> {
 
 fn power(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let base = operand(input)?;
-    let exponent = opt(preceded((multispace0, '^', multispace0), cut_err(signed))).parse_next(input)?;
+    let exponent = opt(preceded((multispace0, '^', multispace0), nested(signed))).parse_next(input)?;
     Ok(match exponent {
-        Some(exponent) => Spanned::binary(base, exponent, |a, b| Raw::Binary(Operator::Power, a, b)),
+        Some(exponent) => Spanned::binary(base, exponent, Raw::Power),
         None => base,
     })
 }
@@ -319,7 +363,7 @@ fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
 }
 
 fn bracketed(input: &mut Input<'_>) -> ModalResult<Spanned> {
-    delimited(('(', multispace0), cut_err(disjunction), (multispace0, cut_err(')').context(expected("`)`"))))
+    delimited(('(', multispace0), nested(disjunction), (multispace0, cut_err(')').context(expected("`)`"))))
         .parse_next(input)
 }
 
@@ -331,7 +375,7 @@ fn name_or_call(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let name: &str = name;
     let arguments: Option<(Vec<Spanned>, Range<usize>)> = opt(delimited(
         (multispace0, '(', multispace0),
-        separated(1.., cut_err(disjunction), (multispace0, ',', multispace0)),
+        separated(1.., nested(disjunction), (multispace0, ',', multispace0)),
         (multispace0, cut_err(')').context(expected("`)`"))),
     )
     .with_span())
@@ -339,7 +383,7 @@ fn name_or_call(input: &mut Input<'_>) -> ModalResult<Spanned> {
     if let Some((arguments, end)) = arguments {
         return Ok(Spanned { span: span.start..end.end, raw: Raw::Call(name.to_owned(), span, arguments) });
     }
-    let index = opt(delimited(('[', multispace0), cut_err(sum), (multispace0, cut_err(']').context(expected("`]`")))))
+    let index = opt(delimited(('[', multispace0), nested(sum), (multispace0, cut_err(']').context(expected("`]`")))))
         .with_span()
         .parse_next(input)?;
     let quantity = match index {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::functions::Function;
+use crate::scalar::Scalar;
 
 /// A part of an expression.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,21 +27,24 @@ pub enum Form {
     Rate(Box<Node>),
     /// `-a`.
     Negative(Box<Node>),
-    /// `a + b` and the like.
-    Binary(Operator, Box<Node>, Box<Node>),
+    /// A sum or a product, from left to right: `a - b + c` is `a`, then `- b`, then `+ c`. It is flat, so that its length
+    /// takes no stack.
+    Chain(Box<Node>, Vec<(Operator, Node)>),
+    /// `a ^ b`; `x^2^3` is `x^(2^3)`.
+    Power(Box<Node>, Box<Node>),
     /// `f(a, b, ..)`.
     Call(Function, Vec<Node>),
     /// A condition: `a > b`.
     Compare(Comparison, Box<Node>, Box<Node>),
-    /// A condition: both.
-    And(Box<Node>, Box<Node>),
-    /// A condition: one or both.
-    Or(Box<Node>, Box<Node>),
+    /// A condition: all of them, `a and b`.
+    All(Vec<Node>),
+    /// A condition: at least one of them, `a or b`.
+    Any(Vec<Node>),
     /// A condition: the opposite.
     Not(Box<Node>),
 }
 
-/// Arithmetic between two numbers.
+/// Arithmetic between the operands of a [`Form::Chain`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operator {
     /// `a + b`.
@@ -51,8 +55,18 @@ pub enum Operator {
     Multiply,
     /// `a / b`.
     Divide,
-    /// `a ^ b`; `x^2^3` is `x^(2^3)`.
-    Power,
+}
+
+impl Operator {
+    /// The result for two operands.
+    pub fn of<S: Scalar>(self, a: S, b: S) -> S {
+        match self {
+            Self::Add => a + b,
+            Self::Subtract => a - b,
+            Self::Multiply => a * b,
+            Self::Divide => a / b,
+        }
+    }
 }
 
 /// A comparison of two numbers.
@@ -83,7 +97,7 @@ impl Comparison {
 impl Node {
     /// Whether it is a condition, not a number.
     pub fn is_condition(&self) -> bool {
-        matches!(self.form, Form::Compare(..) | Form::And(..) | Form::Or(..) | Form::Not(_))
+        matches!(self.form, Form::Compare(..) | Form::All(_) | Form::Any(_) | Form::Not(_))
     }
 
     /// The nodes directly below.
@@ -91,8 +105,11 @@ impl Node {
         match &self.form {
             Form::Number(_) | Form::Name(_) => Vec::new(),
             Form::Member(_, a) | Form::Rate(a) | Form::Negative(a) | Form::Not(a) => vec![a],
-            Form::Binary(_, a, b) | Form::Compare(_, a, b) | Form::And(a, b) | Form::Or(a, b) => vec![a, b],
-            Form::Call(_, arguments) => arguments.iter().collect(),
+            Form::Chain(first, rest) => {
+                std::iter::once(first.as_ref()).chain(rest.iter().map(|(_, node)| node)).collect()
+            }
+            Form::Power(a, b) | Form::Compare(_, a, b) => vec![a, b],
+            Form::Call(_, nodes) | Form::All(nodes) | Form::Any(nodes) => nodes.iter().collect(),
         }
     }
 

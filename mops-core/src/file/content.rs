@@ -68,7 +68,7 @@ impl Files for Listed<'_> {
 /// FNV-1a of 128 bits, in hexadecimal: files that differ by accident have other ones.
 ///
 /// Source: G. Fowler, L. C. Noll, K.-P. Vo, The FNV non-cryptographic hash algorithm, IETF draft (2019).
-fn digest(bytes: &[u8]) -> String {
+pub fn digest(bytes: &[u8]) -> String {
     const PRIME: u128 = 0x0100_0000_0000_0000_0000_013b;
     let basis = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d_u128;
     format!("{:032x}", bytes.iter().fold(basis, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME)))

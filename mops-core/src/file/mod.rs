@@ -18,6 +18,7 @@ mod tree;
 use std::io;
 use std::sync::Arc;
 
+pub use content::digest;
 pub use entries::{Entries, Short};
 pub use parts::{case, criterion, experiment, model};
 pub use schema::{describe, schema_of, study_schema, tables, tables_with};

@@ -179,7 +179,9 @@ impl InputSection {
     pub fn input(&self, unit: &Unit) -> Result<Input, Mistake> {
         let number = |key: &'static str, quantity: &Quantity, unit: &Unit| {
             let unitless = |m: Mistake| m.with_help(format!("a number without a unit counts in `{unit}`"));
-            quantity.to(unit).map_err(|why| unitless(Mistake::new(key, why)))
+            let value = quantity.to(unit).map_err(|why| unitless(Mistake::new(key, why)))?;
+            let finite = || Mistake::new(key, format!("an input must be finite, not {value}"));
+            value.is_finite().then_some(value).ok_or_else(|| finite().with_help("give a number"))
         };
         let or_zero = |key: &'static str, quantity: &Option<Quantity>, unit: &Unit| {
             quantity.as_ref().map_or(Ok(0.0), |quantity| number(key, quantity, unit))

@@ -83,7 +83,8 @@ impl Text {
 fn merge<'t>(into: &mut DeTable<'t>, from: DeTable<'t>) {
     for (key, value) in from {
         match into.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut) {
-            Some(DeValue::Table(old)) if value.get_ref().is_table() => {
+            // An empty table adds nothing: it stands for the table that is there.
+            Some(DeValue::Table(old)) if value.get_ref().as_table().is_some_and(|new| !new.is_empty()) => {
                 let DeValue::Table(new) = value.into_inner() else { unreachable!("it is a table") };
                 merge(old, new);
             }

@@ -264,8 +264,7 @@ impl Span {
         let size = self.slope.norm() + self.rest;
         let growth = size.exp_m1();
         let u = t.norm() * growth;
-        // The comparison is false for NaN too.
-        if !(u <= 0.9) {
+        if u.is_nan() || u > 0.9 {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
         // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) where ln L changes by e.

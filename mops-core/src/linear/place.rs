@@ -84,7 +84,7 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<Pl
     let (_, mut best) = best.ok_or("the poles cannot be placed: their directions depend on each other")?;
     let farthest = distance(&best.poles, &poles, relative);
     let unstable = |list: &[Complex]| list.iter().filter(|p| p.re >= 0.0).count();
-    if !(farthest <= FARTHEST) || unstable(&best.poles) > unstable(&poles) {
+    if farthest.is_nan() || farthest > FARTHEST || unstable(&best.poles) > unstable(&poles) {
         return Err(format!(
             "the poles cannot be placed: with the best feedback found one lies {:.3e} 1/s from where it was asked for, by \
              rounding alone, as the request is ill-conditioned; move repeated poles apart, or ask for slower ones",

@@ -88,9 +88,9 @@ fn shifts(h: &DMatrix<f64>, lo: usize, hi: usize, step: usize) -> [Complex; 2] {
     let at = |i: usize, j: usize| h[(i, j)];
     // Exceptional shifts by turns from the lower and the upper end. Source: LAPACK, `dlahqr`.
     let exceptional = |diagonal: f64, s: f64| [0.75 * s + diagonal, -0.4375 * s, s, 0.75 * s + diagonal];
-    let [a, b, c, d] = if step % (2 * EXCEPTIONAL) == 0 {
+    let [a, b, c, d] = if step.is_multiple_of(2 * EXCEPTIONAL) {
         exceptional(at(hi, hi), at(hi, hi - 1).abs() + at(hi - 1, hi - 2).abs())
-    } else if step % EXCEPTIONAL == 0 {
+    } else if step.is_multiple_of(EXCEPTIONAL) {
         exceptional(at(lo, lo), at(lo + 1, lo).abs() + at(lo + 2, lo + 1).abs())
     } else {
         [at(hi - 1, hi - 1), at(hi - 1, hi), at(hi, hi - 1), at(hi, hi)]

@@ -61,12 +61,12 @@ impl Equation {
             // Newton's step: the next X satisfies a Lyapunov equation.
             let next = lyapunov(&closed.transpose(), &(&self.q + &x * &self.g * &x))?;
             let left = self.residual(&next);
-            if !(left < 0.5 * residual) {
+            if left.is_nan() || left >= 0.5 * residual {
                 break;
             }
             (x, residual) = (next, left);
         }
-        if !(residual <= SOLVED) {
+        if residual.is_nan() || residual > SOLVED {
             return Err(format!(
                 "the Riccati equation was not solved: a relative residual of {residual:.1e} is left; weights whose sizes \
                  differ less may help"

@@ -52,7 +52,7 @@ pub(super) fn passes(
             }
         }
         // Where nothing is known yet the change is not a number.
-        if !(change <= TOUCHING) && span.high - span.low > 1e-13 * span.high {
+        if (change.is_nan() || change > TOUCHING) && span.high - span.low > 1e-13 * span.high {
             let [first, second] = span.split(of);
             open.extend([second, first]);
         }

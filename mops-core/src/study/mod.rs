@@ -25,6 +25,7 @@ pub use tasks::{
 };
 pub use uncertain::{DistributionDraft, UncertainDraft};
 
+use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::criterion::{Criterion, Usage, Value};
 use crate::demand::{Demand, Scaled};
@@ -207,6 +208,11 @@ impl Study {
             && same(&self.jobs, &other.jobs, same_job)
             && same(&self.rows, &other.rows, same_row)
             && same(&self.tuners, &other.tuners, same_tuner)
+    }
+
+    /// Lets a request to end reach the simulations of this study, and of every study that is made from it.
+    pub fn cancelled_by(&mut self, cancellation: &Cancellation) {
+        self.cases.iter_mut().for_each(|case| case.cancellation.clone_from(cancellation));
     }
 
     /// Start values of all tuners, ties applied.

@@ -9,6 +9,7 @@ use mops_core::Diagnostic;
 use super::super::tables::{number, table};
 use super::super::{Trouble, cannot_write, print};
 use crate::bench::diagnosis::{Answer, Cases, Reply, Tools, spelt};
+use crate::files;
 
 /// Diagnoses every case of a folder, writes the answers, and prints a line for each.
 pub(super) fn answer(
@@ -29,8 +30,8 @@ pub(super) fn answer(
     if let Some(trouble) = refused.into_inner().expect("all threads have ended") {
         return Err(trouble);
     }
-    print(&text(&replies));
-    print(&format!("\nanswers, predictions and studies are in {}\n", answers.display()));
+    print(&text(&replies))?;
+    print(&format!("\nanswers, predictions and studies are in {}\n", answers.display()))?;
     let failed = replies.iter().any(|reply| reply.said.is_err());
     Ok(if failed { ExitCode::from(3) } else { ExitCode::SUCCESS })
 }
@@ -39,7 +40,7 @@ pub(super) fn answer(
 fn leave(answers: &Path, reply: &Reply) -> Result<(), Trouble> {
     let write = |name: String, content: &str| {
         let path = answers.join(name);
-        std::fs::write(&path, content).map_err(cannot_write(&path))
+        files::write(&path, content).map_err(cannot_write(&path))
     };
     let name = &reply.name;
     if !reply.study.is_empty() {

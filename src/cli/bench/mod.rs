@@ -13,6 +13,7 @@ use mops_core::{Catalogue, Diagnostic, suggestion};
 use super::progress::Progress;
 use super::{Trouble, cannot_write, print};
 use crate::bench::diagnosis::{self, Beside, Kind, Plan, Tools};
+use crate::files;
 
 /// What can be said to a benchmark.
 #[derive(Args)]
@@ -126,7 +127,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let results = diagnosis::run(&plan, tools, jobs, beside);
     progress.finish();
     let text = tables::all(&results);
-    print(&text);
+    print(&text)?;
     if let Some(folder) = &arguments.out {
         write(folder, "cases.csv", &diagnosis::csv(&results.rows))?;
         write(folder, "strengths.csv", &diagnosis::strengths(&results.rows))?;
@@ -147,7 +148,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
 fn write(folder: &Path, name: &str, content: &str) -> Result<(), Trouble> {
     std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
     let path = folder.join(name);
-    std::fs::write(&path, content).map_err(cannot_write(&path))
+    files::write(&path, content).map_err(cannot_write(&path))
 }
 
 /// What is asked for, names checked.

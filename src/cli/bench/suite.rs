@@ -108,7 +108,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
     progress.finish();
     let text = text(&results, before.as_ref());
-    print(&text);
+    print(&text)?;
     if let Some(folder) = &arguments.out {
         let json = serde_json::to_string_pretty(&results).expect("numbers and names can be written");
         write(folder, "results.json", &(json + "\n"))?;

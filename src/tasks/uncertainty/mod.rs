@@ -6,7 +6,7 @@ mod profile;
 
 use mops_core::identification::Covariance;
 use mops_core::statistics::t_quantile;
-use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Stop, Study, UncertaintyReport, Watch};
+use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Study, UncertaintyReport, Watch};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use profile::Profiles;
@@ -27,7 +27,7 @@ struct Calibrated<'a> {
 /// Adds what the study asks for.
 pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     let Some(task) = solved.problem.study().tasks.uncertainty.clone() else { return };
-    if solved.outcome.stop == Stop::Interrupted {
+    if watch.wants_stop() {
         return;
     }
     let problem = &solved.problem;
@@ -36,6 +36,10 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     let least_squares =
         problem.shape().residuals > 0 && LevenbergMarquardtOptions::default().local().accepts(problem.shape()).is_ok();
     let covariance = Covariance::at(problem, &best.tuners).filter(|_| least_squares && best.scaled.is_some());
+    if watch.wants_stop() {
+        solved.outcome.stop = watch.halt().into();
+        return;
+    }
     let Some(covariance) = covariance else {
         let why = "the uncertainty of the estimates cannot be told: the objective is no sum of squares, a simulation \
                    failed, or the samples are too few";
@@ -74,7 +78,7 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     }
     report.words = words(&report, &calibrated);
     if watch.wants_stop() {
-        solved.outcome.stop = Stop::Interrupted;
+        solved.outcome.stop = watch.halt().into();
     }
     solved.outcome.simulations += simulations;
     solved.outcome.found.uncertainty = Some(report);

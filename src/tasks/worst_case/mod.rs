@@ -4,7 +4,7 @@ mod climb;
 mod search;
 
 use mops_core::{
-    CoordinateReport, Problem, Row, Slice, Stop, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
+    CoordinateReport, Problem, Row, Slice, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
 };
 
 pub(super) use search::{Question, Region, Worst};
@@ -39,7 +39,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let simulations = simulations + drawn.iter().flatten().map(|slice| slice.x.len()).sum::<usize>();
     criteria.iter_mut().zip(drawn).for_each(|(of, slices)| of.slices = slices);
     if criteria.is_empty() {
-        solved.outcome.stop = Stop::Interrupted;
+        solved.outcome.stop = watch.halt().into();
     }
     let words = words(&criteria);
     let parameters = uncertain_reports(region.study());

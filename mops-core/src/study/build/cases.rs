@@ -2,6 +2,7 @@
 
 use super::Models;
 use super::values::{check_horizon, converted, in_range, signal_names};
+use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment, Input, ResponseData};
@@ -31,7 +32,15 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
     let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
     let horizon = draft.horizon.or(end);
     check_horizon(draft.horizon)?;
-    Ok(Case { name: draft.name.clone(), parameters, inputs, experiment, horizon, begins: 0.0 })
+    Ok(Case {
+        name: draft.name.clone(),
+        parameters,
+        inputs,
+        experiment,
+        horizon,
+        begins: 0.0,
+        cancellation: Cancellation::default(),
+    })
 }
 
 fn build_input(

@@ -54,11 +54,13 @@ pub(super) fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64
 
 pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mistake> {
     let [low, high] = parameter.range;
-    if (low..=high).contains(&value) {
+    if (low..=high).contains(&value) && (value.is_finite() || parameter.infinite) {
         return Ok(());
     }
     let Variable { name, unit, about } = &parameter.variable;
-    let wanted = if high < f64::INFINITY {
+    let wanted = if (low..=high).contains(&value) {
+        "be finite".to_owned()
+    } else if high < f64::INFINITY {
         format!("lie between {low} and {}", unit.amount(high))
     } else if low == 0.0 {
         "not be negative".to_owned()
