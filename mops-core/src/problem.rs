@@ -446,18 +446,22 @@ impl Problem {
         if self.shape.objective != Objective::Sum {
             return all;
         }
-        for ((row, (usage, weight)), residuals) in self.study.rows.iter().zip(&self.shape.rows).zip(of_rows) {
-            if *usage != Usage::Minimise {
-                continue;
-            }
-            let Demand::Value(demand) = row.demand else { return Vec::new() };
-            if residuals.is_empty() {
-                return Vec::new();
-            }
-            let factor = (weight / demand).sqrt();
+        for (row, residuals) in of_rows.into_iter().enumerate().filter(|(row, _)| self.is_minimised(*row)) {
+            let Some(factor) = self.residual_factor(row).filter(|_| !residuals.is_empty()) else { return Vec::new() };
             all.extend(residuals.into_iter().map(|r| factor * r));
         }
         all
+    }
+
+    /// Whether a row enters the objective.
+    pub(crate) fn is_minimised(&self, row: usize) -> bool {
+        self.shape.rows[row].0 == Usage::Minimise
+    }
+
+    /// Factor of the residuals of a row in the residual vector: the root of weight / demand; `None` without such a demand.
+    pub(crate) fn residual_factor(&self, row: usize) -> Option<f64> {
+        let Demand::Value(demand) = self.study.rows[row].demand else { return None };
+        Some((self.shape.rows[row].1 / demand).sqrt())
     }
 }
 
