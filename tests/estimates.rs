@@ -9,5 +9,7 @@ mod closed_forms;
 mod coverage;
 #[path = "estimates/identifiability.rs"]
 mod identifiability;
+#[path = "estimates/local_tuners.rs"]
+mod local_tuners;
 #[path = "estimates/profile_ends.rs"]
 mod profile_ends;

@@ -110,13 +110,11 @@ impl Problem {
         Self::with(study, active, base, own_usage)
     }
 
-    /// The problem of one case alone: its free start values are active, all else keeps the values in `tuners`. This is how
-    /// start values are estimated again on data that must move no parameter.
+    /// The problem of one case alone: the tuners of this case (free start values, and all with `per-case = true`) are active,
+    /// all else keeps the values in `tuners`. This estimates what is local to an experiment whose data must move no parameter
+    /// of the study.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
-        let starts: Vec<&str> =
-            study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect();
-        let moves =
-            |tuner: &Tuner| tuner.active && tuner.case == Some(case) && starts.contains(&tuner.parameter.as_str());
+        let moves = |tuner: &Tuner| tuner.active && tuner.case == Some(case);
         let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
