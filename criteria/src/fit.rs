@@ -1,8 +1,8 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Tangent, Unit, Value,
-    Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Samples, Sense, Tangent, Unit,
+    Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -101,6 +101,12 @@ impl Criterion for Bound {
         let slopes = slopes.iter().enumerate().map(|(i, d)| self.root_weight(&channel.times, i) * d).collect();
         Ok(Value::slope_of_squares(&tangent.value.residuals, slopes))
     }
+
+    fn samples(&self, case: &Case) -> Option<Samples> {
+        let channel = case.experiment.as_ref()?.channel(&self.signal.name)?;
+        let weights = (0..channel.times.len()).map(|i| self.root_weight(&channel.times, i)).collect();
+        Some(Samples { signal: self.signal.name.clone(), weights, noise: channel.noise })
+    }
 }
 
 impl Bound {
@@ -137,6 +143,11 @@ mod tests {
         assert_near(value.number, 2.5 * (0.5 + 1.5 * 4.0 + 1.5 * 9.0 + 0.5 * 0.25), 1e-12);
         assert_eq!(value.number, value.residuals.iter().map(|r| r * r).sum::<f64>());
         assert_near(value.residuals[1], -2.0 * f64::sqrt(2.5 * 1.5), 1e-12);
+        let weights = bound(&fit).samples(&case).unwrap().weights;
+        let differences = [1.0, -2.0, 3.0, 0.5];
+        for ((residual, weight), difference) in value.residuals.iter().zip(&weights).zip(differences) {
+            assert_near(*residual, weight * difference, 1e-12);
+        }
         assert_eq!((bound(&fit).unit(), fit.needs_measurement()), (Unit::known("m2 s"), Some("y")));
     }
 

@@ -1,8 +1,8 @@
 //! Fit to a measurement, in units of its noise.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Tangent,
-    Unit, Value,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Samples, Sense,
+    Tangent, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -97,6 +97,12 @@ impl Criterion for Bound {
         let scale = self.scale(channel)?;
         Ok(Value::slope_of_squares(&tangent.value.residuals, slopes.iter().map(|d| scale * d).collect()))
     }
+
+    fn samples(&self, case: &Case) -> Option<Samples> {
+        let channel = case.experiment.as_ref()?.channel(&self.signal)?;
+        let weights = vec![self.scale(channel).ok()?; channel.times.len()];
+        Some(Samples { signal: self.signal.clone(), weights, noise: self.noise.or(channel.noise) })
+    }
 }
 
 impl Bound {
@@ -112,7 +118,7 @@ impl Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::common::testing::{assert_near, measured, quantity, simulated, undefined_in, value_in};
+    use crate::common::testing::{assert_near, bound, measured, quantity, simulated, undefined_in, value_in};
 
     fn error(noise: Option<&str>) -> NormalisedError {
         NormalisedError { signal: "y".into(), noise: noise.map(quantity) }
@@ -124,6 +130,8 @@ mod tests {
         let value = value_in(&case, &error(None), &simulated(3.0, |t| t));
         assert_near(value.number, 1.0, 1e-12);
         assert_near(value.residuals[1], 0.5, 1e-12);
+        let samples = bound(&error(None)).samples(&case).unwrap();
+        assert_eq!((samples.weights, samples.noise), (vec![5.0; 4], Some(0.1)));
         let option = value_in(&case, &error(Some("20 cm")), &simulated(3.0, |t| t));
         assert_near(option.number, 0.25, 1e-12);
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
 use crate::model::{Analysis, AnalysisKind, Interface};
+use crate::samples::Samples;
 use crate::study::Mistake;
 use crate::unit::Unit;
 
@@ -84,6 +85,12 @@ pub trait Criterion: Send + Sync {
             residuals: high.residuals.iter().zip(&low.residuals).map(slope).collect(),
             ..Value::default()
         })
+    }
+
+    /// The samples that its residuals compare with: the standard errors of a calibration rest on their noise. `None`, the
+    /// default, where there are no residuals, or where nothing is known of them but that they have one variance.
+    fn samples(&self, _case: &Case) -> Option<Samples> {
+        None
     }
 
     /// Levels to draw beside the signals, where the criterion has some; `limit` is the value that scales to 1.

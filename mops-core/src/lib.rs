@@ -33,6 +33,7 @@ mod problem;
 mod random;
 mod robustness;
 mod run;
+mod samples;
 mod scalar;
 mod slopes;
 mod solver;
@@ -85,6 +86,7 @@ pub use robustness::{
     UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
 };
 pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch};
+pub use samples::Samples;
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use slopes::{CriterionSlopes, SlopesReport};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};

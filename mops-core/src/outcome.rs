@@ -259,9 +259,10 @@ pub struct ParameterReport {
     pub name: String,
     /// Estimate.
     pub value: f64,
-    /// Standard error to first order, for white residuals; null where the data do not tell.
+    /// Standard error to first order; null where the data do not determine it.
     pub std_error: f64,
-    /// Estimate +- 1.96 standard errors, within the bounds.
+    /// 95 % interval: estimate +- t quantile times standard error, within the bounds; null where the data do not determine
+    /// it.
     pub interval95: [f64; 2],
     /// Unit of all of these.
     pub unit: String,

@@ -120,13 +120,11 @@ impl Problem {
         Self::with(study, active, base, own_usage)
     }
 
-    /// The problem of one case alone: its free start values are active, all else keeps the values in `tuners`. This is how
-    /// start values are estimated again on data that must move no parameter.
+    /// The problem of one case alone: the tuners of this case (free start values, and all with `per-case = true`) are active,
+    /// all else keeps the values in `tuners`. This estimates what is local to an experiment whose data must move no parameter
+    /// of the study.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
-        let starts: Vec<&str> =
-            study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect();
-        let moves =
-            |tuner: &Tuner| tuner.active && tuner.case == Some(case) && starts.contains(&tuner.parameter.as_str());
+        let moves = |tuner: &Tuner| tuner.active && tuner.case == Some(case);
         let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
@@ -487,18 +485,26 @@ impl Problem {
         if self.shape.objective != Objective::Sum {
             return all;
         }
-        for ((row, (usage, weight)), residuals) in self.study.rows.iter().zip(&self.shape.rows).zip(of_rows) {
-            if *usage != Usage::Minimise {
-                continue;
-            }
-            let Demand::AtMost(demand) = row.demand else { return Vec::new() };
-            if residuals.is_empty() || row.reversed {
-                return Vec::new();
-            }
-            let factor = (weight / demand).sqrt();
+        for (row, residuals) in of_rows.into_iter().enumerate().filter(|(row, _)| self.is_minimised(*row)) {
+            let Some(factor) = self.residual_factor(row).filter(|_| !residuals.is_empty()) else { return Vec::new() };
             all.extend(residuals.into_iter().map(|r| factor * r));
         }
         all
+    }
+
+    /// Whether a row enters the objective.
+    pub(crate) fn is_minimised(&self, row: usize) -> bool {
+        self.shape.rows[row].0 == Usage::Minimise
+    }
+
+    /// Factor of the residuals of a row in the residual vector: the root of weight / demand; `None` without such a demand.
+    pub(crate) fn residual_factor(&self, row: usize) -> Option<f64> {
+        match self.study.rows[row] {
+            Row { demand: Demand::AtMost(demand), reversed: false, .. } => {
+                Some((self.shape.rows[row].1 / demand).sqrt())
+            }
+            _ => None,
+        }
     }
 }
 

@@ -111,7 +111,8 @@ pub(super) struct TunerSection {
     pub active: Option<bool>,
     /// Expression of tuners that stand before this one, such as `"4*Td"`; the tuner follows it.
     pub tie: Option<String>,
-    /// One value for every case or experiment instead of one for the study.
+    /// One value for every case or experiment instead of one for the study. In selection and validation experiments it is
+    /// estimated from their own data, as start values are.
     #[serde(default)]
     pub per_case: bool,
     /// Values at the start in cases or experiments that begin elsewhere, by their names; with `per-case`.

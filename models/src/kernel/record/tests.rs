@@ -1,7 +1,7 @@
 //! Recorded signals against what they are functions of.
 
 use super::*;
-use mops_core::{Halt, IntegrationMethod};
+use mops_core::Halt;
 
 /// A state that rests, or runs with the clock: either way steps are as long as they may be.
 struct Idle(f64);

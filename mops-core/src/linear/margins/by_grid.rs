@@ -37,17 +37,17 @@ impl Factored {
             }
         };
         let mut poles: Vec<Complex> = (0..3).flat_map(|_| root(true)).collect();
-        let mut zeros = root(seed % 5 != 0);
-        if seed % 7 == 0 {
+        let mut zeros = root(!seed.is_multiple_of(5));
+        if seed.is_multiple_of(7) {
             poles.extend(root(false));
         }
-        if seed % 3 == 0 {
+        if seed.is_multiple_of(3) {
             zeros.clear();
         }
-        if seed % 4 == 0 {
+        if seed.is_multiple_of(4) {
             poles.push(c(0.0, 0.0));
         }
-        let delay = if seed % 2 == 0 { (stream.random_range(-2.0..1.0) * LN_10).exp() } else { 0.0 };
+        let delay = if seed.is_multiple_of(2) { (stream.random_range(-2.0..1.0) * LN_10).exp() } else { 0.0 };
         let bare = Self { zeros, poles, gain: 1.0, delay };
         // A gain of a thirtieth to thirty somewhere among the corners.
         let omega = (stream.random_range(-1.0..2.0) * LN_10).exp();
