@@ -14,7 +14,7 @@ const FITTED_ALONE: f64 = 0.999;
 
 /// Noise of all residuals.
 ///
-/// A record whose residuals are white and of constant size has one variance ([`Sharing::variances`]):
+/// A record whose residuals are white and of constant size has one variance (`Sharing::variances`):
 /// - records without a declared noise have a variance each;
 /// - records with a declared noise share one factor on their declared variances, except those that contradict the others
 ///   (F test): these have a variance each too.

@@ -46,7 +46,7 @@ pub type Eigen = Vec<(f64, Vec<f64>)>;
 /// small or nearly linear, and the information of the data by the variance of white noise. An eigenvector of eigenvalue
 /// zero is a direction along which, to first order, nothing changes: the tuners are not locally identifiable.
 ///
-/// A direction counts as determined where the slopes resolve it and the noise leaves it ([`Sensitivity::judge`]). Slopes resolve
+/// A direction counts as determined where the slopes resolve it and the noise leaves it (`Sensitivity::judge`). Slopes resolve
 /// singular values of `J` with columns of unit length, so that no choice of units matters, down to `zero` times the largest: below
 /// is what their accuracy leaves of an exact zero.
 ///

@@ -45,7 +45,7 @@ pub struct Placement {
 /// model, poles are placed one after the other. The eigenvalues of `A - B K` are compared with `poles`
 /// before anything is returned.
 ///
-/// Source: the ways are those of [`robust`] and [`deflation`]; which poles allow independent eigenvectors: H. H. Rosenbrock,
+/// Source: the ways are those of `robust` and `deflation`; which poles allow independent eigenvectors: H. H. Rosenbrock,
 /// State-space and Multivariable Theory (1970), chapter 5, theorem 4.2.
 ///
 /// # Errors
