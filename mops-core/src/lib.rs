@@ -65,7 +65,7 @@ pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
-pub use linearised::{Linearise, Linearised, Resting};
+pub use linearised::{Linearise, Linearised, Resting, Rough};
 pub use model::{
     Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
     Variable, WithTangents, Work,
