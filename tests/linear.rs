@@ -302,7 +302,10 @@ slowest = { slowest-pole = { of = 'closed-loop' }, usage = 'monitor' }
     let poles = shown.split("pole (1/s)").nth(1).unwrap();
     assert_eq!(poles.lines().filter(|line| line.trim_start().starts_with("0  ")).count(), 6, "{shown}");
     assert!(poles.contains("0 + 5i") && poles.contains("0 - 5i"), "{shown}");
-    assert!(out.join("root-locus-y-u.svg").is_file() && shown.contains("linearised.json and 4 plots are in"), "{shown}");
+    assert!(
+        out.join("root-locus-y-u.svg").is_file() && shown.contains("linearised.json and 4 plots are in"),
+        "{shown}"
+    );
     for k in ["-1e6", "-3.7", "0.01", "4242.4242", "1e6"] {
         let at = mops(&["simulate", &file, "--at", &format!("k={k}")]).output().unwrap();
         assert!(at.status.success(), "{k}: {}", String::from_utf8_lossy(&at.stderr));
@@ -353,24 +356,27 @@ x = {{ final-value = {{ signal = 'x' }}, usage = 'monitor' }}
 #[test]
 fn a_linearisation_that_does_not_exist_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for der in ["u - k*sqrt(x)", "u - k*x^0.5", "u - k*abs(x)", "u - sign(x)", "max(x, k*x) + u", "k*asin(1 - abs(x)) + u"] {
+    for der in
+        ["u - k*sqrt(x)", "u - k*x^0.5", "u - k*abs(x)", "u - sign(x)", "max(x, k*x) + u", "k*asin(1 - abs(x)) + u"]
+    {
         let refused = mops(&["linearise", &study(folder.path(), &vessel(der))]).output().unwrap();
         let told = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
         assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
         assert!(told.contains("the rate of `x` has no slope along `x` at x = 0"), "{der}: {told}");
     }
     // Elsewhere, or where it is smooth, it exists; an output without a slope is noted.
-    for (der, at) in [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")] {
+    for (der, at) in
+        [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")]
+    {
         let found = mops(&["linearise", &study(folder.path(), &vessel(der)), "--at", at]).output().unwrap();
         let shown = String::from_utf8(found.stdout).unwrap();
         assert!(found.status.success(), "{der}: {}", String::from_utf8_lossy(&found.stderr));
         assert_eq!(shown.contains("note: `size` has no slope along `x`"), at == "x=0", "{der}: {shown}");
     }
     // As a model of a study it has no value there.
-    let text = vessel("u - k*sqrt(x)").replace("horizon = 1", "horizon = 1\n[models.m.linearise]\noutputs = ['x']").replace(
-        "final-value = { signal = 'x' }",
-        "slowest-pole = {}",
-    );
+    let text = vessel("u - k*sqrt(x)")
+        .replace("horizon = 1", "horizon = 1\n[models.m.linearise]\noutputs = ['x']")
+        .replace("final-value = { signal = 'x' }", "slowest-pole = {}");
     let none = mops(&["simulate", &study(folder.path(), &text)]).output().unwrap();
     let told = String::from_utf8(none.stdout).unwrap() + &String::from_utf8(none.stderr).unwrap();
     assert!(!none.status.success() && told.contains("has no slope along `x`"), "{told}");
@@ -394,7 +400,8 @@ fn an_equilibrium_is_found_from_a_start_without_a_slope() {
     ] {
         let (file, out) = (study(folder.path(), &vessel(der)), folder.path().join("out"));
         let at = format!("u={u}");
-        let arguments = ["linearise", &file, "--at", &at, "--equilibrium", "--output", "x", "--out", out.to_str().unwrap()];
+        let arguments =
+            ["linearise", &file, "--at", &at, "--equilibrium", "--output", "x", "--out", out.to_str().unwrap()];
         let found = mops(&arguments).output().unwrap();
         assert!(found.status.success(), "{der}: {}", String::from_utf8_lossy(&found.stderr));
         let x = json(&out.join("linearised.json"))["at"]["states"][0].as_f64().unwrap();
