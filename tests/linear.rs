@@ -364,14 +364,16 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
         assert!(told.contains("the rate of `x` has no slope along `x` at x = 0"), "{der}: {told}");
     }
-    // Elsewhere, or where it is smooth, it exists; an output without a slope is noted.
+    // Elsewhere, or where it is smooth, it exists; an output without a slope is noted. Below 0 the power is not defined, and
+    // then the output has a slope.
     for (der, at) in
         [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")]
     {
         let found = mops(&["linearise", &study(folder.path(), &vessel(der)), "--at", at]).output().unwrap();
         let shown = String::from_utf8(found.stdout).unwrap();
         assert!(found.status.success(), "{der}: {}", String::from_utf8_lossy(&found.stderr));
-        assert_eq!(shown.contains("note: `size` has no slope along `x`"), at == "x=0", "{der}: {shown}");
+        let rough = at == "x=0" && !der.contains('^');
+        assert_eq!(shown.contains("note: `size` has no slope along `x`"), rough, "{der}: {shown}");
     }
     // As a model of a study it has no value there.
     let text = vessel("u - k*sqrt(x)")

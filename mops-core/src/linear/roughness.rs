@@ -34,7 +34,8 @@ impl Point<'_> {
     ) -> Vec<(usize, usize)> {
         // Parts of the golden ratio, by turns up and down, so that no two variables move alike.
         let mixed = |i: usize| {
-            (0.3 + 0.7 * (0.618_033_988_749_894_9 * (i + 1) as f64).fract()) * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
+            (0.3 + 0.7 * (0.618_033_988_749_894_9 * (i + 1) as f64).fract())
+                * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
         };
         let all: Vec<(usize, f64)> = columns.iter().enumerate().map(|(i, &j)| (j, mixed(i))).collect();
         if self.rough_rows(&mut f, rows, &all).iter().all(|rough| !rough) {

@@ -1,4 +1,7 @@
 //! Frequencies at which a response does something, by dividing the axis until bounds exclude or pin it.
+//!
+//! Source (branch and bound): R. E. Moore, R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (2009), chapters 5
+//! and 8.
 
 use super::Complex;
 use super::enclosure::{Enclosure, Span};
