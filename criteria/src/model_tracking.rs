@@ -82,7 +82,12 @@ impl CriterionSpec for ModelTracking {
                 ));
             }
         };
-        Ok(Box::new(Bound { step, reference }))
+        let given = self.frequency.as_ref().filter(|q| q.unit.as_ref().is_some_and(Unit::counts_cycles));
+        let note = given.zip(frequency).map(|(given, angular)| {
+            let unit = given.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+            format!("`frequency` of {} {unit} is {angular} rad/s", given.number)
+        });
+        Ok(Box::new(Bound { step, reference, note }))
     }
 }
 
@@ -152,11 +157,13 @@ impl Reference {
 struct Bound {
     step: Step,
     reference: Reference,
+    /// What a frequency in Hz is in rad/s.
+    note: Option<String>,
 }
 
 impl Criterion for Bound {
     fn unit(&self) -> Unit {
-        self.step.unit.clone()
+        self.step.unit.difference()
     }
 
     fn signals(&self) -> Vec<String> {
@@ -165,6 +172,10 @@ impl Criterion for Bound {
 
     fn sense(&self) -> Sense {
         Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.note.clone()
     }
 
     fn range(&self) -> [f64; 2] {

@@ -57,7 +57,7 @@ struct Bound {
 
 impl Criterion for Bound {
     fn unit(&self) -> Unit {
-        if self.absolute { self.step.unit.clone() } else { Unit::one() }
+        if self.absolute { self.step.unit.difference() } else { Unit::one() }
     }
 
     fn signals(&self) -> Vec<String> {

@@ -42,7 +42,7 @@ struct Bound {
 
 impl Criterion for Bound {
     fn unit(&self) -> Unit {
-        self.signal.unit.clone()
+        self.signal.unit.difference()
     }
 
     fn signals(&self) -> Vec<String> {

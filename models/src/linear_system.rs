@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
+use mops_core::expression::{Form, Node};
 use mops_core::{Analysis, Dual, Expression, Failure, Job, Mistake, Parameter, Scalar, StateSpace, Unit, WithTangents};
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -171,21 +173,48 @@ impl Bound {
     }
 }
 
+/// The values of parameters in coherent units, in which expressions compute.
+pub(crate) fn coherent<S: Scalar>(parameters: &[Parameter], values: &[S]) -> Vec<S> {
+    let coherent = |(parameter, value): (&Parameter, &S)| {
+        let unit = &parameter.variable.unit;
+        if unit.is_coherent() { *value } else { *value * unit.factor() + S::from(unit.zero()) }
+    };
+    parameters.iter().zip(values).map(coherent).collect()
+}
+
 /// Units by name: those that are not named are pure numbers.
 pub(crate) struct Units<'a>(pub &'a [(String, String)]);
 
 impl Units<'_> {
-    /// Checks that every name is one of the `known` ones, and every unit a unit.
-    pub fn check(&self, known: &[&str]) -> Result<(), Mistake> {
+    /// Checks that every name is one of the `parameters` or `signals`, every unit a unit, and that every entry has a dimension.
+    /// Coefficients are in SI units, so that signals must be, too.
+    pub fn check<'e>(
+        &self,
+        parameters: &[String],
+        signals: &[String],
+        entries: impl IntoIterator<Item = &'e Bound>,
+    ) -> Result<(), Mistake> {
+        let known: Vec<&str> = parameters.iter().chain(signals).map(String::as_str).collect();
         for (name, unit) in self.0 {
             let wrong = |fact: String, help: String| Mistake::new(name, fact).with_help(help).within("units");
             if !known.contains(&name.as_str()) {
                 let help = mops_core::suggestion(name, known.iter().copied());
                 return Err(wrong(format!("there is no parameter, input or output `{name}`"), help));
             }
-            Unit::parse(unit).map_err(|why| wrong(why, "as in units = { k = \"N/m\", m = \"kg\" }".to_owned()))?;
+            let unit =
+                Unit::parse(unit).map_err(|why| wrong(why, "as in units = { k = \"N/m\", m = \"kg\" }".to_owned()))?;
+            if signals.contains(name) && !unit.is_coherent() {
+                let help = format!("declare it in {}, in which its coefficients are", unit.dimension());
+                return Err(wrong(format!("a linear system has no signal in {unit}"), help));
+            }
         }
-        Ok(())
+        let mut dimensions = Dimensions::default();
+        let measure = |name: &String| match self.0.iter().find(|(known, _)| known == name) {
+            Some((_, unit)) => Measure::declared(name, &Unit::known(unit)),
+            None => dimensions.open(name),
+        };
+        let mut named = Named(parameters.iter().cloned().zip(parameters.iter().map(measure)).collect());
+        entries.into_iter().try_for_each(|entry| dimensions.measure(&mut named, entry.expression.root()).map(|_| ()))
     }
 
     /// The unit of a name, as text.
@@ -196,5 +225,27 @@ impl Units<'_> {
     /// Parameters of these names.
     pub fn parameters(&self, names: &[String]) -> Vec<Parameter> {
         names.iter().map(|name| Parameter::new(name, self.of(name), "parameter of the system")).collect()
+    }
+}
+
+/// Parameters by name, and what they measure.
+struct Named(Vec<(String, Measure)>);
+
+impl Quantities for Named {
+    type Error = Mistake;
+
+    fn measure(&mut self, _: &mut Dimensions, node: &Node) -> Result<Measure, Mistake> {
+        let Form::Name(name) = &node.form else { unreachable!("the reader takes names only") };
+        Ok(self.0.iter().find(|(known, _)| known == name).expect("all names are parameters").1.clone())
+    }
+
+    fn constant(&self, _: &str) -> Option<f64> {
+        None
+    }
+
+    fn counts(&mut self, _: &Node, _: Open) {}
+
+    fn refuse(&self, Conflict { fact, help, .. }: Conflict) -> Mistake {
+        Mistake::new("units", format!("in an entry of the system {fact}")).with_help(help)
     }
 }

@@ -8,7 +8,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Units};
+use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Units, coherent};
 
 /// `dx/dt = A x + B u(t - delay)`, `y = C x + D u(t - delay)`: a linear system by its matrices, for criteria of linear
 /// systems.
@@ -17,7 +17,7 @@ use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Uni
 /// `a = [[0, 1], ["-k/m", "-d/m"]]`, `b = [[0], ["1/m"]]`, `c = [[1, 0]]`.
 ///
 /// Signals are the outputs; inputs the inputs. Their units, and those of parameters, are pure numbers unless `units` says
-/// otherwise.
+/// otherwise. Entries are in SI units: parameters are converted to them, and inputs and outputs are declared in them.
 ///
 /// Source: T. Kailath, Linear Systems (1980), chapter 2.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -84,8 +84,8 @@ impl ModelOptions for StateSpaceOptions {
         let delay = self.delay.map(|delay| Bound::new(&delay, &mut names));
         let units: Vec<(String, String)> = self.units.into_iter().collect();
         let units = Units(&units);
-        let known: Vec<&str> = names.iter().chain(&inputs).chain(&outputs).map(String::as_str).collect();
-        units.check(&known)?;
+        let entries = matrices.iter().flatten().flatten().chain(&delay);
+        units.check(&names, &[inputs.clone(), outputs.clone()].concat(), entries)?;
         let variables = |names: &[String], about: &str| -> Vec<Variable> {
             names.iter().map(|name| Variable::new(name, units.of(name), about)).collect()
         };
@@ -121,6 +121,7 @@ fn named(key: &str, given: Option<Vec<String>>, letter: &str, count: usize) -> R
 
 impl LinearSystem for Given {
     fn matrices<S: Scalar>(&self, parameters: &[S]) -> Result<Matrices<S>, Failure> {
+        let parameters = &coherent(&self.interface.parameters, parameters);
         let values = |rows: &Rows<Bound>| -> Rows<S> {
             rows.iter().map(|row| row.iter().map(|entry| entry.value(parameters)).collect()).collect()
         };

@@ -8,7 +8,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Units, canonical};
+use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Units, canonical, coherent};
 use crate::plant::from_roots;
 
 /// `G(s) = numerator(s)/denominator(s) exp(-s delay)`, or `gain (s - z1)(s - z2).../((s - p1)(s - p2)...) exp(-s delay)`: a
@@ -18,7 +18,8 @@ use crate::plant::from_roots;
 /// `numerator = ["K"]`, `denominator = ["T", 1]`, `delay = "L"`; coefficients belong to falling powers of s.
 ///
 /// The signal is `y`, the input `u`, unless `output` and `input` name them. Their units, and those of parameters, are pure
-/// numbers unless `units` says otherwise.
+/// numbers unless `units` says otherwise. Coefficients are in SI units: parameters are converted to them, and input and output are
+/// declared in them.
 ///
 /// Source: T. Kailath, Linear Systems (1980), section 2.1.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -100,8 +101,11 @@ impl ModelOptions for TransferFunctionOptions {
         let (input, output) = (self.input.unwrap_or_else(|| "u".into()), self.output.unwrap_or_else(|| "y".into()));
         let units: Vec<(String, String)> = self.units.into_iter().collect();
         let units = Units(&units);
-        let known: Vec<&str> = names.iter().chain([&input, &output]).map(String::as_str).collect();
-        units.check(&known)?;
+        let entries: Vec<&Bound> = match &form {
+            Form::Coefficients { numerator, denominator } => numerator.iter().chain(denominator).collect(),
+            Form::Roots { zeros, poles, gain } => zeros.iter().chain(poles).chain(gain).collect(),
+        };
+        units.check(&names, &[input.clone(), output.clone()], entries.into_iter().chain(&delay))?;
         let interface = Interface {
             signals: vec![Variable::new(&output, units.of(&output), "output of the system")],
             inputs: vec![Variable::new(&input, units.of(&input), "input of the system")],
@@ -115,6 +119,7 @@ impl ModelOptions for TransferFunctionOptions {
 
 impl LinearSystem for Given {
     fn matrices<S: Scalar>(&self, parameters: &[S]) -> Result<Matrices<S>, Failure> {
+        let parameters = &coherent(&self.interface.parameters, parameters);
         let values = |list: &[Bound]| -> Vec<S> { list.iter().map(|entry| entry.value(parameters)).collect() };
         let (mut numerator, mut denominator) = match &self.form {
             Form::Coefficients { numerator, denominator } => {

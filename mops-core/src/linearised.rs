@@ -253,6 +253,10 @@ impl Model for Linearised {
         &self.interface
     }
 
+    fn notes(&self) -> Vec<String> {
+        self.model.notes()
+    }
+
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         let resting = self.at(job.case, job.parameters)?;
         match resting.rough.first() {

@@ -139,6 +139,11 @@ pub trait Model: Send + Sync {
     /// What it offers and takes.
     fn interface(&self) -> &Interface;
 
+    /// How it was read where its declaration leaves a choice, one sentence each: `mops check` tells.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Analyses one case.
     ///
     /// # Errors

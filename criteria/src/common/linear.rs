@@ -33,9 +33,9 @@ impl Channel {
     pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, Mistake> {
         let input = pick("input", input, &model.inputs)?;
         let output = pick("output", output, &model.signals)?;
-        let (from, to) = (&model.inputs[input].unit, &model.signals[output].unit);
+        let (from, to) = (model.inputs[input].unit.difference(), model.signals[output].unit.difference());
         let unit = match (to.to_string().as_str(), from.to_string().as_str()) {
-            (to, "1") => Unit::known(to),
+            (to, "1") => Unit::known(to).difference(),
             (to, from) if to == from => Unit::one(),
             (to, from) => Unit::known(&format!("({to})/({from})")),
         };

@@ -42,9 +42,9 @@ pub fn optional(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Opt
     option.map(|option| number(key, option, unit)).transpose()
 }
 
-/// An option that may be absent and must be positive, as a number in `unit`.
+/// An option that may be absent and must be positive, as a number in `unit`; a temperature is a difference.
 pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
-    match optional(key, option, unit)? {
+    match optional(key, option, &unit.difference())? {
         Some(number) if number <= 0.0 => {
             Err(Mistake::new(key, format!("`{key}` must be positive, not {}", unit.amount(number))))
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use mops_core::expression::{Equation, equation};
+use mops_core::expression::{Equation, Form, equation};
 use mops_core::{Mistake, Quantity, Unit, suggestion};
 
 use super::key::{Index, Key, member};
@@ -27,6 +27,8 @@ pub struct Declared {
     pub name: String,
     /// Unit.
     pub unit: Unit,
+    /// Whether no unit was declared: it is the coherent one of what the equations ask for.
+    pub open: bool,
     /// What it is.
     pub about: String,
     /// Section and key under which it stands.
@@ -42,6 +44,19 @@ pub struct Settable {
     pub default: Option<f64>,
     /// Smallest and largest value.
     pub range: [f64; 2],
+}
+
+/// A number that never changes.
+#[derive(Debug, Clone)]
+pub struct Constant {
+    /// Name.
+    pub name: String,
+    /// Value in the coherent unit.
+    pub value: f64,
+    /// Unit, where one was declared.
+    pub unit: Option<Unit>,
+    /// Section and key under which it stands.
+    pub path: Vec<String>,
 }
 
 /// Friction of a joint.
@@ -83,8 +98,8 @@ pub struct Definition {
     pub inputs: Vec<Declared>,
     /// Parameters, in order.
     pub parameters: Vec<Settable>,
-    /// Constants, in the unit they are written in.
-    pub constants: Vec<(String, f64, Vec<String>)>,
+    /// Constants.
+    pub constants: Vec<Constant>,
     /// Named expressions.
     pub lets: Vec<(String, Text)>,
     /// Derivatives by state.
@@ -101,28 +116,6 @@ pub struct Definition {
     pub when: Vec<When>,
     /// Names of joints: name, position, where it stands.
     pub ports: Vec<(String, String, Vec<String>)>,
-    /// Terms that are added to the model: effects that act at its ports.
-    pub terms: Vec<Term>,
-}
-
-/// A term that acts at a port.
-#[derive(Debug, Clone)]
-pub struct Term {
-    /// Where.
-    pub target: Target,
-    /// What is added, in the quantities of the model.
-    pub value: Text,
-}
-
-/// Where a term is added.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Target {
-    /// To the right-hand side of a state's equation, before the mass matrix is solved.
-    Equation(String),
-    /// To an input, wherever it acts.
-    Input(String),
-    /// To a signal, where it is read.
-    Signal(String),
 }
 
 /// Puts a mistake under these keys.
@@ -158,6 +151,17 @@ impl Text {
     }
 }
 
+impl Text {
+    /// Whether it is made of numbers without units alone.
+    pub(super) fn is_bare(&self) -> bool {
+        let mut bare = self.equation.left.is_none();
+        self.equation.right.walk(&mut |node| {
+            bare &= !matches!(node.form, Form::Name(_) | Form::Member(..) | Form::Rate(_) | Form::Quantity(..));
+        });
+        bare
+    }
+}
+
 const HELP: &str = "`mops describe equations` tells how expressions are written";
 
 impl Definition {
@@ -169,7 +173,7 @@ impl Definition {
         let mut d = Self::default();
         for (key, state) in &options.states.0 {
             let states = declared("states", key, &state.0.unit, state.0.about.as_deref())?;
-            let scale = state.0.scale.as_ref().map(|scale| scale.to(&states[0].unit)).transpose();
+            let scale = state.0.scale.as_ref().map(|scale| scale.to(&states[0].unit.difference())).transpose();
             let wrong = |why| under(&path(&["states", key, "scale"]), Mistake::here(why));
             let scale = scale.map_err(wrong)?;
             if let Some(scale) = scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
@@ -205,10 +209,13 @@ impl Definition {
         for (key, constant) in &options.constants.0 {
             let place = path(&["constants", key]);
             let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
-            d.constants.extend(names.into_iter().map(|name| (name, constant.number, place.clone())));
+            let unit = constant.unit.clone();
+            let value = unit.as_ref().map_or(constant.number, |unit| constant.number * unit.factor() + unit.zero());
+            let one = |name| Constant { name, value, unit: unit.clone(), path: place.clone() };
+            d.constants.extend(names.into_iter().map(one));
         }
         for (key, output) in &options.outputs.0 {
-            let unit = output.0.unit.as_deref().unwrap_or("1");
+            let unit = output.0.unit.as_deref().unwrap_or_default();
             let [declared] = <[Declared; 1]>::try_from(declared("outputs", key, unit, output.0.about.as_deref())?)
                 .map_err(|_| under(&path(&["outputs", key]), Mistake::here("an output is one signal")))?;
             let text = Text::expression(declared.path.clone(), &output.0.value, None)?;
@@ -342,13 +349,14 @@ fn has_unit(text: &str) -> bool {
 fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, Mistake> {
     let place = path(&[section, key]);
     let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
+    let open = unit.trim().is_empty();
     let unit = Unit::parse(unit).map_err(|why| {
         under(&place, Mistake::here(why))
             .with_help("units are s, m, kg, rad, N, V, A, K and products such as \"kg m2\"")
     })?;
     let declare = |name| {
         let about = about.unwrap_or_default().to_owned();
-        Declared { name, unit: unit.clone(), about, path: place.clone() }
+        Declared { name, unit: unit.clone(), open, about, path: place.clone() }
     };
     Ok(names.into_iter().map(declare).collect())
 }

@@ -165,6 +165,19 @@ impl Graph {
         if a == b {
             return self.number(0.0);
         }
+        // Zeros of temperature scales cancel, and round nothing.
+        if let Op::Add(x, p) = self.op(a)
+            && p == b
+            && self.constant(p).is_some()
+        {
+            return x;
+        }
+        if let (Op::Add(x, p), Op::Add(y, q)) = (self.op(a), self.op(b))
+            && p == q
+            && self.constant(p).is_some()
+        {
+            return self.sub(x, y);
+        }
         match self.negated(b) {
             Some(b) => self.add(a, b),
             None => self.fold(a, b, |a, b| a - b).unwrap_or_else(|| self.add_op(Op::Sub(a, b))),
@@ -241,6 +254,13 @@ impl Graph {
     pub fn div(&mut self, a: Id, b: Id) -> Id {
         if self.is(b, 1.0) {
             return a;
+        }
+        // What was just brought to coherent units goes back as it was.
+        if let Op::Mul(factor, x) = self.op(a)
+            && factor == b
+            && self.constant(b).is_some_and(|b| b != 0.0)
+        {
+            return x;
         }
         let (up, down) = (self.level(a), self.level(b));
         if up == Level::Variable && down < Level::Variable {

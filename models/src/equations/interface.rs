@@ -4,7 +4,7 @@ use mops_core::{Mistake, Parameter, Port, Unit, Variable, suggestion};
 
 use super::definition::{self, Definition, under};
 use super::graph::Op;
-use super::system::{Mass, System};
+use super::system::System;
 
 /// Where a state starts.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +61,9 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
     Ok((parameters, starts))
 }
 
-/// Joints and the equations of all states but positions; inputs; states and outputs.
-pub(super) fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistake> {
+/// Joints and the equations of all states but positions; inputs; states and outputs. `forces` are the units of the terms in the
+/// equations of the states.
+pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, Mistake> {
     let name = |s: usize| d.states[s].name.clone();
     let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);
     for (_, joint, path) in &d.ports {
@@ -79,7 +80,7 @@ pub(super) fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistak
         }
         let position = system.joints.iter().find(|&&(_, velocity)| velocity == s).map(|&(position, _)| position);
         let place = position.map_or_else(|| name(s), |p| given(p).map_or_else(|| name(p), |(name, ..)| name.clone()));
-        let unit = force_unit(d, system, s);
+        let unit = Some(forces[s].clone());
         if let Some(position) = position {
             ports.push(Port::Joint {
                 name: place.clone(),
@@ -94,17 +95,4 @@ pub(super) fn ports(d: &Definition, system: &System) -> Result<Vec<Port>, Mistak
     let signals = d.states.iter().chain(d.outputs.iter().map(|(output, _)| output));
     ports.extend(signals.map(|signal| Port::Sensor { output: signal.name.clone() }));
     Ok(ports)
-}
-
-/// The unit of the terms in the equation of a state, where its derivative stands alone or times one declared quantity.
-fn force_unit(d: &Definition, system: &System, s: usize) -> Option<Unit> {
-    let rate = d.states[s].unit.power(1, -1);
-    let unit = match system.masses[s]? {
-        Mass::One => return Some(rate),
-        Mass::Parameter(index) => Unit::product(&[(&d.parameters[index].quantity.unit, 1), (&rate, 1)]),
-    };
-    let usual = ["N m", "N", "W", "kW"].map(Unit::known);
-    let turns = d.states[s].unit.is_compatible(&Unit::known("rad/s"));
-    let usual = usual.into_iter().filter(|u| turns || !u.is_compatible(&Unit::known("N m")));
-    Some(usual.into_iter().find(|u| u.factor_to(&unit).is_some_and(|f| (f - 1.0).abs() < 1e-12)).unwrap_or(unit))
 }

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use mops_core::expression::{Form, Node, Operator};
-use mops_core::{Mistake, suggestion};
+use mops_core::{Mistake, Unit, suggestion};
 
-use super::definition::{Definition, Text, under};
+use super::definition::{Declared, Definition, Text, under};
 use super::graph::{Graph, Id, Level, Op};
 use super::key::member;
 
@@ -96,8 +96,6 @@ pub struct Lowering<'d> {
     pub orders: Vec<Order>,
     /// Number of modes so far.
     pub modes: usize,
-    /// What stands for each input.
-    inputs: Vec<Id>,
     /// Nodes of expressions within which the present one stands, over all definitions.
     depth: usize,
 }
@@ -115,8 +113,7 @@ impl<'d> Lowering<'d> {
         let parameters = d.parameters.iter().enumerate();
         let parameters =
             parameters.map(|(i, p)| (&p.quantity.name, Meaning::Parameter(i), "a parameter", &p.quantity.path));
-        let constants =
-            d.constants.iter().map(|(name, value, path)| (name, Meaning::Constant(*value), "a constant", path));
+        let constants = d.constants.iter().map(|c| (&c.name, Meaning::Constant(c.value), "a constant", &c.path));
         let lets =
             d.lets.iter().enumerate().map(|(i, (name, text))| (name, Meaning::Let(i), "a definition", &text.path));
         for (name, meaning, what, path) in states.chain(inputs).chain(parameters).chain(constants).chain(lets) {
@@ -134,7 +131,7 @@ impl<'d> Lowering<'d> {
                 .with_help("states and inputs are signals already"));
             }
         }
-        let mut lowering = Self {
+        Ok(Self {
             definition,
             names: names.into_iter().map(|(name, (meaning, _))| (name, meaning)).collect(),
             lets: HashMap::new(),
@@ -142,16 +139,22 @@ impl<'d> Lowering<'d> {
             switches: Vec::new(),
             orders: Vec::new(),
             modes: 0,
-            inputs: Vec::new(),
             depth: 0,
-        };
-        lowering.inputs = (0..d.inputs.len()).map(|i| lowering.graph.add_op(Op::Input(i))).collect();
-        Ok(lowering)
+        })
     }
 
-    /// Lets a term act on an input, wherever the input stands from now on.
-    pub fn add_to_input(&mut self, input: usize, term: Id) {
-        self.inputs[input] = self.graph.add(self.inputs[input], term);
+    /// A quantity in its declared unit as one in the coherent unit.
+    pub fn coherent(&mut self, declared: Id, unit: &Unit) -> Id {
+        let (factor, zero) = (self.graph.number(unit.factor()), self.graph.number(unit.zero()));
+        let scaled = self.graph.mul(declared, factor);
+        self.graph.add(scaled, zero)
+    }
+
+    /// A quantity in the coherent unit as one in its declared unit.
+    pub fn declared(&mut self, coherent: Id, unit: &Unit) -> Id {
+        let (factor, zero) = (self.graph.number(unit.factor()), self.graph.number(unit.zero()));
+        let from_zero = self.graph.sub(coherent, zero);
+        self.graph.div(from_zero, factor)
     }
 
     /// A new mode.
@@ -253,7 +256,7 @@ impl<'d> Lowering<'d> {
             Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
         };
         Ok(match &node.form {
-            Form::Number(value) => Affine::of(self.graph.number(*value)),
+            Form::Number(value) | Form::Quantity(value, _) => Affine::of(self.graph.number(*value)),
             Form::Name(name) => match &text.index {
                 Some((index, k)) if index == name => {
                     #[allow(clippy::cast_precision_loss)]
@@ -279,7 +282,9 @@ impl<'d> Lowering<'d> {
                         suggestion(&name, states()),
                     );
                 };
-                Affine { rest: self.graph.number(0.0), rates: BTreeMap::from([(state, self.graph.number(1.0))]) }
+                // The rate of a state in its declared unit, times this, is that in coherent units.
+                let factor = self.definition.states[state].unit.factor();
+                Affine { rest: self.graph.number(0.0), rates: BTreeMap::from([(state, self.graph.number(factor))]) }
             }
             Form::Negative(a) => {
                 let a = self.node(text, a, kinks)?;
@@ -411,10 +416,15 @@ impl<'d> Lowering<'d> {
             };
             return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
         };
+        let definition: &'d Definition = self.definition;
+        let declared = |lowering: &mut Self, op: Op, quantity: &Declared| {
+            let id = lowering.graph.add_op(op);
+            Affine::of(lowering.coherent(id, &quantity.unit))
+        };
         Ok(match *meaning {
-            Meaning::State(i) => Affine::of(self.graph.add_op(Op::State(i))),
-            Meaning::Input(i) => Affine::of(self.inputs[i]),
-            Meaning::Parameter(i) => Affine::of(self.graph.add_op(Op::Parameter(i))),
+            Meaning::State(i) => declared(self, Op::State(i), &definition.states[i]),
+            Meaning::Input(i) => declared(self, Op::Input(i), &definition.inputs[i]),
+            Meaning::Parameter(i) => declared(self, Op::Parameter(i), &definition.parameters[i].quantity),
             Meaning::Constant(value) => Affine::of(self.graph.number(value)),
             Meaning::Let(i) => match self.lets.get(&(i, kinks)) {
                 Some(Visit::Done(affine)) => affine.clone(),
@@ -434,7 +444,6 @@ impl<'d> Lowering<'d> {
                         return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
                     }
                     self.lets.insert((i, kinks), Visit::Open);
-                    let definition: &'d Definition = self.definition;
                     let text = &definition.lets[i].1;
                     let affine = self.node(text, &text.equation.right, kinks)?;
                     self.lets.insert((i, kinks), Visit::Done(affine.clone()));

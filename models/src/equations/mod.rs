@@ -5,6 +5,7 @@ mod bounds;
 mod branches;
 mod compiled;
 mod definition;
+mod dimensions;
 mod graph;
 mod happenings;
 mod interface;
@@ -32,7 +33,7 @@ use crate::kernel::{self, Recording, Simulate, Tolerance, rates_and_signals, rec
 use bank::{Bank, Large as Many, Small};
 use compiled::Compiled;
 use definition::Definition;
-pub use definition::{Target, Text};
+pub use definition::Text;
 use interface::{Start, parameters, ports};
 pub use options::EquationsOptions;
 use running::Running;
@@ -56,6 +57,8 @@ pub struct Equations {
     compiled: Compiled,
     starts: Vec<Start>,
     tolerance: Tolerance,
+    /// How numbers without units were read.
+    notes: Vec<String>,
     /// The same with an input more in every equation that is a port; made at the first need.
     opened: OnceLock<Compiled>,
 }
@@ -72,9 +75,11 @@ impl Equations {
         Self::compile(Definition::read(options)?, horizon, options.tolerance)
     }
 
-    fn compile(definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, Mistake> {
+    fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, Mistake> {
+        let system = System::new(&definition, &[])?;
+        let measured = dimensions::check(&definition, &system.joints)?;
+        measured.declare(&mut definition);
         let d = &definition;
-        let system = System::new(d, &[])?;
         let (parameters, starts) = parameters(d, &system)?;
         let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
         let compiled = Compiled::new(&system, &names, d.inputs.len(), d.parameters.len())?;
@@ -95,24 +100,13 @@ impl Equations {
             signals: signals.map(variable).collect(),
             states: starts.iter().enumerate().map(state).collect(),
             inputs: d.inputs.iter().map(variable).collect(),
-            ports: ports(d, &system)?,
+            ports: ports(d, &system, &measured.forces)?,
             parameters,
             horizon,
             analysis: AnalysisKind::Time,
         };
-        Ok(Self { definition, interface, compiled, starts, tolerance, opened: OnceLock::new() })
-    }
-
-    /// The same model with one more term at a port: `value` is an expression of the model's quantities, the numbers in it
-    /// in their units. In the equation of a state it is added to the right-hand side, before a mass matrix is solved.
-    ///
-    /// # Errors
-    /// A mistake in the expression.
-    pub fn with_term(&self, target: Target, value: &str) -> Result<Self, Mistake> {
-        let mut definition = self.definition.clone();
-        let value = Text::read(Vec::new(), &options::Formula(value.to_owned()), None)?;
-        definition.terms.push(definition::Term { target, value });
-        Self::compile(definition, self.interface.horizon, self.tolerance)
+        let notes = measured.notes;
+        Ok(Self { definition, interface, compiled, starts, tolerance, notes, opened: OnceLock::new() })
     }
 
     /// Which derivative depends on which state: pairs of derivative and state.
@@ -166,6 +160,10 @@ impl Equations {
 impl Model for Equations {
     fn interface(&self) -> &Interface {
         &self.interface
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {

@@ -26,7 +26,11 @@ use crate::kernel::Tolerance;
 /// log10 sqrt`; `abs sign min max clip(x, low, high) deadzone(x, low, high)`; `table(x, x1, y1, x2, y2, ..)`, straight
 /// lines through points; `if(condition, a, b)`, with conditions of `> >= < <=`, `and`, `or`, `not`. Where one of the
 /// second row, a table or an `if` changes its branch, a step of the integrator ends: none crosses a kink or a jump.
-/// Numbers are in the units that stand beside the names; nothing is converted within an equation.
+///
+/// Quantities enter an expression in their coherent SI units, whatever unit they are declared in, and the dimensions of all
+/// expressions are checked. A number in a product is a pure number. As a whole term it counts in the SI unit of its neighbours,
+/// unless one of these is declared in another unit: then it needs its own, `20 [degC]`. A quantity declared in `""` has the unit
+/// that the equations ask for, one in `"1"` is a pure number. Hz counts cycles: `sin(2*pi*f*time)`. Temperatures are in K.
 ///
 /// A family of states is declared as `"T[1..100]" = "K"`; `"T[i]" = "k*(T[i-1] - 2*T[i] + T[i+1])"` gives the derivative
 /// of every member that has none of its own, `"T[i=2..99]"` of these. `let`, `start`, `inputs` and `parameters` have
@@ -48,10 +52,11 @@ pub struct EquationsOptions {
     /// Inputs and their units; 0 where no case or experiment drives them.
     #[serde(default)]
     pub(super) inputs: Entries<Short<Described>>,
-    /// Parameters and their units: `b = "N m s/rad"`, or a table with `unit`, `default`, `min`, `max`, `about`.
+    /// Parameters and their units: `b = "N m s/rad"`, or a table with `unit`, `default`, `min`, `max`, `about`. The unit `""` is
+    /// the one that the equations ask for.
     #[serde(default)]
     pub(super) parameters: Entries<Short<Settable>>,
-    /// Numbers that never change: `g = "9.81 m/s^2"`.
+    /// Numbers that never change: `g = "9.81 m/s^2"`. Without a unit they have that which the equations ask for.
     #[serde(default)]
     pub(super) constants: Entries<Quantity>,
     /// Names for expressions, in any order: `s = "sin(th)"`.
@@ -66,7 +71,7 @@ pub struct EquationsOptions {
     /// More signals: `height = "l*cos(th)"`, or a table with `value`, `unit`, `about`.
     #[serde(default)]
     pub(super) outputs: Entries<Short<Output>>,
-    /// Values at the start: numbers, or expressions of parameters.
+    /// Values at the start: numbers, in the unit of the state unless they have their own; or expressions of parameters.
     #[serde(default)]
     pub(super) start: Entries<Formula>,
     /// Friction of joints, by their position or speed.
@@ -149,7 +154,7 @@ impl From<String> for Settable {
 pub(super) struct Output {
     /// Its expression.
     pub value: Formula,
-    /// Unit; a pure number where absent.
+    /// Unit; the SI unit of what its expression measures where absent.
     pub unit: Option<String>,
     /// What it is, in one line.
     pub about: Option<String>,

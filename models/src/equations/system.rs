@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mops_core::{Mistake, suggestion};
 
-use super::definition::{Definition, Target, Text, under};
+use super::definition::{Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
 use super::lower::{Affine, Lowering, Order, Switch};
 
@@ -47,15 +47,6 @@ pub struct Happening {
     pub at_rest: Vec<(usize, Id)>,
 }
 
-/// What a state's derivative is multiplied with in its own equation.
-#[derive(Debug, Clone, Copy)]
-pub enum Mass {
-    /// Nothing.
-    One,
-    /// A parameter.
-    Parameter(usize),
-}
-
 /// A model as a graph.
 #[derive(Debug)]
 pub struct System {
@@ -81,8 +72,6 @@ pub struct System {
     pub starts: Vec<Option<Id>>,
     /// Joints: position and speed.
     pub joints: Vec<(usize, usize)>,
-    /// What each state's derivative is multiplied with, where it is one thing.
-    pub masses: Vec<Option<Mass>>,
     /// Matrices of equations that are solved together, row by row.
     pub matrices: Vec<Vec<Id>>,
 }
@@ -98,13 +87,6 @@ impl System {
         let d = definition;
         let mut l = Lowering::new(d)?;
         let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
-        for term in &d.terms {
-            if let Target::Input(input) = &term.target {
-                let value = l.value(&term.value)?;
-                let input = d.inputs.iter().position(|i| i.name == *input).expect("the port is one of the model's");
-                l.add_to_input(input, value);
-            }
-        }
         let mut rows: Vec<Row> =
             (0..d.states.len()).map(|s| row(&mut l, d, s, &d.der[&d.states[s].name])).collect::<Result<_, _>>()?;
         let massive: BTreeSet<usize> = d.mass.iter().map(|(row, ..)| state(row)).collect();
@@ -120,25 +102,15 @@ impl System {
         }
         for (row, column, text) in &d.mass {
             let value = l.value(text)?;
-            rows[state(row)].coefficients.insert(state(column), value);
+            let column = state(column);
+            let factor = l.graph.number(d.states[column].unit.factor());
+            let value = l.graph.mul(value, factor);
+            rows[state(row)].coefficients.insert(column, value);
         }
         for row in &mut rows {
             row.coefficients.retain(|_, c| !l.graph.is(*c, 0.0));
         }
-        let joints = joints(&l.graph, &rows);
-        let mass = |(state, row): (usize, &Row)| match row.coefficients.get(&state).map(|&id| (id, l.graph.op(id))) {
-            Some((_, Op::Parameter(index))) => Some(Mass::Parameter(index)),
-            Some((id, _)) if l.graph.is(id, 1.0) => Some(Mass::One),
-            _ => None,
-        };
-        let masses = rows.iter().enumerate().map(mass).collect();
-        for term in &d.terms {
-            if let Target::Equation(name) = &term.target {
-                let value = l.value(&term.value)?;
-                let row = &mut rows[state(name)];
-                row.force = l.graph.add(row.force, value);
-            }
-        }
+        let joints = joints(&l.graph, d, &rows);
         for (k, &state) in opened.iter().enumerate() {
             let force = l.graph.add_op(Op::Input(d.inputs.len() + k));
             rows[state].force = l.graph.add(rows[state].force, force);
@@ -156,29 +128,21 @@ impl System {
             contact.torque = torque;
         }
         let mut signals: Vec<Id> = (0..d.states.len()).map(|s| l.graph.add_op(Op::State(s))).collect();
-        for (_, text) in &d.outputs {
+        for (output, text) in &d.outputs {
             let affine = l.text(text)?;
-            signals.push(with_rates(&mut l.graph, affine, &derivatives));
+            let value = with_rates(&mut l.graph, affine, &derivatives);
+            signals.push(l.declared(value, &output.unit));
         }
         signals.extend((0..d.inputs.len()).map(|i| l.graph.add_op(Op::Input(i))));
-        let outputs = d.outputs.iter().map(|(o, _)| &o.name);
-        let names: Vec<&String> =
-            d.states.iter().map(|s| &s.name).chain(outputs).chain(d.inputs.iter().map(|i| &i.name)).collect();
-        for term in &d.terms {
-            if let Target::Signal(name) = &term.target {
-                let value = l.value(&term.value)?;
-                let signal = names.iter().position(|n| *n == name).expect("the port is one of the model's");
-                signals[signal] = l.graph.add(signals[signal], value);
-            }
-        }
         let mut happenings = Vec::new();
         for when in &d.when {
             let affine = l.text(&when.guard)?;
             let guard = with_rates(&mut l.graph, affine, &derivatives);
             let mut values = |texts: &[(String, Text)]| {
                 let value = |(name, text): &(String, Text)| {
-                    let affine = l.text(text)?;
-                    Ok((state(name), with_rates(&mut l.graph, affine, &derivatives)))
+                    let (affine, state) = (l.text(text)?, state(name));
+                    let value = with_rates(&mut l.graph, affine, &derivatives);
+                    Ok((state, l.declared(value, &d.states[state].unit)))
                 };
                 texts.iter().map(value).collect::<Result<Vec<_>, Mistake>>()
             };
@@ -186,8 +150,13 @@ impl System {
             happenings.push(Happening { name: when.name.clone(), guard, resets, at_rest });
         }
         let start = |l: &mut Lowering<'_>, s: usize| {
-            let name = &d.states[s].name;
-            d.start.get(name).map(|text| l.fixed(text, &format!("the start value of `{name}`"))).transpose()
+            let (name, unit) = (&d.states[s].name, &d.states[s].unit);
+            let value = d.start.get(name).map(|text| {
+                let value = l.fixed(text, &format!("the start value of `{name}`"))?;
+                // A number without a unit is in that of the state.
+                Ok(if text.is_bare() { value } else { l.declared(value, unit) })
+            });
+            value.transpose()
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
         // Definitions that nothing uses are checked too; what they would switch is forgotten.
@@ -211,7 +180,6 @@ impl System {
             happenings,
             starts,
             joints,
-            masses,
             matrices,
         })
     }
@@ -227,9 +195,9 @@ fn with_rates(graph: &mut Graph, affine: Affine, derivatives: &[Id]) -> Id {
 
 fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Result<Row, Mistake> {
     let affine = l.text(text)?;
-    let one = l.graph.number(1.0);
+    let own = l.graph.number(d.states[state].unit.factor());
     if text.equation.left.is_none() {
-        let mut coefficients: BTreeMap<usize, Id> = BTreeMap::from([(state, one)]);
+        let mut coefficients: BTreeMap<usize, Id> = BTreeMap::from([(state, own)]);
         for (column, rate) in affine.rates {
             let before = coefficients.get(&column).copied().unwrap_or_else(|| l.graph.number(0.0));
             coefficients.insert(column, l.graph.sub(before, rate));
@@ -245,14 +213,20 @@ fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Resul
     Ok(Row { coefficients: affine.rates, force: l.graph.negative(affine.rest) })
 }
 
-/// Pairs of states of which the first has the second as its derivative.
-fn joints(graph: &Graph, rows: &[Row]) -> Vec<(usize, usize)> {
+/// Pairs of states of which the first has the second as its derivative, each in its own unit.
+fn joints(graph: &Graph, d: &Definition, rows: &[Row]) -> Vec<(usize, usize)> {
     let pair = |(position, row): (usize, &Row)| {
-        let alone = row.coefficients.len() == 1 && row.coefficients.get(&position).is_some_and(|&c| graph.is(c, 1.0));
-        match graph.op(row.force) {
-            Op::State(velocity) if alone && velocity != position => Some((position, velocity)),
+        let own = |state: usize, id: Id| graph.is(id, d.states[state].unit.factor());
+        let alone = row.coefficients.len() == 1 && row.coefficients.get(&position).is_some_and(|&c| own(position, c));
+        let velocity = match graph.op(row.force) {
+            Op::State(velocity) => Some(velocity),
+            Op::Mul(factor, state) => match graph.op(state) {
+                Op::State(velocity) if own(velocity, factor) => Some(velocity),
+                _ => None,
+            },
             _ => None,
-        }
+        };
+        velocity.filter(|&velocity| alone && velocity != position).map(|velocity| (position, velocity))
     };
     rows.iter().enumerate().filter_map(pair).collect()
 }
@@ -283,6 +257,7 @@ fn friction(
         if let Some(viscous) = &friction.viscous {
             let factor = l.value(viscous)?;
             let speed = l.graph.add_op(Op::State(velocity));
+            let speed = l.coherent(speed, &d.states[velocity].unit);
             let force = l.graph.mul(factor, speed);
             rows[velocity].force = l.graph.sub(rows[velocity].force, force);
         }

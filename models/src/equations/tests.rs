@@ -4,12 +4,13 @@ mod large;
 
 use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
 
-use super::{Equations, EquationsOptions, Target};
+use super::{Equations, EquationsOptions};
 
 mod dry_friction;
 mod events;
 mod order;
 mod scales;
+mod units;
 
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
 
@@ -292,7 +293,7 @@ fn an_event_happens_once_until_its_guard_was_positive_again() {
     // A thermostat: below 19 the heater goes on, above 21 off; the level of the heater is a state that events set.
     let text = "
         states = { T = 'K', heat = 'K/s' }
-        der = { T = '-0.1*(T - 10) + heat', heat = 0 }
+        der = { T = '-0.1 [1/s]*(T - 10) + heat', heat = 0 }
         start = { T = 20 }
         when.on  = { guard = 'T - 19', reset = { heat = 2 } }
         when.off = { guard = '21 - T', reset = { heat = 0 } }";
@@ -380,9 +381,9 @@ fn a_stiff_rod_by_the_stiff_method_takes_few_steps_and_comes_to_the_same() {
         parameters = { k = '1/s' }
         start = { 'T[i]' = 300 }
         [der]
-        'T[i]'   = 'k*(T[i-1] - 2*T[i] + T[i+1]) - 1e-10*(T[i]^4 - 300^4)'
-        'T[1]'   = 'k*(400 - 2*T[1] + T[2]) - 1e-10*(T[1]^4 - 300^4)'
-        'T[100]' = 'k*(T[99] - T[100]) - 1e-10*(T[100]^4 - 300^4)'
+        'T[i]'   = 'k*(T[i-1] - 2*T[i] + T[i+1]) - 1e-10 [1/K3/s]*(T[i]^4 - 300^4)'
+        'T[1]'   = 'k*(400 - 2*T[1] + T[2]) - 1e-10 [1/K3/s]*(T[1]^4 - 300^4)'
+        'T[100]' = 'k*(T[99] - T[100]) - 1e-10 [1/K3/s]*(T[100]^4 - 300^4)'
         [tolerance]
         relative = 1e-8
         absolute = 1e-8
@@ -414,7 +415,7 @@ fn dry_friction_is_left_out_of_an_equilibrium_and_its_slopes() {
     let text = "
         states = { ph = 'rad', w = 'rad/s' }
         inputs = { u = 'N m' }
-        der = { ph = 'w', w = \"0.01*w' = u - 0.6*sin(ph)\" }
+        der = { ph = 'w', w = \"0.01 [kg m2]*w' = u - 0.6 [N m]*sin(ph)\" }
         friction.ph = { coulomb = 0.05, viscous = 0.002, peak = 1.3 }
         ";
     let at = vec![("ph".to_owned(), Quantity::parse("0.3").unwrap())];
@@ -459,32 +460,6 @@ fn places_of_effects_have_the_names_of_joints_states_inputs_and_signals() {
     assert_eq!(places(text!("room")), ["process:T", "actuator:P", "actuator:To", "sensor:T"]);
     let named = format!("{}\n[ports]\narm = {{ joint = 'ph' }}", text!("furuta-free"));
     assert!(places(&named).contains(&"joint:arm".to_owned()));
-}
-
-#[test]
-fn a_term_at_a_port_acts_before_the_mass_matrix_at_the_input_and_at_the_output() {
-    let plain = text!("furuta-free");
-    let given = [("b", 0.0075), ("c", 0.0036), ("d", 0.21), ("bp", 2e-4), ("ba", 9e-4), ("th0", 2.0)];
-    let end = |model: &Equations| respond(model, &[("u", sine(0.05, 4.0, 0.0))], &given, 2.0);
-    let by_hand = |from: &str, to: &str| {
-        assert_eq!(plain.matches(from).count(), 1);
-        end(&model(&plain.replace(from, to)))
-    };
-    let with = |target: Target, value: &str| end(&model(plain).with_term(target, value).unwrap());
-    let friction = with(Target::Equation("phd".into()), "-0.002*ph");
-    let same = by_hand("= u - ba*phd", "= u - ba*phd - 0.002*ph");
-    let actuator = with(Target::Input("u".into()), "-0.1*u");
-    let weaker = by_hand("= u - ba*phd", "= 0.9*u - ba*phd");
-    for signal in ["th", "ph"] {
-        assert!((at(&friction, signal, 2.0) - at(&same, signal, 2.0)).abs() < 1e-9);
-        assert!((at(&actuator, signal, 2.0) - at(&weaker, signal, 2.0)).abs() < 1e-9);
-        assert!((at(&friction, signal, 2.0) - at(&actuator, signal, 2.0)).abs() > 1e-3);
-    }
-    let sensor = with(Target::Signal("th".into()), "0.01 + 0.1*ph");
-    assert!(
-        (at(&sensor, "th", 1.0) - (at(&sensor, "ph", 1.0) * 0.1 + 0.01) - at(&end(&model(plain)), "th", 1.0)).abs()
-            < 1e-12
-    );
 }
 
 #[test]

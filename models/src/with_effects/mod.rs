@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use mops_core::{
     Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Plant, Port, Scalar,
-    State, Unit, Variable, WithTangents,
+    State, Trials, Unit, Variable, WithTangents,
 };
 
 use crate::kernel::{self, Recording, Tolerance, record, wanted};
@@ -75,7 +75,11 @@ impl WithEffects {
             for strength in effect.strengths() {
                 let variable = Variable {
                     name: format!("{name}.{}", strength.name),
-                    unit: unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
+                    unit: match strength.trials {
+                        // 1/s would take 5 Hz for 5 rad/s.
+                        Trials::Frequencies => Unit::known("rad/s"),
+                        _ => unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
+                    },
                     about: strength.about.to_owned(),
                 };
                 if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
@@ -271,6 +275,10 @@ fn unit(dimension: Dimension, port: &Port, companion: Option<&Port>, interface: 
 impl Model for WithEffects {
     fn interface(&self) -> &Interface {
         &self.interface
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.model.notes()
     }
 
     fn augmented(&self) -> Option<(&Arc<dyn Model>, &[Placement])> {

@@ -3,6 +3,7 @@
 pub mod functions;
 mod parse;
 mod tree;
+pub mod units;
 
 pub use functions::{FUNCTIONS, Function};
 pub use parse::{DEEPEST, Equation, SyntaxError, equation};
@@ -15,7 +16,8 @@ use crate::scalar::Scalar;
 /// An expression over named quantities, read once and evaluated with values or with tangents.
 ///
 /// Operators `+ - * / ^` with the usual precedence (`-x^2` is `-(x^2)`), parentheses, `pi`, and the functions of
-/// [`FUNCTIONS`]; conditions are comparisons `> >= < <=`, joined by `and`, `or`, `not`.
+/// [`FUNCTIONS`]; conditions are comparisons `> >= < <=`, joined by `and`, `or`, `not`. A number may have a unit in brackets:
+/// `20 [degC]`; its value is that in the coherent SI unit, 293.15.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     root: Node,
@@ -44,6 +46,11 @@ impl Expression {
         }
     }
 
+    /// What it is made of.
+    pub fn root(&self) -> &Node {
+        &self.root
+    }
+
     /// Names that occur, each once, in the order of their first use; values are given in this order.
     pub fn names(&self) -> &[String] {
         &self.names
@@ -66,7 +73,7 @@ impl Node {
     pub fn evaluate<S: Scalar>(&self, lookup: &impl Fn(&str) -> S) -> S {
         let value = |node: &Self| node.evaluate(lookup);
         match &self.form {
-            Form::Number(number) => S::from(*number),
+            Form::Number(number) | Form::Quantity(number, _) => S::from(*number),
             Form::Name(name) => lookup(name),
             Form::Negative(a) => -value(a),
             Form::Chain(first, rest) => {

@@ -10,7 +10,7 @@
 //! product     = signed (('*' | '/') signed)*
 //! signed      = ('-' | '+')? power
 //! power       = operand ('^' signed)?
-//! operand     = '(' expression ')' | number | name '(' expression (',' expression)* ')' | name ('[' sum ']')? "'"?
+//! operand     = '(' expression ')' | number ('[' unit ']')? | name '(' expression (',' expression)* ')' | name ('[' sum ']')? "'"?
 //! ```
 
 use std::ops::Range;
@@ -24,6 +24,7 @@ use winnow::token::{one_of, take_while};
 
 use super::functions::{FUNCTIONS, Function};
 use super::tree::{Comparison, Form, Node, Operator};
+use crate::unit::Unit;
 
 /// Where an expression is wrong, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,6 +59,7 @@ type Input<'t> = Stateful<LocatingSlice<&'t str>, usize>;
 /// As read: functions by their names, conditions anywhere.
 enum Raw {
     Number(f64),
+    Quantity(f64, String, Range<usize>),
     Name(String),
     Member(String, Box<Spanned>),
     Rate(Box<Spanned>),
@@ -85,6 +87,9 @@ impl Spanned {
 
 /// Reads an expression that is a number.
 pub fn expression(text: &str) -> Result<Node, SyntaxError> {
+    if let Some(quantity) = quantity_alone(text) {
+        return Ok(quantity);
+    }
     let raw = run(text, delimited(multispace0, disjunction, multispace0))?;
     number_of(raw)
 }
@@ -94,12 +99,33 @@ pub fn expression(text: &str) -> Result<Node, SyntaxError> {
 /// # Errors
 /// A text that is neither, with the place of the first mistake.
 pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
+    if let Some(right) = quantity_alone(text) {
+        return Ok(Equation { left: None, right });
+    }
     let right = opt(preceded('=', cut_err((multispace0, disjunction, multispace0))));
     let (_, first, _, second) = run(text, (multispace0, disjunction, multispace0, right))?;
     Ok(match second {
         Some((_, right, _)) => Equation { left: Some(number_of(first)?), right: number_of(right)? },
         None => Equation { left: None, right: number_of(first)? },
     })
+}
+
+/// A text that is a number with a unit and nothing else, as everywhere in a study: `20 degC`. A blank stands between the two:
+/// `1/s` is one over a quantity `s`.
+fn quantity_alone(text: &str) -> Option<Node> {
+    let (number, unit) = text.trim().split_once(char::is_whitespace)?;
+    let is_unit = unit.trim_start().starts_with(|c: char| c.is_alphabetic() || c == '%') || unit.starts_with("1/");
+    if !number.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || !is_unit {
+        return None;
+    }
+    let (number, unit) = (number.parse::<f64>().ok()?, Unit::parse(unit).ok()?);
+    let start = text.len() - text.trim_start().len();
+    Some(Node { form: quantity(number, unit), span: start..start + text.trim().len() })
+}
+
+/// A number in a unit, which is kept as its value in the coherent one.
+fn quantity(number: f64, unit: Unit) -> Form {
+    Form::Quantity(number * unit.factor() + unit.zero(), unit)
 }
 
 fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<ContextError>>) -> Result<T, SyntaxError> {
@@ -123,6 +149,14 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
             })
             .collect();
         let found = if rest.is_empty() { "the expression ends".to_owned() } else { format!("`{rest}` stands") };
+        let word = text[from..].split(|c: char| !c.is_alphabetic() && c != '%').next().unwrap_or_default();
+        if text[..from].trim_end().ends_with(|c: char| c.is_ascii_digit())
+            && Unit::parse(word).is_ok()
+            && !word.is_empty()
+        {
+            let message = format!("within an expression a unit stands in brackets, as in 20 [{word}]");
+            return SyntaxError { span: from..from + word.len(), message };
+        }
         let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
         SyntaxError { span: from..to, message: format!("{found} where {wanted} is expected") }
     })
@@ -157,6 +191,10 @@ fn checked(Spanned { raw, span }: Spanned) -> Result<Node, SyntaxError> {
             return Err(SyntaxError { span, message: "the number is too large".to_owned() });
         }
         Raw::Number(value) => Form::Number(value),
+        Raw::Quantity(number, unit, place) => {
+            let unit = Unit::parse(&unit).map_err(|message| SyntaxError { span: place, message })?;
+            quantity(number, unit)
+        }
         Raw::Name(name) if name == "pi" => Form::Number(std::f64::consts::PI),
         Raw::Name(name) => Form::Name(name),
         Raw::Member(name, index) => Form::Member(name, number(index)?),
@@ -332,12 +370,19 @@ fn chain(
     Ok(Spanned { raw: Raw::Chain(Box::new(first), rest), span })
 }
 
-/// `-x^2` is `-(x^2)`.
+/// `-x^2` is `-(x^2)`; `-5 [degC]` is a temperature below 0 degC.
 fn signed(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let (sign, span) = opt((one_of(['-', '+']), multispace0)).with_span().parse_next(input)?;
     let inner = power(input)?;
     Ok(match sign {
-        Some(('-', _)) => Spanned { span: span.start..inner.span.end, raw: Raw::Negative(Box::new(inner)) },
+        Some(('-', _)) => {
+            let span = span.start..inner.span.end;
+            let raw = match inner.raw {
+                Raw::Quantity(number, unit, place) => Raw::Quantity(-number, unit, place),
+                _ => Raw::Negative(Box::new(inner)),
+            };
+            Spanned { span, raw }
+        }
         _ => inner,
     })
 }
@@ -352,14 +397,22 @@ fn power(input: &mut Input<'_>) -> ModalResult<Spanned> {
 }
 
 fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
-    let number = preceded(peek(one_of(('0'..='9', '.'))), float).with_span();
-    alt((
-        bracketed,
-        number.map(|(value, span)| Spanned { raw: Raw::Number(value), span }),
-        name_or_call,
-        fail.context(expected("a number, a name or `(`")),
-    ))
-    .parse_next(input)
+    alt((bracketed, number, name_or_call, fail.context(expected("a number, a name or `(`")))).parse_next(input)
+}
+
+/// A number, with a unit in brackets or without.
+fn number(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let (value, span): (f64, _) = preceded(peek(one_of(('0'..='9', '.'))), float).with_span().parse_next(input)?;
+    let unit = take_while(1.., |c: char| c != ']' && c != '[').with_span();
+    let unit = opt(preceded((multispace0, '['), cut_err((unit, ']'.context(expected("`]` after a unit"))))));
+    let (unit, end) = unit.with_span().parse_next(input)?;
+    Ok(match unit {
+        Some(((unit, place), _)) => {
+            let unit: &str = unit;
+            Spanned { raw: Raw::Quantity(value, unit.to_owned(), place), span: span.start..end.end }
+        }
+        None => Spanned { raw: Raw::Number(value), span },
+    })
 }
 
 fn bracketed(input: &mut Input<'_>) -> ModalResult<Spanned> {

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::functions::Function;
 use crate::scalar::Scalar;
+use crate::unit::Unit;
 
 /// A part of an expression.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,8 @@ pub struct Node {
 pub enum Form {
     /// A number, `pi` included.
     Number(f64),
+    /// A number with its unit, `20 [degC]`: its value in the coherent SI unit, and the unit.
+    Quantity(f64, Unit),
     /// A named quantity.
     Name(String),
     /// A member of a family: `T[i-1]`.
@@ -103,7 +106,7 @@ impl Node {
     /// The nodes directly below.
     pub fn children(&self) -> Vec<&Self> {
         match &self.form {
-            Form::Number(_) | Form::Name(_) => Vec::new(),
+            Form::Number(_) | Form::Quantity(..) | Form::Name(_) => Vec::new(),
             Form::Member(_, a) | Form::Rate(a) | Form::Negative(a) | Form::Not(a) => vec![a],
             Form::Chain(first, rest) => {
                 std::iter::once(first.as_ref()).chain(rest.iter().map(|(_, node)| node)).collect()

@@ -200,7 +200,7 @@ impl<'f> Table<'f> {
         let scale = scale.unwrap_or(1.0);
         let offset = match (offset, &unit) {
             (None, _) => 0.0,
-            (Some(q), Some(unit)) => q.to(unit).map_err(|why| {
+            (Some(q), Some(unit)) => q.to(&unit.difference()).map_err(|why| {
                 at_key(place, "offset", why).with_help(format!("a number without a unit counts in `{unit}`"))
             })?,
             (Some(q), None) => q.number,

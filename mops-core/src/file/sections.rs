@@ -201,7 +201,7 @@ impl InputSection {
             Self::Sine(sine) => {
                 let within = |m: Mistake| m.within("sine");
                 Input::Sine {
-                    amplitude: number("amplitude", &sine.amplitude, unit).map_err(within)?,
+                    amplitude: number("amplitude", &sine.amplitude, &unit.difference()).map_err(within)?,
                     frequency: number("frequency", &sine.frequency, &known("Hz")).map_err(within)?,
                     phase: or_zero("phase", &sine.phase, &known("rad")).map_err(within)?,
                     offset: or_zero("offset", &sine.offset, unit).map_err(within)?,

@@ -222,12 +222,18 @@ impl Study {
         values
     }
 
-    /// Sets every tied tuner from the ones it follows.
+    /// Sets every tied tuner from the ones it follows; expressions are evaluated in coherent units.
     pub fn apply_ties<S: Scalar>(&self, values: &mut [S]) {
         for (i, tuner) in self.tuners.iter().enumerate() {
             if let Some((expression, of)) = &tuner.tie {
-                let arguments: Vec<S> = of.iter().map(|&j| values[j]).collect();
-                values[i] = expression.evaluate(&arguments);
+                let coherent = |j: usize| {
+                    let unit = &self.tuners[j].unit;
+                    values[j] * unit.factor() + S::from(unit.zero())
+                };
+                let arguments: Vec<S> = of.iter().map(|&j| coherent(j)).collect();
+                let value = expression.evaluate(&arguments);
+                let unit = &tuner.unit;
+                values[i] = (value - S::from(unit.zero())) / S::from(unit.factor());
             }
         }
     }

@@ -69,7 +69,7 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     let unit = tuner.map_or(&parameter.variable.unit, |t| &study.tuners[t].unit).clone();
     let number = |key: &str, quantity: &Quantity| -> Result<f64, Mistake> {
         let value = quantity
-            .to(&unit)
+            .to(&if key == "deviation" { unit.difference() } else { unit.clone() })
             .map_err(|why| Mistake::new(key, why).with_help(format!("a number without a unit counts in `{unit}`")))?;
         if value.is_finite() { Ok(value) } else { Err(Mistake::new(key, format!("{value} is not a finite number"))) }
     };

@@ -230,7 +230,7 @@ fn a_mass_on_a_flexible_mode_swings_at_both_its_frequencies() {
     let model = with(BLOCK, "flexible-mode", "joint:x", None);
     let (m1, m2, w, k) = (2.0_f64, 0.5, 3.0, 8.0);
     // With a spring k at the first mass by hand: a cosine of each eigenfrequency, started in its own shape.
-    let spring = BLOCK.replace("= u\"", "= u - 8*x\"");
+    let spring = BLOCK.replace("= u\"", "= u - 8 [N/m]*x\"");
     let sprung = with(&spring, "flexible-mode", "joint:x", None);
     let (a, b) = ((k + m2 * w * w) / m1 + w * w, k / m1 * w * w);
     for sign in [-1.0, 1.0] {
@@ -262,7 +262,7 @@ fn a_coupling_with_play_lets_go_within_its_gap() {
 fn damped_contact_in_a_coupling_takes_speed_and_does_not_pull() {
     let ratio: f64 = 0.3;
     let tau = 2.0 * ratio / 4.0;
-    let damped = COUPLED.replace("k*(x - y)", "(k*(x - y) + 2.4*(v - w))");
+    let damped = COUPLED.replace("k*(x - y)", "(k*(x - y) + 2.4 [N s/m]*(v - w))");
     let model = with(&damped, "coupling-play", "joint:x", Some("joint:y"));
     let parameters = [2.0, 16.0, 0.0, 1.0, 0.0, 0.0, 16.0, 1.0, tau];
     let restitution = (-ratio / (1.0 - ratio * ratio).sqrt() * (PI - 2.0 * ratio.asin())).exp();
@@ -272,7 +272,7 @@ fn damped_contact_in_a_coupling_takes_speed_and_does_not_pull() {
 
 #[test]
 fn a_spring_with_play_lets_go_within_its_gap() {
-    let model = with(&BLOCK.replace("= u\"", "= u - 8*x\""), "spring-play", "joint:x", None);
+    let model = with(&BLOCK.replace("= u\"", "= u - 8 [N/m]*x\""), "spring-play", "joint:x", None);
     let found = values(&model, &[2.0, 0.0, 1.0, 8.0, 1.0], NOTHING, "v", &[0.4, 0.5 + PI / 2.0 + 0.2]);
     close(&found, &[1.0, -1.0], 1e-5);
 }

@@ -73,7 +73,7 @@ proptest! {
     fn guards_on_time_alone_are_found_though_no_state_moves(
         frequency in 0.05..8.0_f64, level in -0.98..0.98_f64, phase in 0.0..6.2_f64, states in 0..2_usize,
     ) {
-        let decay = ["", ", y = '-y'"][states];
+        let decay = ["", ", y = '-1 [1/s]*y'"][states];
         let unit = ["", ", y = '1'"][states];
         let text = format!(
             "states = {{ n = '1', e = 's'{unit} }}\nparameters = {{ f = '1/s', c = '1', p = '1' }}\n\
@@ -111,7 +111,7 @@ proptest! {
         hold in prop::sample::select(&[Hold::Zero, Hold::First]),
     ) {
         let text = "states = { q = 's', s = '1', y = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\n\
-                    der = { q = '1', s = '0', y = '-y + s' }\n\
+                    der = { q = '1', s = '0', y = '(s - y)/1 [s]' }\n\
                     when.tick = { guard = 'T - q', reset = { q = '0', s = 'u' } }";
         let times_of = |period: f64| (0..=(5.0 / period).round() as usize).map(move |k| k as f64 * period);
         // Held samples are numbers 0, 1, 2 ..; straight lines between them are the time over the period.

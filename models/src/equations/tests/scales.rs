@@ -46,8 +46,7 @@ fn a_spring_swings_as_the_closed_form_says_at_all_sizes() {
 
 #[test]
 fn a_pendulum_of_any_length_swings_alike() {
-    let text =
-        "states = { th = 'rad', w = 'rad/s' }\nparameters = { l = 'm' }\nder = { th = 'w', w = '-9.81/l*sin(th)' }";
+    let text = "states = { th = 'rad', w = 'rad/s' }\nparameters = { l = 'm' }\nder = { th = 'w', w = '-9.81 [m/s2]/l*sin(th)' }";
     let model = read(text).unwrap();
     for start in [1e-12, 1e-6, 1.0, 3.0] {
         let ends: Vec<f64> = DECADES
@@ -79,7 +78,7 @@ fn a_chain_of_integrators_starts_from_rest() {
 fn a_difference_that_is_rounding_is_no_motion_to_follow() {
     // Two equal masses under equal forces: e is their distance, 0 but for rounding.
     let text = "states = { e = 'm', a = 'm/s', b = 'm/s' }\nparameters = { k = '1/s2' }\n\
-                der = { e = 'a - b', a = '3.3*cos(7*time) - 0.1*a - k*e', b = '3.3*cos(7*time) - 0.1*b + k*e' }";
+                der = { e = 'a - b', a = '3.3 [m/s2]*cos(7 [1/s]*time) - 0.1 [1/s]*a - k*e', b = '3.3 [m/s2]*cos(7 [1/s]*time) - 0.1 [1/s]*b + k*e' }";
     let model = read(text).unwrap();
     let response = respond(&model, &[], &[("k", 30.0), ("a0", 1.1), ("b0", 1.1 * (1.0 + 1e-15))], 20.0);
     assert!(at(&response, "e", 20.0).abs() < 1e-12);

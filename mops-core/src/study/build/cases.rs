@@ -55,22 +55,21 @@ fn build_input(
     })?;
     let mut input = input.clone();
     if let Some(unit) = unit {
-        let factor = unit.factor_to(&variable.unit).ok_or_else(|| {
+        let difference = unit.factor_to(&variable.unit).ok_or_else(|| {
             Mistake::new(name, format!("the input `{name}` is given in `{unit}`, the model takes `{}`", variable.unit))
                 .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
                 .within("inputs")
         })?;
+        let convert =
+            |value: &mut f64| *value = unit.convert(*value, &variable.unit).expect("the units are compatible");
         match &mut input {
-            Input::Constant(value) => *value *= factor,
-            Input::Step { before, after, .. } => {
-                *before *= factor;
-                *after *= factor;
-            }
+            Input::Constant(value) => convert(value),
+            Input::Step { before, after, .. } => [before, after].into_iter().for_each(convert),
             Input::Sine { amplitude, offset, .. } => {
-                *amplitude *= factor;
-                *offset *= factor;
+                *amplitude *= difference;
+                convert(offset);
             }
-            Input::Sampled { values, .. } => values.iter_mut().for_each(|v| *v *= factor),
+            Input::Sampled { values, .. } => values.iter_mut().for_each(convert),
         }
     }
     if let Some(at) = input.uneven() {
@@ -171,17 +170,16 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
 }
 
 fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
-    let factor = match &draft.unit {
-        None => 1.0,
-        Some(unit) => unit.factor_to(to).ok_or_else(|| {
-            Mistake::new("column", format!("the column is in `{unit}`, the signal `{}` in `{to}`", draft.signal))
-                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
-        })?,
-    };
+    let unit = draft.unit.as_ref().unwrap_or(to);
+    if !unit.is_compatible(to) {
+        let fact = format!("the column is in `{unit}`, the signal `{}` in `{to}`", draft.signal);
+        return Err(Mistake::new("column", fact)
+            .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here"));
+    }
     let noise = match &draft.noise {
         None => None,
         Some(noise) => {
-            let value = converted(noise, to).map_err(|m| m.within("noise"))?;
+            let value = converted(noise, &to.difference()).map_err(|m| m.within("noise"))?;
             if !(value.is_finite() && value > 0.0) {
                 return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}"))
                     .with_help("leave `noise` out where it is not known; `mops data` estimates it"));
@@ -190,7 +188,8 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
         }
     };
     let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
-    let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, value * factor)).unzip();
+    let in_model = |value: f64| unit.convert(value, to).expect("the units are compatible");
+    let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();
     if let Some(early) = times.first().filter(|&&t| t < 0.0) {
         return Err(Mistake::new("column", format!("the first sample is at {early} s, before the simulation begins"))
             .with_help("a simulation begins at 0 s: leave `reset-time` away, or cut with `from`"));

@@ -69,16 +69,23 @@ fn sources(
         .map(|p| {
             let name = &p.variable.name;
             let tuner = |of: Option<usize>| study.tuners.iter().position(|t| t.parameter == *name && t.case == of);
+            let by = |tuner: usize| {
+                let unit = &study.tuners[tuner].unit;
+                if unit.zero() != p.variable.unit.zero() {
+                    let fact = format!("`{name}` is in {unit} in one model and in {} in another", p.variable.unit);
+                    return Err(Mistake::here(fact).with_help("declare it on one scale of temperature in all models"));
+                }
+                let factor = unit.factor_to(&p.variable.unit).unwrap_or(1.0);
+                Ok(ParameterSource::Tuner { tuner, factor })
+            };
             if let Some(tuner) = tuner(Some(case)) {
-                let factor = study.tuners[tuner].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
-                return Ok(ParameterSource::Tuner { tuner, factor });
+                return by(tuner);
             }
             if let Some(value) = find(&study.cases[case].parameters, name) {
                 return Ok(ParameterSource::Constant(value));
             }
             if let Some(tuner) = tuner(None) {
-                let factor = study.tuners[tuner].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
-                return Ok(ParameterSource::Tuner { tuner, factor });
+                return by(tuner);
             }
             find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
                 Mistake::here(format!("nothing gives a value to `{name}` in `{}`", study.cases[case].name)).with_help(

@@ -3,6 +3,7 @@
 mod cases;
 mod criteria;
 mod jobs;
+mod ties;
 mod tuners;
 mod values;
 
@@ -51,7 +52,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     for (name, tuner) in &draft.tuners {
         build_tuner(name, tuner, &models, &cases, &mut tuners).map_err(|m| m.within(name).within("tuners"))?;
     }
-    tie_tuners(&draft.tuners, &mut tuners)?;
+    tie_tuners(&draft.tuners, &mut tuners, &models)?;
     for (index, (case, case_draft)) in cases.iter().zip(&drafts).enumerate() {
         for free in case_draft.measured.iter().flat_map(|m| &m.free) {
             let tuner = free_start(free, index, case, &models)
@@ -69,7 +70,10 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
             if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
         }
     });
-    let notes = assumed_units(&drafts, &models);
+    let mut notes = assumed_units(&drafts, &models);
+    for (name, model) in &models {
+        notes.extend(model.notes().into_iter().map(|note| format!("`{name}`: {note}")));
+    }
     let mut study = Study {
         name: draft.name,
         task: draft.task,

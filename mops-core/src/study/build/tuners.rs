@@ -29,9 +29,16 @@ pub(super) fn build_tuner(
             )
             .with_help("give a unit that converts to it, or leave `unit` out"));
         }
+        // A tuner is its parameter times a factor: a temperature on another scale has that of the parameter.
+        (Some(unit), Some(p)) if unit.zero() != p.variable.unit.zero() => p.variable.unit.clone(),
         (Some(unit), _) => unit.clone(),
         (None, Some(p)) => p.variable.unit.clone(),
         (None, None) => Unit::one(),
+    };
+    // A number without a unit is in that of the tuner, even where this is on another scale of temperature.
+    let converted = |quantity: &Quantity, unit: &Unit| {
+        let own = quantity.unit.clone().or_else(|| draft.unit.clone());
+        converted(&Quantity { unit: own, ..quantity.clone() }, unit)
     };
     let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, Mistake> {
         let Some(quantity) = quantity else { return Ok(None) };
@@ -197,7 +204,12 @@ pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Res
 }
 
 /// Binds the expressions of tied tuners, in an order in which each follows what it names.
-pub(super) fn tie_tuners(drafts: &[(String, TunerDraft)], tuners: &mut [Tuner]) -> Result<(), Mistake> {
+pub(super) fn tie_tuners(
+    drafts: &[(String, TunerDraft)],
+    tuners: &mut [Tuner],
+    models: &Models,
+) -> Result<(), Mistake> {
+    let parameters: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
     for (position, (name, draft)) in drafts.iter().enumerate() {
         let Some(text) = &draft.tie else { continue };
         let wrong =
@@ -220,6 +232,12 @@ pub(super) fn tie_tuners(drafts: &[(String, TunerDraft)], tuners: &mut [Tuner]) 
                 wrong(format!("`{used}` has a value of its own in every case"), "tie to tuners of the whole study")
             })?);
         }
+        let loose = |name: &str| {
+            let draft = drafts.iter().find(|(known, _)| known == name).map(|(_, draft)| draft);
+            draft.is_some_and(|draft| draft.unit.is_none()) && !parameters.contains(&name)
+        };
+        super::ties::check(&expression, name, tuners, &loose)
+            .map_err(|m| m.within("tie").within(name).within("tuners"))?;
         for tuner in tuners.iter_mut().filter(|t| t.parameter == *name) {
             tuner.tie = Some((expression.clone(), of.clone()));
         }

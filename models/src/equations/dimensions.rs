@@ -1,0 +1,265 @@
+//! Dimensions of the whole model: every expression is measured, and what has no unit gets one.
+
+use std::collections::{BTreeMap, HashMap};
+
+use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
+use mops_core::expression::{Form, Node};
+use mops_core::{Mistake, Unit};
+
+use super::definition::{Declared, Definition, Text, under};
+use super::key::member;
+
+/// What the equations say of units.
+#[derive(Debug)]
+pub struct Measured {
+    /// Units of the terms in the equations of the states.
+    pub forces: Vec<Unit>,
+    /// How numbers and quantities without units were read.
+    pub notes: Vec<String>,
+    /// Units of states, inputs, parameters and constants that were declared without one.
+    names: HashMap<String, Unit>,
+    /// Units of the outputs.
+    outputs: Vec<Unit>,
+}
+
+impl Measured {
+    /// Gives their units to what was declared without.
+    pub fn declare(&self, d: &mut Definition) {
+        let parameters = d.parameters.iter_mut().map(|p| &mut p.quantity);
+        for quantity in d.states.iter_mut().chain(&mut d.inputs).chain(parameters) {
+            if let Some(unit) = self.names.get(&quantity.name) {
+                quantity.unit = unit.clone();
+            }
+        }
+        for ((output, _), unit) in d.outputs.iter_mut().zip(&self.outputs) {
+            output.unit = unit.clone();
+        }
+    }
+}
+
+/// Measures every expression of the model; `joints` are pairs of a position and its speed.
+///
+/// # Errors
+/// The first part that does not fit, at its place.
+pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mistake> {
+    let mut model = Model::new(d);
+    for (_, text) in &d.lets {
+        model.measure(text)?;
+    }
+    let forces = d.states.iter().map(|state| model.force(&state.name)).collect::<Result<Vec<_>, _>>()?;
+    let state = |name: &String| d.states.iter().position(|s| s.name == *name).expect("names of states were checked");
+    for (row, column, text) in &d.mass {
+        let mass = forces[state(row)].times(&model.rate(column), -1.0);
+        model.fits(&mass, text, "a mass times a derivative measures what `der` gives")?;
+    }
+    for (k, (_, text)) in d.outputs.iter().enumerate() {
+        model.fits(&model.outputs[k].clone(), text, "an output measures what its unit says")?;
+    }
+    for (state, text) in d.start.iter().filter(|(_, text)| !text.is_bare()) {
+        model.fits(&model.names[state].clone(), text, "a start value measures what the state measures")?;
+    }
+    for friction in &d.friction {
+        let of = state(&friction.of);
+        let Some(&(_, velocity)) = joints.iter().find(|(q, v)| *q == of || *v == of) else { continue };
+        let force = &forces[velocity];
+        let viscous = force.times(&model.names[&d.states[velocity].name], -1.0);
+        let wanted = [
+            (&friction.coulomb, force, "dry friction measures what the terms of the equation measure"),
+            (&friction.viscous, &viscous, "viscous friction times the speed is a term of the equation"),
+            (&friction.peak, &Measure::pure(), "a ratio is a pure number"),
+        ];
+        for (text, measure, rule) in wanted {
+            text.as_ref().map_or(Ok(()), |text| model.fits(measure, text, rule))?;
+        }
+    }
+    for when in &d.when {
+        model.measure(&when.guard)?;
+        for (state, text) in when.resets.iter().chain(&when.at_rest) {
+            model.fits(
+                &model.names[state].clone(),
+                text,
+                "the new value of a state measures what the state measures",
+            )?;
+        }
+    }
+    Ok(model.measured(&forces))
+}
+
+/// The quantities of a model, and what they measure.
+struct Model<'d> {
+    definition: &'d Definition,
+    dimensions: Dimensions,
+    /// States, inputs, parameters, constants, and definitions once they were measured.
+    names: HashMap<String, Measure>,
+    outputs: Vec<Measure>,
+    lets: HashMap<&'d str, &'d Text>,
+    constants: HashMap<&'d str, f64>,
+    time: Measure,
+    /// Numbers that count in coherent units, by their places and what they are.
+    counted: BTreeMap<(String, String), Open>,
+}
+
+/// Whether everything in the model is declared as a pure number: then time is one, too.
+fn is_dimensionless(d: &Definition) -> bool {
+    let outputs = d.outputs.iter().map(|(output, _)| output);
+    let parameters = d.parameters.iter().map(|p| &p.quantity);
+    let mut declared = d.states.iter().chain(&d.inputs).chain(parameters).chain(outputs).map(|q| &q.unit);
+    let is_one = |unit: &Unit| unit.to_string() == "1";
+    declared.all(is_one) && d.constants.iter().filter_map(|c| c.unit.as_ref()).all(is_one)
+}
+
+impl<'d> Model<'d> {
+    fn new(d: &'d Definition) -> Self {
+        let mut dimensions = Dimensions::default();
+        let pure = is_dimensionless(d);
+        let mut measure = |name: &str, unit: &Unit, open: bool| {
+            if open && !pure { dimensions.open(name) } else { Measure::declared(name, unit) }
+        };
+        let parameters = d.parameters.iter().map(|p| &p.quantity);
+        let mut names = HashMap::new();
+        for q in d.states.iter().chain(&d.inputs).chain(parameters) {
+            names.insert(q.name.clone(), measure(&q.name, &q.unit, q.open));
+        }
+        for c in &d.constants {
+            let unit = c.unit.clone().unwrap_or_else(Unit::one);
+            names.insert(c.name.clone(), measure(&c.name, &unit, c.unit.is_none()));
+        }
+        let outputs = d.outputs.iter().map(|(q, _): &(Declared, Text)| measure(&q.name, &q.unit, q.open)).collect();
+        Self {
+            definition: d,
+            names,
+            outputs,
+            lets: d.lets.iter().map(|(name, text)| (name.as_str(), text)).collect(),
+            constants: d.constants.iter().map(|c| (c.name.as_str(), c.value)).collect(),
+            time: if pure { Measure::pure() } else { Measure::declared("time", &Unit::known("s")) },
+            counted: BTreeMap::new(),
+            dimensions,
+        }
+    }
+
+    fn rate(&self, state: &str) -> Measure {
+        self.names[state].rate(&self.time)
+    }
+
+    fn within<T>(&mut self, text: &Text, f: impl FnOnce(&mut Dimensions, &mut Within<'_, 'd>) -> T) -> T {
+        // What was found so far is taken along, as the quantities that an expression names may be measured on the way.
+        let mut dimensions = std::mem::take(&mut self.dimensions);
+        let found = f(&mut dimensions, &mut Within { model: self, text });
+        self.dimensions = dimensions;
+        found
+    }
+
+    fn measure(&mut self, text: &Text) -> Result<Measure, Mistake> {
+        self.within(text, |dimensions, within| dimensions.measure(within, &text.equation.right))
+    }
+
+    fn fits(&mut self, what: &Measure, text: &Text, rule: &str) -> Result<(), Mistake> {
+        self.within(text, |dimensions, within| dimensions.fits(within, what, &text.equation.right, rule))
+    }
+
+    /// What the terms in the equation of a state measure.
+    fn force(&mut self, state: &str) -> Result<Measure, Mistake> {
+        let text = &self.definition.der[state];
+        if let Some(left) = &text.equation.left {
+            return self.within(text, |dimensions, within| dimensions.equate(within, [left, &text.equation.right]));
+        }
+        let has_mass = self.definition.mass.iter().any(|(row, ..)| row == state);
+        let force = if has_mass { self.dimensions.open(&format!("der.{state}")) } else { self.rate(state) };
+        self.fits(&force, text, "a derivative measures what its state measures, per time")?;
+        Ok(force)
+    }
+
+    fn measured(&self, forces: &[Measure]) -> Measured {
+        let d = self.definition;
+        let unit = |measure: &Measure| Unit::coherent(&self.dimensions.of(measure));
+        let force = |(state, force): (&Declared, &Measure)| {
+            let (rate, coherent) = (state.unit.difference().power(1, -1), unit(force));
+            if rate.is_coherent() && rate.is_compatible(&coherent) { rate } else { coherent }
+        };
+        let open =
+            self.names.iter().filter(|(name, measure)| measure.is_loose() && !self.lets.contains_key(name.as_str()));
+        let names: HashMap<String, Unit> = open.map(|(name, measure)| (name.clone(), unit(measure))).collect();
+        let output =
+            |((q, _), measure): (&(Declared, Text), &Measure)| if q.open { unit(measure) } else { q.unit.clone() };
+        let measured = |unit: &Unit| !unit.dimension().is_none();
+        let numbers = self.counted.iter().map(|((place, number), open)| {
+            (format!("{number} in {{}} ({place})"), Unit::coherent(&self.dimensions.found(open)))
+        });
+        let numbers =
+            numbers.filter(|(_, unit)| measured(unit)).map(|(text, unit)| text.replace("{}", &unit.to_string()));
+        let mut without: Vec<String> =
+            names.iter().filter(|(_, unit)| measured(unit)).map(|(name, unit)| format!("`{name}` in {unit}")).collect();
+        without.sort();
+        let notes = [
+            ("numbers without units count in SI units", numbers.collect::<Vec<_>>()),
+            ("quantities declared without units have those that the equations ask for", without),
+        ];
+        let notes = notes.into_iter().filter(|(_, list)| !list.is_empty());
+        Measured {
+            forces: d.states.iter().zip(forces).map(force).collect(),
+            notes: notes.map(|(what, list)| format!("{what}: {}", list.join(", "))).collect(),
+            outputs: d.outputs.iter().zip(&self.outputs).map(output).collect(),
+            names,
+        }
+    }
+}
+
+/// One expression of the model.
+struct Within<'m, 'd> {
+    model: &'m mut Model<'d>,
+    text: &'m Text,
+}
+
+impl Quantities for Within<'_, '_> {
+    type Error = Mistake;
+
+    fn measure(&mut self, dimensions: &mut Dimensions, node: &Node) -> Result<Measure, Mistake> {
+        let name = match &node.form {
+            Form::Name(name) => name.clone(),
+            Form::Member(name, index) => member(name, self.index(index)),
+            Form::Rate(of) => {
+                let state = self.measure(dimensions, of)?;
+                return Ok(state.rate(&self.model.time));
+            }
+            _ => unreachable!("only what has a name is looked up"),
+        };
+        if self.text.index.as_ref().is_some_and(|(index, _)| *index == name) {
+            return Ok(Measure::pure());
+        }
+        if name == "time" {
+            return Ok(self.model.time.clone());
+        }
+        if let Some(known) = self.model.names.get(&name) {
+            return Ok(known.clone());
+        }
+        let text = self.model.lets[name.as_str()];
+        let measure = dimensions.measure(&mut Within { model: &mut *self.model, text }, &text.equation.right)?;
+        self.model.names.insert(name, measure.clone());
+        Ok(measure)
+    }
+
+    fn constant(&self, name: &str) -> Option<f64> {
+        match &self.text.index {
+            #[allow(clippy::cast_precision_loss)]
+            Some((index, k)) if index == name => Some(*k as f64),
+            _ => self.model.constants.get(name).copied(),
+        }
+    }
+
+    fn counts(&mut self, number: &Node, dimension: Open) {
+        let value = number.evaluate(&|_: &str| f64::NAN);
+        self.model.counted.insert((self.text.path.join("."), value.to_string()), dimension);
+    }
+
+    fn refuse(&self, Conflict { span, fact, help }: Conflict) -> Mistake {
+        under(&self.text.path, Mistake::here(fact).with_help(help).at(span))
+    }
+}
+
+impl Within<'_, '_> {
+    /// The index of a member; it was checked when the expression was lowered.
+    #[allow(clippy::cast_possible_truncation)]
+    fn index(&self, node: &Node) -> i64 {
+        node.evaluate(&|name: &str| self.constant(name).unwrap_or(f64::NAN)) as i64
+    }
+}

@@ -1,0 +1,95 @@
+//! What a quantity measures: exponents of the base units.
+
+use std::fmt;
+
+/// Exponents of m, kg, s, A, K, mol, and of the decibel (a unit apart, as it is not a ratio). They may be fractions, as in
+/// `V^0.5/s`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Dimension(pub(super) [f64; 7]);
+
+/// Symbols of the coherent base units, and the places of their exponents, in the order in which they are written.
+const BASE: [(&str, usize); 7] = [("kg", 1), ("m", 0), ("s", 2), ("A", 3), ("K", 4), ("mol", 5), ("dB", 6)];
+
+/// Coherent units with names of their own, in the order in which a dimension is written with them.
+/// Source: BIPM, The International System of Units, 9th edition (2019), table 4.
+const NAMED: [(&str, [f64; 7]); 10] = [
+    ("N m", [2.0, 1.0, -2.0, 0.0, 0.0, 0.0, 0.0]),
+    ("N", [1.0, 1.0, -2.0, 0.0, 0.0, 0.0, 0.0]),
+    ("Pa", [-1.0, 1.0, -2.0, 0.0, 0.0, 0.0, 0.0]),
+    ("W", [2.0, 1.0, -3.0, 0.0, 0.0, 0.0, 0.0]),
+    ("V", [2.0, 1.0, -3.0, -1.0, 0.0, 0.0, 0.0]),
+    ("Ohm", [2.0, 1.0, -3.0, -2.0, 0.0, 0.0, 0.0]),
+    ("H", [2.0, 1.0, -2.0, -2.0, 0.0, 0.0, 0.0]),
+    ("F", [-2.0, -1.0, 4.0, 2.0, 0.0, 0.0, 0.0]),
+    ("C", [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]),
+    ("S", [-2.0, -1.0, 3.0, 2.0, 0.0, 0.0, 0.0]),
+];
+
+/// Exponents closer than this are the same: thirds add up to whole numbers but for rounding.
+const SAME: f64 = 1e-9;
+
+impl Dimension {
+    /// That of a pure number.
+    pub const NONE: Self = Self([0.0; 7]);
+    /// That of a time.
+    pub const TIME: Self = Self([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+
+    /// Whether it is that of a pure number.
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// That of the product with the power `exponent` of a quantity of dimension `other`.
+    #[must_use]
+    pub fn times(mut self, other: &Self, exponent: f64) -> Self {
+        for (sum, power) in self.0.iter_mut().zip(other.0) {
+            *sum += exponent * power;
+        }
+        self
+    }
+
+    /// The text of its coherent SI unit: a unit with a name and few base units beside it.
+    pub fn coherent(&self) -> String {
+        // Masses that would have to be divided out again speak against a name: m/s2, not N/kg.
+        let cost = |rest: &Self| rest.0.iter().map(|e| e.abs()).sum::<f64>() + 2.0 * rest.0[1].abs();
+        let plain = (self.0.iter().map(|e| e.abs()).sum(), "", *self);
+        let named = NAMED.iter().map(|(symbol, dimension)| {
+            let rest = self.times(&Self(*dimension), -1.0);
+            (cost(&rest) + 1.0, *symbol, rest)
+        });
+        // The first of the cheapest: base units alone where nothing is gained.
+        let (_, symbol, rest) = named.fold(plain, |best, other| if other.0 < best.0 - SAME { other } else { best });
+        let part = |(symbol, exponent): (&str, f64)| {
+            if (exponent - 1.0).abs() < SAME { symbol.to_owned() } else { format!("{symbol}{}", rounded(exponent)) }
+        };
+        let powers = |sign: f64| {
+            let exponents = BASE.iter().map(|&(symbol, place)| (symbol, sign * rest.0[place]));
+            exponents.filter(|(_, exponent)| *exponent > SAME).map(part).collect::<Vec<_>>()
+        };
+        let above: Vec<String> =
+            (!symbol.is_empty()).then(|| symbol.to_owned()).into_iter().chain(powers(1.0)).collect();
+        let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+        powers(-1.0).into_iter().fold(above, |text, factor| format!("{text}/{factor}"))
+    }
+}
+
+/// An exponent as a unit has it: thirds with six digits.
+fn rounded(exponent: f64) -> String {
+    let whole = exponent.round();
+    if (exponent - whole).abs() < SAME {
+        return format!("{whole}");
+    }
+    format!("^{}", (exponent * 1e6).round() / 1e6)
+}
+
+impl PartialEq for Dimension {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.iter().zip(other.0).all(|(a, b)| (a - b).abs() < SAME)
+    }
+}
+
+impl fmt::Display for Dimension {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.coherent())
+    }
+}

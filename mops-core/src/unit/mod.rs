@@ -1,0 +1,442 @@
+//! Units of measure, and quantities such as `"15 s"`.
+
+mod dimension;
+mod quantity;
+mod symbols;
+
+use std::f64::consts::PI;
+use std::fmt;
+
+pub use dimension::Dimension;
+pub use quantity::Quantity;
+use symbols::{SYMBOLS, Turning};
+
+use crate::diagnostic::nearest;
+
+/// A unit of measure: a product of powers of SI units, prefixes allowed (`kg m2`, `N.m.s/rad`, `mm/s^2`, `V^0.5/s`).
+///
+/// Factors stand side by side or are joined by `*` or a dot; `/` divides by the one factor, or the parenthesis, after it; an
+/// exponent follows its unit, with or without `^`, and may be a fraction (`m^0.5`, `m^(1/2)`).
+///
+/// The radian counts as 1, as in the SI; a revolution is 2 pi of it, so that rev/s and rpm are angular speeds. Hz counts cycles:
+/// 1 Hz is 1 1/s, and where a frequency in rad/s is asked for it is 2 pi rad/s.
+///
+/// degC and degF alone are scales of temperature with a zero of their own. In a product (`W/degC`) they are differences.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    text: String,
+    dimension: Dimension,
+    /// Value of this unit in the coherent SI unit.
+    factor: f64,
+    /// The zero of the scale in K, of a scale of temperature.
+    zero: f64,
+    /// Whether it is of differences, to which the zeros of scales do not matter.
+    is_difference: bool,
+    /// Exponents of units that count angles, and of those that count cycles.
+    turning: [f64; 2],
+}
+
+impl Unit {
+    /// The unit of a pure number.
+    pub fn one() -> Self {
+        Self {
+            text: "1".to_owned(),
+            dimension: Dimension::NONE,
+            factor: 1.0,
+            zero: 0.0,
+            is_difference: false,
+            turning: [0.0; 2],
+        }
+    }
+
+    /// Reads a unit; an empty text is the unit of a pure number.
+    ///
+    /// # Errors
+    /// An unknown symbol, or a text that is not a product of powers: one sentence that says which.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let mut rest = text.trim();
+        let mut unit = Self { text: if rest.is_empty() { "1".into() } else { rest.into() }, ..Self::one() };
+        let mut divide = false;
+        let mut first = true;
+        while !rest.is_empty() {
+            if let Some(after) = rest.strip_prefix('/') {
+                divide = true;
+                rest = after.trim_start();
+            } else if let Some(after) = rest.strip_prefix(['*', '.', '\u{b7}']) {
+                rest = after.trim_start();
+            }
+            let (factor, after) = factor(rest).ok_or_else(|| {
+                let place = if rest == text.trim() { String::new() } else { format!(" in `{text}`") };
+                let end = rest.find(|c: char| !c.is_alphabetic()).unwrap_or(rest.len());
+                // A slip seldom hits the first letter, and one letter alone is near to everything.
+                let first = |text: &str| text.chars().next().map(|c| c.to_lowercase().to_string());
+                let alike = |symbol: &&str| symbol.len() > 1 && first(symbol) == first(rest);
+                let near = nearest(&rest[..end], SYMBOLS.iter().map(|known| known.symbol).filter(alike));
+                let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                format!("`{rest}` is not a known unit{place}{meant}")
+            })?;
+            let sign = if divide { -1.0 } else { 1.0 };
+            unit.zero = if first && !divide { factor.zero } else { 0.0 };
+            unit.dimension = unit.dimension.times(&factor.dimension, sign);
+            unit.factor *= raised(factor.factor, sign);
+            for (sum, power) in unit.turning.iter_mut().zip(factor.turning) {
+                *sum += sign * power;
+            }
+            (divide, first) = (false, false);
+            rest = after.trim_start();
+        }
+        if divide { Err(format!("nothing follows the `/` in `{text}`")) } else { Ok(unit) }
+    }
+
+    /// A unit that is written in the program, not by a user.
+    ///
+    /// # Panics
+    /// If `text` is not a unit.
+    pub fn known(text: &str) -> Self {
+        Self::parse(text).expect("units in the program are spelled right")
+    }
+
+    /// The coherent SI unit of a dimension.
+    pub fn coherent(dimension: &Dimension) -> Self {
+        Self { text: dimension.coherent(), dimension: *dimension, ..Self::one() }
+    }
+
+    /// What it measures.
+    pub fn dimension(&self) -> &Dimension {
+        &self.dimension
+    }
+
+    /// Its value in the coherent SI unit: 0.01 for cm.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+
+    /// The zero of its scale in K: 273.15 for degC; 0 for what is no scale of temperature.
+    pub fn zero(&self) -> f64 {
+        self.zero
+    }
+
+    /// Whether it counts cycles, as Hz does: where angles are asked for it is 2 pi times as much.
+    pub fn counts_cycles(&self) -> bool {
+        self.turning[1] != 0.0
+    }
+
+    /// Whether numbers in it are numbers in the coherent SI unit.
+    pub fn is_coherent(&self) -> bool {
+        self.factor == 1.0 && self.zero == 0.0
+    }
+
+    /// The unit of differences, rates and errors of quantities in this unit: K for degC, degR for degF, else the same. A
+    /// temperature that is converted to it is a difference: 5 degC are 5 K.
+    #[must_use]
+    pub fn difference(&self) -> Self {
+        let unit = match (self.zero == 0.0, self.factor == 1.0) {
+            (true, _) => self.clone(),
+            (_, true) => Self::known("K"),
+            _ => Self::known("degR"),
+        };
+        Self { is_difference: true, ..unit }
+    }
+
+    /// A number with this unit, as it stands in a sentence: `3 rad`; a pure number alone.
+    pub fn amount(&self, number: f64) -> String {
+        if self.text == "1" { number.to_string() } else { format!("{number} {self}") }
+    }
+
+    /// Whether quantities in the two units can be compared.
+    pub fn is_compatible(&self, other: &Self) -> bool {
+        self.dimension == other.dimension
+    }
+
+    /// Factor that turns a difference in this unit into one in `other`; `None` where they measure different things.
+    ///
+    /// Zeros of temperature scales do not enter: [`Unit::convert`] has them. A frequency in cycles is 2 pi times that in rad.
+    pub fn factor_to(&self, other: &Self) -> Option<f64> {
+        if !self.is_compatible(other) {
+            return None;
+        }
+        let [[angles, cycles], [others, of_other]] = [self.turning, other.turning];
+        let counted = cycles - of_other;
+        let turns = if counted != 0.0 && counted == others - angles { raised(2.0 * PI, counted) } else { 1.0 };
+        // Equal units must convert without a rounding, so that no bit of a study's numbers changes.
+        Some(if self.factor == other.factor { turns } else { self.factor / other.factor * turns })
+    }
+
+    /// A number in this unit as one in `other`, scales of temperature by their zeros: 20 degC is 293.15 K. `None` where they
+    /// measure different things.
+    pub fn convert(&self, number: f64, other: &Self) -> Option<f64> {
+        let factor = self.factor_to(other)?;
+        if self.zero == other.zero || self.is_difference || other.is_difference {
+            return Some(number * factor);
+        }
+        Some((number * self.factor + self.zero - other.zero) / other.factor)
+    }
+
+    /// The unit of a product of powers of units; temperatures count as differences.
+    #[must_use]
+    pub fn product(factors: &[(&Self, i32)]) -> Self {
+        let factors: Vec<(Self, i32)> = factors.iter().map(|(unit, power)| (unit.difference(), *power)).collect();
+        let mut text = String::new();
+        for (unit, power) in factors.iter().filter(|(unit, power)| *power > 0 && unit.text != "1") {
+            text.push_str(if text.is_empty() { "" } else { " " });
+            text.push_str(&unit.power(*power, 0).text);
+        }
+        if text.is_empty() {
+            text.push('1');
+        }
+        for (unit, power) in factors.iter().filter(|(unit, power)| *power < 0 && unit.text != "1") {
+            let own = if unit.text.contains(|c: char| !c.is_alphabetic()) {
+                format!("({})", unit.text)
+            } else {
+                unit.text.clone()
+            };
+            text.push_str(&format!("/{own}"));
+            if *power < -1 {
+                text.push_str(&format!("^{}", -power));
+            }
+        }
+        Self::known(&text).difference()
+    }
+
+    /// The unit of a product of powers of this unit and seconds, as `unit^power s^seconds`; temperatures count as differences.
+    #[must_use]
+    pub fn power(&self, power: i32, seconds: i32) -> Self {
+        let own = match (self.difference().text.as_str(), power) {
+            ("1", _) | (_, 0) => String::new(),
+            (text, 1) => text.to_owned(),
+            (text, _) if text.contains(|c: char| !c.is_alphabetic()) => format!("({text})^{power}"),
+            (text, _) => format!("{text}^{power}"),
+        };
+        let time = match seconds {
+            0 => "",
+            1 => "s",
+            -1 => "/s",
+            _ => return Self::known(&format!("{own} s^{seconds}")).difference(),
+        };
+        let text = match (own.is_empty(), time.starts_with('/')) {
+            (true, true) => "1/s".to_owned(),
+            (_, true) => format!("{own}{time}"),
+            _ => format!("{own} {time}").trim().to_owned(),
+        };
+        Self::known(&text).difference()
+    }
+}
+
+/// Reads one factor: a symbol or a parenthesis, with its exponent. Returns it and the rest of the text.
+fn factor(text: &str) -> Option<(Unit, &str)> {
+    let (mut unit, rest) = if let Some((inner, rest)) = parenthesis(text) {
+        (Unit::parse(inner).ok()?, rest)
+    } else {
+        let end = text.find(|c: char| !(c.is_alphabetic() || c == '%')).unwrap_or(text.len());
+        let end = if end == 0 && text.starts_with('1') { 1 } else { end };
+        (symbol(&text[..end])?, &text[end..])
+    };
+    let (exponent, rest) = exponent(rest)?;
+    if exponent != 1.0 {
+        unit.dimension = Dimension::NONE.times(&unit.dimension, exponent);
+        unit.factor = raised(unit.factor, exponent);
+        unit.zero = 0.0;
+        unit.turning = unit.turning.map(|power| power * exponent);
+    }
+    Some((unit, rest))
+}
+
+/// What stands in the parenthesis with which a text begins, and the rest.
+fn parenthesis(text: &str) -> Option<(&str, &str)> {
+    let inner = text.strip_prefix('(')?;
+    let mut depth = 1;
+    let closes = |c: char| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        depth == 0
+    };
+    let end = inner.find(closes)?;
+    Some((&inner[..end], &inner[end + 1..]))
+}
+
+/// The exponent with which a text begins, 1 where there is none, and the rest: `2`, `^-1`, `^0.5`, `^(1/2)`.
+fn exponent(text: &str) -> Option<(f64, &str)> {
+    let (text, raised) = text.strip_prefix('^').map_or((text, false), |text| (text, true));
+    if raised && let Some((inner, rest)) = parenthesis(text) {
+        let (above, below) = inner.split_once('/').unwrap_or((inner, "1"));
+        let number = |text: &str| text.trim().parse::<f64>().ok();
+        return Some((limited(number(above)? / number(below)?)?, rest));
+    }
+    let digits = |text: &str| text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let sign = usize::from(text.starts_with('-'));
+    let mut end = sign + digits(&text[sign..]);
+    // A dot without a digit after it multiplies.
+    if end > sign && text[end..].starts_with('.') {
+        let fraction = digits(&text[end + 1..]);
+        end += if fraction > 0 { 1 + fraction } else { 0 };
+    }
+    match end {
+        0 if !raised => Some((1.0, text)),
+        _ => Some((limited(text[..end].parse().ok()?)?, &text[end..])),
+    }
+}
+
+/// Exponents beyond 100 are slips.
+fn limited(exponent: f64) -> Option<f64> {
+    (exponent.abs() < 100.0).then_some(exponent)
+}
+
+/// A power of a factor: whole ones by products, which leaves 10 and its powers exact.
+fn raised(factor: f64, exponent: f64) -> f64 {
+    if factor == 1.0 {
+        return 1.0;
+    }
+    #[allow(clippy::cast_possible_truncation)]
+    if exponent.fract() == 0.0 { factor.powi(exponent as i32) } else { factor.powf(exponent) }
+}
+
+fn symbol(text: &str) -> Option<Unit> {
+    let (found, prefix) = symbols::find(text)?;
+    let turning = match found.turning {
+        Turning::No => [0.0, 0.0],
+        Turning::Angle => [1.0, 0.0],
+        Turning::Cycle => [0.0, 1.0],
+    };
+    Some(Unit {
+        text: text.to_owned(),
+        dimension: found.dimension,
+        factor: prefix * found.factor,
+        zero: found.zero,
+        is_difference: false,
+        turning,
+    })
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl PartialEq for Unit {
+    fn eq(&self, other: &Self) -> bool {
+        let alike = self.factor == other.factor && self.zero == other.zero && self.turning[1] == other.turning[1];
+        alike && self.dimension == other.dimension
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_a_product_of_powers_however_it_is_spelled() {
+        for text in ["N m s/rad", "N*m*s", "kg m2/s", "kg*m^2*s^-1", "J s", "kg m2 / s", "(kg m2)/s"] {
+            assert_eq!(Unit::known(text), Unit::known("N m s"), "{text}");
+        }
+    }
+
+    #[test]
+    fn common_spellings_are_known_and_slips_lead_to_the_unit() {
+        for (text, known) in
+            [("ohm", "Ohm"), ("k\u{3a9}", "kOhm"), ("Nm/rad", "N m"), ("N.m", "N m"), ("ml", "cm3"), ("day", "h")]
+        {
+            assert!(Unit::known(text).is_compatible(&Unit::known(known)), "{text}");
+        }
+        assert_eq!(Unit::known("day").factor_to(&Unit::known("h")), Some(24.0));
+        assert_eq!(Unit::known("mNm"), Unit::known("N mm"));
+        assert_eq!(Unit::parse("Ohms").unwrap_err(), "`Ohms` is not a known unit; did you mean `Ohm`?");
+    }
+
+    #[test]
+    fn prefixes_and_other_units_convert() {
+        assert_eq!(Unit::known("mm/ms").factor_to(&Unit::known("m/s")), Some(1.0));
+        assert_eq!(Unit::known("Hz").factor_to(&Unit::known("rad/s")), Some(2.0 * PI));
+        assert_eq!(Unit::known("min").factor_to(&Unit::known("s")), Some(60.0));
+        assert_eq!(Unit::known("m").factor_to(&Unit::known("s")), None);
+    }
+
+    #[test]
+    fn hertz_count_cycles_and_become_angles_only_where_angles_are_asked_for() {
+        let factor = |from: &str, to: &str| Unit::known(from).factor_to(&Unit::known(to)).unwrap();
+        assert_eq!([factor("Hz", "1/s"), factor("1/s", "Hz"), factor("kHz", "1/ms"), factor("Hz s", "1")], [1.0; 4]);
+        assert_eq!(factor("Hz", "rad/s"), 2.0 * PI);
+        assert_eq!(factor("Hz", "rpm"), 60.0);
+        assert_eq!(factor("rad/s", "Hz"), 1.0 / (2.0 * PI));
+        assert_eq!(factor("N m/Hz", "N m s/rad"), 1.0 / (2.0 * PI));
+        assert_eq!([factor("1/s", "rad/s"), factor("N m s", "N m s/rad")], [1.0; 2]);
+        assert_eq!(factor("rev/s", "rad/s"), 2.0 * PI);
+    }
+
+    #[test]
+    fn scales_of_temperature_have_zeros_and_their_differences_have_none() {
+        let [kelvin, celsius, fahrenheit] = ["K", "degC", "degF"].map(Unit::known);
+        assert_eq!(celsius.convert(20.0, &kelvin), Some(293.15));
+        assert_eq!(kelvin.convert(293.15, &celsius), Some(20.0));
+        assert!((fahrenheit.convert(212.0, &celsius).unwrap() - 100.0).abs() < 1e-12);
+        assert!((celsius.convert(-40.0, &fahrenheit).unwrap() + 40.0).abs() < 1e-12);
+        assert_eq!(celsius.factor_to(&kelvin), Some(1.0));
+        assert_eq!(celsius.difference(), kelvin);
+        assert_eq!(fahrenheit.difference().factor_to(&kelvin), Some(5.0 / 9.0));
+        for text in ["W/degC", "degC/s", "degC^2", "degC m", "1/degC"] {
+            assert_eq!(Unit::known(text).zero(), 0.0, "{text}");
+        }
+        assert_eq!([celsius.power(1, 0), Unit::product(&[(&celsius, 1)])], [kelvin.clone(), kelvin.clone()]);
+        assert_eq!(celsius.convert(5.0, &kelvin.difference()), Some(5.0));
+        assert!(Unit::parse("mdegC").is_err());
+    }
+
+    #[test]
+    fn exponents_may_be_fractions_and_dots_multiply() {
+        for (text, same) in [
+            ("V^0.5/s", "V^(1/2) s^-1"),
+            ("N.m.s/rad", "N m s"),
+            ("kg.m2.s-2", "J"),
+            ("m^1.5", "m m^0.5"),
+            ("m2.5", "m^(5/2)"),
+            ("m^2.s", "m2 s"),
+            ("m^(1/3) m^(1/3) m^(1/3)", "m"),
+        ] {
+            assert!(Unit::known(text).is_compatible(&Unit::known(same)), "{text}");
+        }
+        assert_eq!(Unit::known("cm^0.5").factor(), 0.1);
+        assert!(["m^", "m^x", "m^(1/0)", "m^200"].iter().all(|text| Unit::parse(text).is_err()));
+    }
+
+    #[test]
+    fn a_dimension_is_written_with_few_symbols_and_reads_back() {
+        for (text, coherent) in [
+            ("g cm2/ms^2", "N m"),
+            ("kg m2", "kg m2"),
+            ("kN/mm", "N/m"),
+            ("N m s/rad", "N m s"),
+            ("mA", "A"),
+            ("V/krpm", "V s"),
+            ("cm3/s", "m3/s"),
+            ("V^0.5/s", "kg^0.5 m/s^2.5/A^0.5"),
+            ("%", "1"),
+            ("1/min", "1/s"),
+            ("kOhm", "Ohm"),
+            ("Hz", "1/s"),
+        ] {
+            let Ok(unit) = Unit::parse(text) else { continue };
+            let found = unit.dimension().coherent();
+            assert!(Unit::known(&found).is_compatible(&unit) && Unit::known(&found).is_coherent(), "{text}: {found}");
+            if !text.contains("0.5") {
+                assert_eq!(found, coherent, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quantity_converts_to_the_unit_of_its_place() {
+        assert_eq!(Quantity::parse("1.5 min").unwrap().to(&Unit::known("s")), Ok(90.0));
+        assert_eq!(Quantity::parse("180 deg").unwrap().to(&Unit::known("rad")), Ok(PI));
+        assert_eq!(Quantity::parse("1e-3").unwrap().to(&Unit::known("V")), Ok(1e-3));
+        assert!(Quantity::parse("15 s").unwrap().to(&Unit::known("m")).is_err());
+        assert!(Quantity::parse("fast").is_err());
+        assert!(Quantity::parse("3 parsecs").is_err());
+    }
+
+    #[test]
+    fn powers_of_units_read_back() {
+        assert_eq!(Unit::known("rad/s").power(2, 1).to_string(), "(rad/s)^2 s");
+        assert_eq!(Unit::one().power(2, 1).to_string(), "s");
+        assert_eq!(Unit::known("V").power(1, -1).to_string(), "V/s");
+        assert_eq!(Unit::known("(rad/s)^2").power(2, 1), Unit::known("s^-3"));
+    }
+}

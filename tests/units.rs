@@ -1,0 +1,220 @@
+//! Units in a study as a user meets them: converted where they can be, refused with the place where they cannot.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn mops(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let output = Command::cargo_bin("mops").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+    (output.status.code().unwrap(), text)
+}
+
+/// A study in a folder of its own, with a data file beside it.
+fn study(text: &str, data: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("study.toml"), text).unwrap();
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    folder
+}
+
+fn result(folder: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join("out/result.json")).unwrap()).unwrap()
+}
+
+/// Values of the criteria at the start values, by name.
+fn values(text: &str, data: &str) -> Vec<(String, f64, String)> {
+    let folder = study(text, data);
+    let (code, output) = mops(folder.path(), &["run", "study.toml", "--max-evaluations", "1", "--out", "out"]);
+    assert!(code <= 1, "{output}");
+    let of = |criterion: &Value| {
+        let text = |key: &str| criterion[key].as_str().unwrap().to_owned();
+        (text("name"), criterion["value"].as_f64().unwrap_or(f64::NAN), text("unit"))
+    };
+    result(folder.path())["criteria"].as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn the_angle_of_a_motor_that_runs_out_is_the_integral_of_its_speed() {
+    // 1 - exp(-1) turns of 100 rpm for one second, in deg: 379.
+    let text = |criterion: &str| {
+        format!(
+            "[study]\nname = 'motor'\n[models.m.equations]\nstates = {{ w = 'rpm', x = 'deg' }}\nparameters = {{ k = '1/s' }}\n\
+             der = {{ x = 'w', w = '-k*w' }}\nstart = {{ w = '100 rpm' }}\nhorizon = '1 s'\n\
+             [tuners]\nk = {{ start = 1, min = 0.5, max = 2 }}\n[criteria]\nf = {{ {criterion} }}\n"
+        )
+    };
+    let found = values(&text("final-value = { signal = 'x' }, demand = '10 rad'"), "");
+    assert!((found[0].1 - 600.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-5, "{found:?}");
+    assert_eq!(found[0].2, "deg");
+}
+
+const ROOM: &str = "
+[study]
+name = 'room'
+[models.room.equations]
+states     = { T = 'STATE' }
+inputs     = { To = 'INPUT' }
+parameters = { k = '1/s', Tb = 'BASE' }
+der        = { T = 'k*(To - T) + k*(Tb - T)' }
+start      = { T = '20 degC' }
+horizon    = '1 h'
+[tuners]
+k  = { start = 1e-3, min = 1e-5, max = 1e-1, scale = 'log' }
+Tb = { start = '20 degC', min = '10 degC', max = '30 degC' }
+[cases]
+rest = { inputs.To = '20 degC' }
+[criteria]
+end  = { steady-state-error = { signal = 'T', target = '20 degC' }, demand = '1 K' }
+top  = { peak = { signal = 'T' }, demand = '25 degC' }
+";
+
+#[test]
+fn a_room_at_rest_stays_at_rest_whatever_scale_its_temperatures_are_on() {
+    for state in ["K", "degC", "degF"] {
+        for (input, base) in [("K", "degC"), ("degC", "K"), ("degF", "degF")] {
+            let text = ROOM.replace("STATE", state).replace("INPUT", input).replace("BASE", base);
+            let found = values(&text, "");
+            let (end, top) = (&found[0], &found[1]);
+            assert!(end.1.abs() < 1e-9, "{state} {input} {base}: {found:?}");
+            let (level, difference) = match state {
+                "K" => (293.15, "K"),
+                "degC" => (20.0, "K"),
+                _ => (68.0, "degR"),
+            };
+            assert!((top.1 - level).abs() < 1e-9 && top.2 == state && end.2 == difference, "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn recorded_temperatures_are_converted_and_their_noise_is_a_difference() {
+    let text = |state: &str, noise: &str, tuner: &str| {
+        format!(
+            "[study]\nname = 'cooling'\ntask = 'calibration'\n[models.cup.equations]\nstates = {{ T = '{state}' }}\n\
+             parameters = {{ k = '1/s', Ta = '{state}' }}\nder = {{ T = 'k*(Ta - T)' }}\nstart = {{ T = '80 degC' }}\n\
+             [tuners]\nk = {{ start = 0.01, min = 1e-3, max = 0.1 }}\nTa = {{ {tuner} }}\n\
+             [experiments.e]\nfile = 'data.csv'\nchannels = {{ T = {{ column = 'T', noise = {noise} }} }}\n\
+             [criteria]\nT = {{ normalised-error = {{ signal = 'T' }} }}\n"
+        )
+    };
+    // Off by 0.5 K everywhere: one standard deviation.
+    let data = |unit: &str, factor: f64, zero: f64| {
+        let row = |k: i32| {
+            let t = 10.0 * f64::from(k);
+            format!("{t},{}\n", (20.5 + 60.0 * (-0.01 * t).exp()) * factor + zero)
+        };
+        format!("t [s],T [{unit}]\n{}", (0..20).map(row).collect::<String>())
+    };
+    let files = [data("degC", 1.0, 0.0), data("K", 1.0, 273.15), data("degF", 1.8, 32.0)];
+    for state in ["K", "degC", "degF"] {
+        for (file, own) in files.iter().zip(["0.5", "0.5", "0.9"]) {
+            for noise in [own, "'0.5 K'", "'0.5 degC'", "'0.9 degF'"] {
+                for tuner in
+                    ["start = '20 degC', min = '0 degC', max = '300 K'", "start = 20, min = 0, max = 30, unit = 'degC'"]
+                {
+                    let found = values(&text(state, noise, tuner), file);
+                    assert!((found[0].1 - 1.0).abs() < 1e-6, "{state} {noise} {tuner}: {found:?}");
+                }
+            }
+        }
+    }
+}
+
+const SERVO: &str = "
+[study]
+name = 'servo'
+[models.m.equations]
+states     = { i = 'A', w = 'rad/s' }
+inputs     = { u = 'V' }
+parameters = { k = 'V' }
+constants  = { R = '0.6 ohm', L = '0.8 mH', Kt = '0.06 N m/A', J = '80 kg mm2' }
+der        = { i = \"L*i' = u + k - R*i - Kt*w\", w = \"J*w' = Kt*i\" }
+horizon    = '50 ms'
+[tuners]
+k = { start = 1, min = 0.1, max = 10 }
+[criteria]
+w = { final-value = { signal = 'w' }, demand = '1 rad/s' }
+";
+
+#[test]
+fn constants_are_converted_and_a_wrong_unit_of_one_is_refused_at_the_equation() {
+    let plain = SERVO.replace("0.8 mH", "0.8e-3 H").replace("80 kg mm2", "8e-5 kg m2");
+    let (found, same) = (values(SERVO, ""), values(&plain, ""));
+    assert!((found[0].1 - same[0].1).abs() < 1e-9, "{found:?} {same:?}");
+    for (from, to, place) in [
+        ("0.8 mH", "0.8 kg", "study.toml:9:"),
+        ("0.8 mH", "0.8 mF", "study.toml:9:"),
+        ("0.06 N m/A", "0.06 N/A", "study.toml:9:"),
+        ("80 kg mm2", "80 kg mm", "study.toml:9:"),
+        ("0.6 ohm", "0.6 V", "study.toml:9:"),
+        ("k = 'V'", "k = 'A'", "study.toml:9:"),
+        ("u = 'V'", "u = 'mA'", "study.toml:9:"),
+        ("Kt*i\"", "Kt*i + k\"", "study.toml:9:"),
+        ("J*w' = Kt*i", "J*w' = Kt*u", "study.toml:9:"),
+        ("w = 'rad/s'", "w = 'm/s'", "study.toml:9:"),
+    ] {
+        let folder = study(&SERVO.replace(from, to), "");
+        let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+        assert!(code == 2 && output.contains(place) && output.contains("expected a quantity in"), "{to}: {output}");
+    }
+}
+
+#[test]
+fn check_lists_bare_numbers_units_that_were_found_and_frequencies_in_rad_per_second() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { h = 'm', v = 'm/s' }\nparameters = { c = '', f = 'rad/s' }\n\
+                der = { h = 'v', v = '-9.81 - c*v*abs(v) + 1 [m/s2]*sin(f*time)' }\nhorizon = '1 s'\n\
+                [tuners]\nc = { start = 0.1, min = 0, max = 1 }\nf = { start = '5 Hz', min = '1 Hz', max = '10 Hz' }\n\
+                [criteria]\nh = { model-tracking = { signal = 'h', target = -1.0, frequency = '2 Hz', damping = 0.7 }, demand = '1 m' }\n";
+    let folder = study(text, "");
+    let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+    assert_eq!(code, 0, "{output}");
+    for part in ["-9.81 in m/s2 (der.v)", "`c` in 1/m", "31.4159", "`frequency` of 2 Hz is 12.56637"] {
+        assert!(output.contains(part), "{part}: {output}");
+    }
+}
+
+#[test]
+fn ties_are_computed_and_checked_in_coherent_units() {
+    let text = |tie: &str| {
+        format!(
+            "[study]\nname = 'm'\n[models.m.equations]\nstates = {{ x = 'm' }}\nparameters = {{ a = 'ms', b = 's', v = 'mm/s' }}\n\
+             der = {{ x = 'v' }}\noutputs = {{ b = {{ value = 'b', unit = 's' }} }}\nhorizon = '1 s'\n\
+             [tuners]\na = {{ start = 20, min = 1, max = 100 }}\nv = {{ start = 3, min = 1, max = 10 }}\nb = {{ tie = '{tie}' }}\n\
+             [criteria]\nb = {{ final-value = {{ signal = 'b' }}, demand = '1 s' }}\n"
+        )
+    };
+    for (tie, value) in
+        [("2*a", 0.04), ("a + 5 [ms]", 0.025), ("6 [mm]/v", 2.0), ("a*v/3 [mm/s]", 0.02), ("1 min", 60.0)]
+    {
+        assert!((values(&text(tie), "")[0].1 - value).abs() < 1e-12, "{tie}");
+    }
+    for (tie, fact) in [
+        ("2*v", "expected a quantity in s, found one in m/s"),
+        ("a + v", "expected a quantity in s, found one in m/s"),
+        ("a + 5", "beside `a` in ms stands a number without a unit"),
+        ("exp(a)", "`exp` takes a pure number, found a quantity in s"),
+    ] {
+        let folder = study(&text(tie), "");
+        let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+        assert!(code == 2 && output.contains(fact), "{tie}: {output}");
+    }
+}
+
+#[test]
+fn parameters_of_linear_systems_are_converted_and_their_entries_checked() {
+    let text = |k: &str, entry: &str| {
+        format!(
+            "[study]\nname = 'm'\n[models.m.state-space]\na = [[0, 1], ['{entry}', '-d/m']]\nb = [[0], ['1/m']]\nc = [[1, 0]]\n\
+             units = {{ k = '{k}', m = 'kg', d = 'N s/m' }}\n[models.m.parameters]\nm = '2000 g'\nd = 1\n\
+             [tuners]\nk = {{ start = '8 kN/m', min = '1 N/m', max = '9 kN/m' }}\n\
+             [criteria]\nw = {{ hinf-norm = {{}}, demand = 1 }}\n"
+        )
+    };
+    let (a, b) = (values(&text("N/m", "-k/m"), ""), values(&text("kN/m", "-k/m"), ""));
+    assert!((a[0].1 - b[0].1).abs() < 1e-12 * a[0].1, "{a:?} {b:?}");
+    let folder = study(&text("kN/m", "-(k + m)"), "");
+    let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+    assert!(code == 2 && output.contains("expected a quantity in N/m, found one in kg"), "{output}");
+}
