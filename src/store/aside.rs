@@ -8,9 +8,11 @@ use std::time::Duration;
 use mops_core::Diagnostic;
 use rusqlite::{Connection, OpenFlags};
 
-use super::database::{Database, RunState, is_passing, with_companions};
+use super::database::{Database, is_passing};
 use super::file;
 use super::keeper::Refusal;
+use super::place::with_companions;
+use super::runs::RunState;
 
 /// Makes room for the database of a new run; what the user may want to know of the old one.
 ///
