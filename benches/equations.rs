@@ -26,7 +26,7 @@ struct Variant {
 }
 
 fn variants() -> Vec<Variant> {
-    let tolerance = Tolerance { relative: 1e-6, absolute: 1e-8, ..Tolerance::default() };
+    let tolerance = Tolerance { relative: 1e-6, absolute: Some(1e-8), ..Tolerance::default() };
     let text = |text: &str| {
         let options = format!("{text}\n[tolerance]\nrelative = 1e-6\nabsolute = 1e-8\n");
         let options: EquationsOptions = toml::from_str(&options).expect("the text is right");

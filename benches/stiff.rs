@@ -61,7 +61,7 @@ absolute = 1e-6
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let tolerance =
-        Tolerance { relative: 1e-6, absolute: 1e-6, method: IntegrationMethod::Stiff, ..Tolerance::default() };
+        Tolerance { relative: 1e-6, absolute: Some(1e-6), method: IntegrationMethod::Stiff, ..Tolerance::default() };
     let compiled =
         || integrate(&mut Rod, 0.0, END, black_box(vec![COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
     let (end, work) = compiled();

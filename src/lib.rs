@@ -49,6 +49,11 @@ mod tasks;
 mod toml_text;
 mod watch;
 
+/// The fragments of the guide in Rust, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/guide/7-in-rust.md")]
+mod guide {}
+
 use std::process::ExitCode;
 
 pub use mops_core::*;

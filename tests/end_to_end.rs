@@ -433,3 +433,43 @@ fn problems_without_known_minima_are_measured_by_the_best_of_all_solvers() {
     let text = benched(&["more-wild", "--problems", "1 n9 m45,4 n2 m2", "--solver", "auto"]);
     assert!(text.contains("simplex gradients: ") && text.contains("auto: 2 of 2 solved"), "{text}");
 }
+
+/// `x' = k u` from 0.5 at 0 s; the sensor is used from 2 s on, and the input drives the model before that.
+#[test]
+fn inputs_before_the_first_sample_that_is_used_are_those_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = r#"
+        [study]
+        name = "late"
+        task = "calibration"
+        [models.tank.equations]
+        states     = { x = "1" }
+        inputs     = { u = "1" }
+        parameters = { k = "1/s" }
+        der        = { x = "k*u" }
+        start      = { x = 0.5 }
+        [tuners]
+        k = { start = 1.0, min = 0.1, max = 5.0 }
+        [experiments.e]
+        file       = "e.csv"
+        reset-time = false
+        from       = "2 s"
+        channels   = { x = { column = "x", noise = 0.01 } }
+        inputs     = { u = { column = "u", hold = "zero" } }
+        [criteria]
+        x = { normalised-error = { signal = "x" } }
+    "#;
+    // The input is 3 up to 1.5 s, then -1; k = 0.7.
+    let row = |i: i32| {
+        let t = 0.1 * f64::from(i);
+        let x = 0.5 + 0.7 * (3.0 * t.min(1.5) - (t - 1.5).max(0.0));
+        format!("{t},{},{x}\n", if i < 15 { 3.0 } else { -1.0 })
+    };
+    let table = format!("t,u,x\n{}", (0..=60).map(row).collect::<String>());
+    std::fs::write(folder.path().join("e.csv"), table).unwrap();
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, study).unwrap();
+    let result = run(path.to_str().unwrap(), folder.path(), &[]);
+    let k = result["tuners"][0]["value"].as_f64().unwrap();
+    assert!((k - 0.7).abs() < 1e-7, "{k}");
+}

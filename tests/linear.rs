@@ -237,3 +237,176 @@ p = { peak = { signal = 'ph' }, usage = 'monitor' }
     let error = String::from_utf8(held.stderr).unwrap();
     assert!(error.contains("`ph` still changes by") && error.contains("the input `u` is held, --free"), "{error}");
 }
+
+#[test]
+fn repeated_poles_of_several_inputs_are_placed_or_refused_and_what_they_are_worth_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "
+[study]
+name = 'axis-and-pump'
+[models.m.state-space]
+a = [[0, 1, 0, 0], [0, -2, 4, 0], [0, -1, -30, 0], [0, 0, 0, -0.05]]
+b = [[0, 0], [0, 0], [8, 0], [0, 0.4]]
+c = [[1, 0, 0, 0]]
+[criteria]
+slowest = { slowest-pole = { input = 'u1' }, usage = 'monitor' }
+";
+    let (file, out) = (study(folder.path(), text), folder.path().join("out"));
+    let placed = mops(&["linearise", &file, "--place=-3,-3,-9,-9", "--out", out.to_str().unwrap()]).output().unwrap();
+    let printed = String::from_utf8(placed.stdout).unwrap();
+    assert!(placed.status.success(), "{}", String::from_utf8_lossy(&placed.stderr));
+    for part in ["controllability indices 3, 1", "one part in a million", "linearised.json and 8 plots are in"] {
+        assert!(printed.contains(part), "{part}: {printed}");
+    }
+    let feedback = &json(&out.join("linearised.json"))["feedback"];
+    assert!(feedback["error"].as_f64().unwrap() < 1e-5, "{feedback}");
+    for pole in feedback["poles"].as_array().unwrap() {
+        let (re, im) = (pole[0].as_f64().unwrap(), pole[1].as_f64().unwrap());
+        assert!(im.abs() < 1e-5 && ((re + 3.0).abs() < 1e-5 || (re + 9.0).abs() < 1e-5), "{pole}");
+    }
+    let largest = feedback["k"].as_array().unwrap().iter().flat_map(|row| row.as_array().unwrap());
+    assert!(largest.map(|k| k.as_f64().unwrap().abs()).fold(0.0, f64::max) < 200.0, "{feedback}");
+    // An input that does not act any more: the rank, and everything else all the same.
+    std::fs::remove_dir_all(&out).unwrap();
+    let file = study(folder.path(), &text.replace("0.4", "0"));
+    let refused = mops(&["linearise", &file, "--place=-3,-3,-9,-9", "--out", out.to_str().unwrap()]).output().unwrap();
+    let told = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
+    assert_eq!(refused.status.code(), Some(2), "{told}");
+    assert!(told.contains("rank 3 of 4") && told.contains("-0.050000"), "{told}");
+    assert!(json(&out.join("linearised.json"))["feedback"].is_null());
+}
+
+#[test]
+fn several_free_axes_have_poles_at_zero_and_all_their_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    // Four axes; the last one hangs on a spring, the others roll freely.
+    let text = "
+[study]
+name = 'stage'
+[models.m.state-space]
+a = [
+  [0, 0, 0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 0, 0, 0, 1],
+  [7, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, -3, 0, 0, 0], [0, 0, 0, 0, 0, 0, 0, 0], [0, 11, 0, -25, 0, 0, 0, 0],
+]
+b = [[0], [0], [0], [0], [0], ['-40*k'], ['3*k'], ['k']]
+c = [[0, 0, 1, 1, 0, 0, 0, 0]]
+[tuners]
+k = { start = 1, min = -1e6, max = 1e6 }
+[criteria]
+slowest = { slowest-pole = { of = 'closed-loop' }, usage = 'monitor' }
+";
+    let (file, out) = (study(folder.path(), text), folder.path().join("out"));
+    let printed = mops(&["linearise", &file, "--out", out.to_str().unwrap()]).output().unwrap();
+    let shown = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.status.success(), "{}", String::from_utf8_lossy(&printed.stderr));
+    let poles = shown.split("pole (1/s)").nth(1).unwrap();
+    assert_eq!(poles.lines().filter(|line| line.trim_start().starts_with("0  ")).count(), 6, "{shown}");
+    assert!(poles.contains("0 + 5i") && poles.contains("0 - 5i"), "{shown}");
+    assert!(
+        out.join("root-locus-y-u.svg").is_file() && shown.contains("linearised.json and 4 plots are in"),
+        "{shown}"
+    );
+    for k in ["-1e6", "-3.7", "0.01", "4242.4242", "1e6"] {
+        let at = mops(&["simulate", &file, "--at", &format!("k={k}")]).output().unwrap();
+        assert!(at.status.success(), "{k}: {}", String::from_utf8_lossy(&at.stderr));
+    }
+}
+
+#[test]
+fn where_there_are_no_plots_nobody_says_that_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "
+[study]
+name = 'alone'
+[models.m.equations]
+states = { x = '1' }
+der = { x = '-2*x + 1' }
+horizon = 1
+[criteria]
+x = { final-value = { signal = 'x' }, usage = 'monitor' }
+";
+    let (file, out) = (study(folder.path(), text), folder.path().join("out"));
+    let printed = mops(&["linearise", &file, "--out", out.to_str().unwrap()]).output().unwrap();
+    let shown = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.status.success() && shown.contains("without plots, as the system has no input"), "{shown}");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
+}
+
+/// A tank with a free outlet, and a spring that is flat at rest.
+fn vessel(der: &str) -> String {
+    format!(
+        "
+[study]
+name = 'vessel'
+[models.m.equations]
+states = {{ x = '1' }}
+inputs = {{ u = '1' }}
+parameters = {{ k = '' }}
+der = {{ x = '{der}' }}
+outputs = {{ size = 'abs(x)' }}
+horizon = 1
+[tuners]
+k = {{ start = 2, min = 0.1, max = 10 }}
+[criteria]
+x = {{ final-value = {{ signal = 'x' }}, usage = 'monitor' }}
+"
+    )
+}
+
+#[test]
+fn a_linearisation_that_does_not_exist_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for der in
+        ["u - k*sqrt(x)", "u - k*x^0.5", "u - k*abs(x)", "u - sign(x)", "max(x, k*x) + u", "k*asin(1 - abs(x)) + u"]
+    {
+        let refused = mops(&["linearise", &study(folder.path(), &vessel(der))]).output().unwrap();
+        let told = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
+        assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
+        assert!(told.contains("the rate of `x` has no slope along `x` at x = 0"), "{der}: {told}");
+    }
+    // Elsewhere, or where it is smooth, it exists; an output without a slope is noted. Below 0 the power is not defined, and
+    // then the output has a slope.
+    for (der, at) in
+        [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")]
+    {
+        let found = mops(&["linearise", &study(folder.path(), &vessel(der)), "--at", at]).output().unwrap();
+        let shown = String::from_utf8(found.stdout).unwrap();
+        assert!(found.status.success(), "{der}: {}", String::from_utf8_lossy(&found.stderr));
+        let rough = at == "x=0" && !der.contains('^');
+        assert_eq!(shown.contains("note: `size` has no slope along `x`"), rough, "{der}: {shown}");
+    }
+    // As a model of a study it has no value there.
+    let text = vessel("u - k*sqrt(x)")
+        .replace("horizon = 1", "horizon = 1\n[models.m.linearise]\noutputs = ['x']")
+        .replace("final-value = { signal = 'x' }", "slowest-pole = {}");
+    let none = mops(&["simulate", &study(folder.path(), &text)]).output().unwrap();
+    let told = String::from_utf8(none.stdout).unwrap() + &String::from_utf8(none.stderr).unwrap();
+    assert!(!none.status.success() && told.contains("has no slope along `x`"), "{told}");
+}
+
+#[test]
+fn an_equilibrium_is_found_from_a_start_without_a_slope() {
+    let folder = tempfile::tempdir().unwrap();
+    // The equilibrium for k = 2, by hand.
+    for (der, u, expected) in [
+        ("u - k*sqrt(x)", "1", 0.25),
+        ("u - k*sqrt(x)", "50", 625.0),
+        ("u - k*x^0.5", "0.02", 1e-4),
+        ("u - k*x^3", "54", 3.0),
+        ("u - k*x^3", "-2e-6", -0.01),
+        ("u - k*x^5", "64", 2.0),
+        ("u - k*x*abs(x)", "18", 3.0),
+        ("u - deadzone(k*x, -1, 1)", "3", 2.0),
+        ("u - k*max(x - 1, 0)", "4", 3.0),
+        ("u + k*ln(x)", "2", 0.367_879_441_171_442_3),
+    ] {
+        let (file, out) = (study(folder.path(), &vessel(der)), folder.path().join("out"));
+        let at = format!("u={u}");
+        let arguments =
+            ["linearise", &file, "--at", &at, "--equilibrium", "--output", "x", "--out", out.to_str().unwrap()];
+        let found = mops(&arguments).output().unwrap();
+        assert!(found.status.success(), "{der}: {}", String::from_utf8_lossy(&found.stderr));
+        let x = json(&out.join("linearised.json"))["at"]["states"][0].as_f64().unwrap();
+        assert!((x - expected).abs() < 1e-7 * expected.abs().max(0.01), "{der} {u}: {x}");
+    }
+}

@@ -408,6 +408,8 @@ fn demands_that_cannot_be_met_or_missed() {
             design("bad without good", "demand = 0.10", "bad = 0.10"),
             design("good and bad alike", "demand = 0.10", "good = 0.10, bad = 0.10"),
             design("a demand beside good and bad", "demand = 0.10", "demand = 0.1, good = 0.0, bad = 0.1"),
+            design("good and bad against the sense of the kind", "demand = 0.10", "good = 0.3, bad = \"10 %\""),
+            design("a value that the kind never has", "demand = 0.10", "good = -0.1, bad = 0.1"),
             design("a demand in a unit that does not fit", "\"15 s\"", "\"15 m\""),
             design("a weight of zero", "demand = 0.10", "demand = 0.10, weight = 0.0"),
             design("an option in a unit that does not fit", "target = 1.0 }, ", "target = \"1 rad/s\" }, "),
@@ -522,6 +524,11 @@ fn experiments_that_do_not_fit_their_data() {
             calibration("an end that leaves one sample", "free     =", "to = 0.01\nfree     ="),
             calibration("every sample skipped", "free     =", "skip = 4\nfree     ="),
             calibration("an experiment that measures nothing", "channels = {", "channels = {}\n# {"),
+            calibration(
+                "an input that is not known when the simulation begins",
+                "free     =",
+                "skip = 1\nreset-time = false\nfree     =",
+            ),
             calibration("a noise of zero", "noise = 0.003", "noise = 0.0"),
             calibration(
                 "an error in units of a noise that nobody gave",
@@ -604,7 +611,6 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             called("no such study file", &["check", "loop/study.toml"]),
             Case::new("a folder without a study", DESIGN).with("empty/notes.txt", "").called(&["check", "empty"]),
             called("a setting that is no value", &["check", "study.toml", "--set", "tuners.Ti.start=fast"]),
-            called("a setting without its quotes", &["check", "study.toml", "--set", "study.name=other loop"]),
             called("a setting without a value", &["check", "study.toml", "--set", "tuners.Ti.start"]),
             called("a setting of an unknown key", &["check", "study.toml", "--set", "tuners.Ti.strat=2.0"]),
             called("a setting of an unknown tuner", &["check", "study.toml", "--set", "tuners.Tj.start=2.0"]),

@@ -1,17 +1,16 @@
 //! Bandwidth.
 
 use mops_core::linear::bandwidth;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, Of, feedback};
+use crate::common::{Channel, LinearCriterion, Of, Values, feedback};
 
 /// The bandwidth: the lowest `w` with `|G(j w)| = |G(0)|/sqrt 2` (3 dB below), in rad/s, found exactly. With `of =
 /// "closed-loop"` the model is the loop transfer function L, and `G = L/(1 + L)`.
 ///
-/// Range: above 0. More is mostly better, so that a demand is the pair `good` and `bad`, such as `good = "2 Hz"`, `bad =
-/// "1 Hz"` (1 Hz is 6.28 rad/s). It has no value where the gain at frequency 0 is 0 or infinite or never falls so far, or where
+/// Range: above 0. More is better: `demand = "2 Hz"` asks for at least 2 Hz (12.6 rad/s). It has no value where the gain at frequency 0 is 0 or infinite or never falls so far, or where
 /// the closed loop is unstable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 11.3.
@@ -42,7 +41,11 @@ impl CriterionSpec for Bandwidth {
             Of::System => Ok(bandwidth(&system)?.into()),
             Of::ClosedLoop => Ok(feedback(system)?.closed_loop_bandwidth()?.into()),
         };
-        Ok(LinearCriterion::boxed(channel, Unit::known("rad/s"), value))
+        Ok(LinearCriterion::boxed(
+            channel,
+            Values::of(Unit::known("rad/s"), Sense::More).within(0.0, f64::INFINITY),
+            value,
+        ))
     }
 }
 

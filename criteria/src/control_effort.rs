@@ -1,18 +1,19 @@
 //! Control effort.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{optional, signal, trace};
+use crate::common::{NOT_NEGATIVE, optional, signal, trace};
 
 /// `integral (u - offset)^2 dt` over the whole simulation, in signal^2 s; with `of = "absolute"`
 /// `integral |u - offset| dt`, in signal s.
 ///
 /// The square is the energy of a signal, the absolute value its fuel. `offset` is the value at which the actuator
-/// rests, 0 where absent. Range: from 0 up. The integral is that of the curve, exact up to rounding.
+/// rests, 0 where absent. Less is better. Range: from 0 up. The integral is that of the curve, exact up to rounding.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (norms of signals).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -66,6 +67,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

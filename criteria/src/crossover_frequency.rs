@@ -1,15 +1,18 @@
 //! Gain crossover frequency of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{
+    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, StateSpace, Unit, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, feedback};
+use crate::common::{Channel, LinearCriterion, Values, feedback};
 
 /// The gain crossover frequency: the highest `w` with `|L(j w)| = 1`, in rad/s, found exactly. The model is the loop transfer
 /// function L; a delay does not matter.
 ///
-/// Range: above 0. More is mostly better, so that a demand is the pair `good` and `bad`. It has no value where `|L|` never is 1.
+/// Range: above 0. Neither less nor more is better: demand it with usage = "equality", or by the pair `good` and `bad`. Where
+/// `|L|` never is 1 there is no value, and no demand is met.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -20,6 +23,9 @@ pub struct CrossoverFrequency {
     /// Output of the loop transfer function; the only one where absent.
     pub output: Option<String>,
 }
+
+/// What counts as near a gain of 1.
+const NEAR: f64 = 0.01;
 
 impl CriterionOptions for CrossoverFrequency {
     const KIND: &'static str = "crossover-frequency";
@@ -32,24 +38,37 @@ impl CriterionSpec for CrossoverFrequency {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        let value = |system| match feedback(system)?.gain_crossovers.last() {
-            Some(crossing) => Ok(crossing.frequency.into()),
-            None => Err("the gain of the loop never is 1".to_owned()),
+        let value = |system: StateSpace| {
+            let still = system.response()?.scalar(0.0).norm();
+            match feedback(system)?.gain_crossovers.last() {
+                Some(crossing) => Ok(crossing.frequency.into()),
+                None => Ok(Value::missed(None, (still - 1.0).abs(), NEAR, "the gain of the loop never is 1")),
+            }
         };
-        Ok(LinearCriterion::boxed(channel, Unit::known("rad/s"), value))
+        Ok(LinearCriterion::boxed(
+            channel,
+            Values::of(Unit::known("rad/s"), Sense::Target).within(0.0, f64::INFINITY),
+            value,
+        ))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use mops_core::Missed;
+
     use super::*;
-    use crate::common::testing::{assert_near, linear, undefined, value};
+    use crate::common::testing::{assert_near, linear, value};
 
     #[test]
     fn the_crossover_of_a_third_order_lag_has_its_closed_form() {
         let found = value(&CrossoverFrequency::default(), &linear(&[4.0], &[1.0, 3.0, 3.0, 1.0])).number;
         assert_near(found, (4.0f64.powf(2.0 / 3.0) - 1.0).sqrt(), 1e-12);
-        let never = undefined(&CrossoverFrequency::default(), &linear(&[0.5], &[1.0, 1.0]));
-        assert_eq!(never, "the gain of the loop never is 1");
+        let never = value(&CrossoverFrequency::default(), &linear(&[0.5], &[1.0, 1.0]));
+        assert_eq!(
+            (never.missed, never.note),
+            (Some(Missed { horizon: None }), Some("the gain of the loop never is 1"))
+        );
+        assert_near(never.number, 1.0 + 0.5 / 0.51, 1e-12);
     }
 }

@@ -1,17 +1,17 @@
 //! Smallest damping ratio of all poles.
 
 use mops_core::linear::Complex;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, Of, poles};
+use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 
 /// The damping ratio of the least damped pole, `min -Re p/|p|`, dimensionless. With `of = "closed-loop"` the model is the loop
 /// transfer function L, and the poles are those of `L/(1 + L)`. Poles that neither input nor output touches count too.
 ///
-/// Range: -1 to 1; 1 for real stable poles, negative for unstable ones, 0 for a pole at the origin. More is better, so that a
-/// demand is the pair `good` and `bad`, such as `good = 0.7`, `bad = 0.5`. A closed loop with a delay has no finite number of
+/// Range: -1 to 1; 1 for real stable poles, negative for unstable ones, 0 for a pole at the origin. More is better:
+/// `demand = 0.5` asks for at least 0.5. A closed loop with a delay has no finite number of
 /// poles, and no value.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 6.3.
@@ -40,7 +40,7 @@ impl CriterionSpec for DampingRatio {
         let of = self.of;
         let damping = |p: &Complex| if p.norm() == 0.0 { 0.0 } else { -p.re / p.norm() };
         let value = move |system| Ok(poles(&system, of)?.iter().map(damping).fold(1.0, f64::min).into());
-        Ok(LinearCriterion::boxed(channel, Unit::one(), value))
+        Ok(LinearCriterion::boxed(channel, Values::of(Unit::one(), Sense::More).within(-1.0, 1.0), value))
     }
 }
 

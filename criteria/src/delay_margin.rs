@@ -1,10 +1,10 @@
 //! Delay margin of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, capped, feedback, second};
+use crate::common::{Channel, LinearCriterion, Values, capped, feedback, second};
 
 /// The delay margin: the smallest further delay with which the closed loop becomes unstable, `min (pi + arg L(j w))/w` over
 /// the frequencies at which `|L(j w)| = 1` (the turn counted from 0 to 2 pi), in s. The model is the loop transfer function L,
@@ -12,8 +12,7 @@ use crate::common::{Channel, LinearCriterion, capped, feedback, second};
 ///
 /// Crossings are found exactly, not on a grid; a delay that the model has already enters exactly.
 ///
-/// Range: any number. More is better, so that a demand is the pair `good` and `bad`, such as `good = "0.2 s"`, `bad =
-/// "0.1 s"`. Negative where the closed loop is unstable: the delay that would have to go. An infinite margin counts as 1e6 s.
+/// Range: any number. More is better: `demand = "0.1 s"` asks for at least 0.1 s. Negative where the closed loop is unstable: the delay that would have to go. An infinite margin counts as 1e6 s.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -36,8 +35,8 @@ impl CriterionSpec for DelayMargin {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        let value = |system| Ok(capped(feedback(system)?.delay_margin(), 1e6));
-        Ok(LinearCriterion::boxed(channel, second(), value))
+        let value = |system| Ok(capped(feedback(system)?.delay_margin()?, 1e6));
+        Ok(LinearCriterion::boxed(channel, Values::of(second(), Sense::More), value))
     }
 }
 

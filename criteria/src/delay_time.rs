@@ -1,17 +1,17 @@
 //! Delay time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions, number, second};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 
 /// First time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5 where absent.
 ///
-/// Range: from 0 to the length of the simulation. A response that never gets there has that length as its delay time,
-/// noted `level not reached`.
+/// Less is better. Range: from 0 to the length of the simulation. A response that never gets there has no delay time and meets
+/// no demand, noted `level not reached`.
 ///
 /// Source: K. Ogata, Modern Control Engineering (5th ed., 2010), section 5-3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -64,15 +64,31 @@ impl Criterion for Bound {
         vec![self.step.signal.clone()]
     }
 
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
+    }
+
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
         let answer = self.step.answer(analysis)?;
-        let reached = answer.first_reaching(self.level)?;
-        Ok(reached.map_or_else(|| Value::noted(answer.length(), "level not reached"), Value::from))
+        match answer.first_reaching(self.level)? {
+            Some(time) => Ok(time.into()),
+            None => answer.not_reached(answer.length(), self.level, "level not reached"),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use mops_core::Missed;
+
     use super::*;
     use crate::common::testing::{assert_near, mistake, simulated, value};
 
@@ -91,7 +107,11 @@ mod tests {
     #[test]
     fn a_response_that_does_not_get_there_is_noted() {
         let low = simulated(7.0, |t| 0.4 * (1.0 - (-t).exp()));
-        assert_eq!(value(&delay(), &low), Value::noted(7.0, "level not reached"));
+        let missed = value(&delay(), &low);
+        // 0.1 below the level, and a little more as it has not arrived.
+        let rest = 0.4 * ((-6.3_f64).exp() - (-7.0_f64).exp()) / 0.7;
+        assert_near(missed.number, 7.0 * (1.0 + (0.1 + rest) / (0.11 + rest)), 1e-9);
+        assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(7.0) }), Some("level not reached")));
     }
 
     #[test]

@@ -10,7 +10,8 @@ use crate::common::{signal, trace};
 
 /// `y(t_end)`, in the unit of the signal.
 ///
-/// Range: any number. It reads what a model computes along its simulation, such as a cost or an energy that it
+/// Which values are better depends on the signal: `demand` asks for at most that value, the pair `good` and `bad` for either
+/// side. Range: any number. It reads what a model computes along its simulation, such as a cost or an energy that it
 /// integrates. A value that may be zero or negative is demanded by the pair `good` and `bad` rather than by `demand`.
 ///
 /// Source: the Mayer form of a cost; A. E. Bryson, Y.-C. Ho, Applied Optimal Control (1975), chapter 2.

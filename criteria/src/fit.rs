@@ -1,12 +1,13 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Tangent, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Samples, Sense, Tangent, Unit,
+    Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, compared_slopes, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, signal};
 
 /// `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
 ///
@@ -18,7 +19,7 @@ use crate::common::{compare, compared_slopes, signal};
 /// Several signals are fitted together by one such criterion each; `weight` balances them. It is evaluated in the
 /// experiments that measure the signal.
 ///
-/// Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
+/// Less is better. Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
 ///
 /// Source: Greybox Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section
 /// 4.5.1: there J is the sum over the arm's angle, with weight 2.5, and the pendulum's, with weight 1.
@@ -74,6 +75,14 @@ impl Criterion for Bound {
         vec![self.signal.name.clone()]
     }
 
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
+    }
+
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal.name)?;
         let times = &comparison.channel.times;
@@ -91,6 +100,12 @@ impl Criterion for Bound {
         let (channel, slopes) = compared_slopes(case, tangent.along, &self.signal.name)?;
         let slopes = slopes.iter().enumerate().map(|(i, d)| self.root_weight(&channel.times, i) * d).collect();
         Ok(Value::slope_of_squares(&tangent.value.residuals, slopes))
+    }
+
+    fn samples(&self, case: &Case) -> Option<Samples> {
+        let channel = case.experiment.as_ref()?.channel(&self.signal.name)?;
+        let weights = (0..channel.times.len()).map(|i| self.root_weight(&channel.times, i)).collect();
+        Some(Samples { signal: self.signal.name.clone(), weights, noise: channel.noise })
     }
 }
 
@@ -128,6 +143,11 @@ mod tests {
         assert_near(value.number, 2.5 * (0.5 + 1.5 * 4.0 + 1.5 * 9.0 + 0.5 * 0.25), 1e-12);
         assert_eq!(value.number, value.residuals.iter().map(|r| r * r).sum::<f64>());
         assert_near(value.residuals[1], -2.0 * f64::sqrt(2.5 * 1.5), 1e-12);
+        let weights = bound(&fit).samples(&case).unwrap().weights;
+        let differences = [1.0, -2.0, 3.0, 0.5];
+        for ((residual, weight), difference) in value.residuals.iter().zip(&weights).zip(differences) {
+            assert_near(*residual, weight * difference, 1e-12);
+        }
         assert_eq!((bound(&fit).unit(), fit.needs_measurement()), (Unit::known("m2 s"), Some("y")));
     }
 

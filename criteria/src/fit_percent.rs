@@ -1,6 +1,6 @@
 //! Fit to a measurement, in percent.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -10,8 +10,8 @@ use crate::common::{compare, signal};
 /// the samples.
 ///
 /// Range: any number up to 100; 100 % is a perfect fit, 0 % no better than the measurement's mean. It is evaluated in
-/// the experiments that measure the signal; a measurement that is constant has no fit. Larger is better: monitor it, or
-/// demand it by a pair such as `good = 100`, `bad = 80`.
+/// the experiments that measure the signal; a measurement that is constant has no fit. More is better:
+/// `demand = 80` asks for at least 80 %.
 ///
 /// Source: L. Ljung, System Identification (2nd ed., 1999), chapter 16; the formula is that of `compare` in his System
 /// Identification Toolbox.
@@ -47,6 +47,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::More
+    }
+
+    fn range(&self) -> [f64; 2] {
+        [f64::NEG_INFINITY, 100.0]
     }
 
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {

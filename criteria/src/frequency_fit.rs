@@ -2,12 +2,12 @@
 
 use mops_core::linear::Complex;
 use mops_core::{
-    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value,
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::Channel;
+use crate::common::{Channel, NOT_NEGATIVE};
 
 /// `J = 1/N sum_i |G(j w_i)/G_i - 1|^2`, dimensionless: the mean square of the relative deviation from a measured frequency
 /// response `G_i` at the angular frequencies `w_i`. With `absolute = true`: `1/N sum_i |G(j w_i) - G_i|^2`, in the square of
@@ -17,7 +17,7 @@ use crate::common::Channel;
 /// parts, over `sqrt N`, are the residuals that least-squares solvers use. A relative deviation gives a resonance and the
 /// response far below it the same weight, as a Bode plot does.
 ///
-/// The response is measured in an experiment with `frequency` and `responses`. Range: from 0 up; a relative noise of
+/// The response is measured in an experiment with `frequency` and `responses`. Less is better. Range: from 0 up; a relative noise of
 /// standard deviation s in magnitude and phase leaves about 2 s^2.
 ///
 /// Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition (2012), section 9.
@@ -66,6 +66,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     #[allow(clippy::cast_precision_loss)]

@@ -1,10 +1,10 @@
 //! Gain margin of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, capped, feedback};
+use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 
 /// The gain margin: the smallest factor `g > 1` with which `g L` meets -1, `20 log10 g` in dB. The model is the loop transfer
 /// function L, with unity negative feedback around it.
@@ -12,8 +12,7 @@ use crate::common::{Channel, LinearCriterion, capped, feedback};
 /// Crossings of the negative real axis are found exactly, not on a grid; a delay of the model enters exactly. For a loop that
 /// would become unstable with less gain too, `either-way = true` takes the smallest change of the gain, up or down.
 ///
-/// Range: any number of dB. More is better, so that a demand is the pair `good` and `bad`, such as `good = "12 dB"`, `bad =
-/// "6 dB"`. Where the closed loop is unstable the margin is negative: minus the smallest change of the gain with which L
+/// Range: any number of dB. More is better: `demand = "6 dB"` asks for at least 6 dB. Where the closed loop is unstable the margin is negative: minus the smallest change of the gain with which L
 /// meets -1, so that the value passes 0 where stability is lost. A margin above 200 dB counts as 200 dB.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
@@ -41,7 +40,7 @@ impl CriterionSpec for GainMargin {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
         let both = self.either_way;
         let value = move |system| Ok(capped(feedback(system)?.gain_margin(both)?, 200.0));
-        Ok(LinearCriterion::boxed(channel, Unit::known("dB"), value))
+        Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("dB"), Sense::More), value))
     }
 }
 

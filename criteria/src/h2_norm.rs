@@ -1,17 +1,17 @@
 //! H2 norm.
 
 use mops_core::linear::h2_norm;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion};
+use crate::common::{Channel, LinearCriterion, Values};
 
 /// The H2 norm `sqrt(1/(2 pi) integral |G(j w)|^2 dw)`: the root mean square of the output for white noise of unit intensity at
 /// the input, and the root of the integrated square of the impulse response. In the unit of the output over that of the input,
 /// times s^(-1/2), which is left out.
 ///
-/// From a Lyapunov equation, not from an integral. Range: from 0 up. It has no value where the system is unstable or passes its
+/// From a Lyapunov equation, not from an integral. Less is better. Range: from 0 up. It has no value where the system is unstable or passes its
 /// input on directly.
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
@@ -36,7 +36,9 @@ impl CriterionSpec for H2Norm {
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
         let unit = channel.unit.clone();
-        Ok(LinearCriterion::boxed(channel, unit, |system| Ok(h2_norm(&system)?.into())))
+        Ok(LinearCriterion::boxed(channel, Values::of(unit, Sense::Less).within(0.0, f64::INFINITY), |system| {
+            Ok(h2_norm(&system)?.into())
+        }))
     }
 }
 

@@ -1,16 +1,16 @@
 //! Hinf norm.
 
 use mops_core::linear::hinf_norm;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion};
+use crate::common::{Channel, LinearCriterion, Values};
 
 /// The Hinf norm `max_w |G(j w)|`: the largest amplification of any sine, in the unit of the output over that of the input. Of
 /// the linearised closed loop from setpoint to actuator it is the largest effort of the controller.
 ///
-/// The peak is found by the eigenvalues of a Hamiltonian matrix, not on a grid. Range: from 0 up. It has no value where the
+/// The peak is found by the eigenvalues of a Hamiltonian matrix, not on a grid. Less is better. Range: from 0 up. It has no value where the
 /// system is unstable.
 ///
 /// Source: N. A. Bruinsma, M. Steinbuch, A fast algorithm to compute the Hinf norm of a transfer function matrix, Systems and
@@ -36,7 +36,9 @@ impl CriterionSpec for HinfNorm {
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
         let unit = channel.unit.clone();
-        Ok(LinearCriterion::boxed(channel, unit, |system| Ok(hinf_norm(&system)?.gain.into())))
+        Ok(LinearCriterion::boxed(channel, Values::of(unit, Sense::Less).within(0.0, f64::INFINITY), |system| {
+            Ok(hinf_norm(&system)?.gain.into())
+        }))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::common::{ErrorIntegral, StepOptions};
 ///
 /// Between ISE and ITAE: it forgives the beginning, and small errors.
 ///
-/// Range: from 0 up. The integral is that of the curve, exact up to rounding.
+/// Less is better. Range: from 0 up. The integral is that of the curve, exact up to rounding.
 ///
 /// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
 /// Transactions of the AIEE 72 (1953), part II, 273-288.

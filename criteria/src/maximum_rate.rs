@@ -1,16 +1,16 @@
 //! Largest rate of change of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{signal, trace};
+use crate::common::{NOT_NEGATIVE, signal, trace};
 
 /// `max_t |dy/dt|` over the whole simulation, in the unit of the signal per second.
 ///
-/// Range: from 0 up. The derivative is that of the curve on each step of the simulation. Where the signal jumps, as a
+/// Less is better. Range: from 0 up. The derivative is that of the curve on each step of the simulation. Where the signal jumps, as a
 /// controller's output does on a step of its reference, the rate is infinite and the criterion has no value; read a
 /// signal that is continuous, or filter this one in the model. The value at the very start is no jump.
 ///
@@ -46,6 +46,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

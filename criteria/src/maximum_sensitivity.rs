@@ -1,17 +1,17 @@
 //! Largest sensitivity of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, feedback};
+use crate::common::{Channel, LinearCriterion, Values, feedback};
 
 /// `Ms = max_w |1/(1 + L(j w))|`, dimensionless: one over the smallest distance of L from -1. The model is the loop transfer
 /// function L, with unity negative feedback around it.
 ///
 /// The peak is found by the eigenvalues of a Hamiltonian matrix, with a delay by following L, never on a grid.
 ///
-/// Range: from 1 up (nearly always); 1.2 to 2 is usual. It has no value where the closed loop is unstable.
+/// Less is better. Range: from 1 up (nearly always); 1.2 to 2 is usual. It has no value where the closed loop is unstable.
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), section 4.5; S. Skogestad, I. Postlethwaite,
 /// Multivariable Feedback Control, 2nd edition (2005), section 2.4.
@@ -35,7 +35,9 @@ impl CriterionSpec for MaximumSensitivity {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        Ok(LinearCriterion::boxed(channel, Unit::one(), |system| Ok(feedback(system)?.peak_sensitivity()?.into())))
+        Ok(LinearCriterion::boxed(channel, Values::of(Unit::one(), Sense::Less).within(0.0, f64::INFINITY), |system| {
+            Ok(feedback(system)?.peak_sensitivity()?.into())
+        }))
     }
 }
 

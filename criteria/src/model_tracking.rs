@@ -1,12 +1,12 @@
 //! Distance of a step response from that of a reference model.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions, part, positive, second};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions, part, positive, second};
 
 /// `sqrt(mean_t (y - y_ref)^2)` from the step to the end, in the unit of the signal, with
 /// `y_ref = from + (target - from) h(t)`.
@@ -15,7 +15,7 @@ use crate::common::{Step, StepOptions, part, positive, second};
 /// `1/(T s + 1)`; with `frequency` w and `damping` z that of `w^2/(s^2 + 2 z w s + w^2)`, z at least 0.05. It is
 /// evaluated in closed form and integrated along the curve.
 ///
-/// Range: from 0 up; 0 where the response is that of the reference model.
+/// Less is better. Range: from 0 up; 0 where the response is that of the reference model.
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Adaptive Control (2nd ed., 1995), chapter 5 (model-reference systems); step
 /// responses: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 7.3.
@@ -161,6 +161,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.step.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -1,13 +1,13 @@
 //! Fit to a measurement, in units of its noise.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Tangent, Unit,
-    Value,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Samples, Sense,
+    Tangent, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, compared_slopes, positive, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
 
 /// `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 where nothing but the noise is left.
 ///
@@ -15,7 +15,7 @@ use crate::common::{compare, compared_slopes, positive, signal};
 /// says. The sum has the residuals `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that
 /// least-squares solvers use.
 ///
-/// It is evaluated in the experiments that measure the signal. Range: from 0 up; well below 1 the noise is overrated or
+/// It is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up; well below 1 the noise is overrated or
 /// the model fits the noise, well above 1 the model lacks something. Without a demand, it is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
@@ -64,6 +64,14 @@ impl Criterion for Bound {
         vec![self.signal.clone()]
     }
 
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
+    }
+
     fn suits(&self, case: &Case) -> Result<(), Mistake> {
         let channel = case.experiment.as_ref().and_then(|experiment| experiment.channel(&self.signal));
         match channel {
@@ -89,6 +97,12 @@ impl Criterion for Bound {
         let scale = self.scale(channel)?;
         Ok(Value::slope_of_squares(&tangent.value.residuals, slopes.iter().map(|d| scale * d).collect()))
     }
+
+    fn samples(&self, case: &Case) -> Option<Samples> {
+        let channel = case.experiment.as_ref()?.channel(&self.signal)?;
+        let weights = vec![self.scale(channel).ok()?; channel.times.len()];
+        Some(Samples { signal: self.signal.clone(), weights, noise: self.noise.or(channel.noise) })
+    }
 }
 
 impl Bound {
@@ -104,7 +118,7 @@ impl Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::common::testing::{assert_near, measured, quantity, simulated, undefined_in, value_in};
+    use crate::common::testing::{assert_near, bound, measured, quantity, simulated, undefined_in, value_in};
 
     fn error(noise: Option<&str>) -> NormalisedError {
         NormalisedError { signal: "y".into(), noise: noise.map(quantity) }
@@ -116,6 +130,8 @@ mod tests {
         let value = value_in(&case, &error(None), &simulated(3.0, |t| t));
         assert_near(value.number, 1.0, 1e-12);
         assert_near(value.residuals[1], 0.5, 1e-12);
+        let samples = bound(&error(None)).samples(&case).unwrap();
+        assert_eq!((samples.weights, samples.noise), (vec![5.0; 4], Some(0.1)));
         let option = value_in(&case, &error(Some("20 cm")), &simulated(3.0, |t| t));
         assert_near(option.number, 0.25, 1e-12);
     }

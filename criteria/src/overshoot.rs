@@ -1,12 +1,12 @@
 //! Overshoot of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 
 /// `max(0, max_t (y - target)/(target - from))`, dimensionless: 0.05 is 5 % of the step.
 ///
@@ -15,7 +15,7 @@ use crate::common::{Step, StepOptions};
 /// so that it also serves a signal that should stay where it is; the relative overshoot of such a signal is not
 /// defined.
 ///
-/// Range: from 0 up. The maximum is that of the curve, not of samples. Simulate long enough for it to come.
+/// Less is better. Range: from 0 up. The maximum is that of the curve, not of samples. Simulate long enough for it to come.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -62,6 +62,18 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.step.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -1,16 +1,17 @@
 //! Largest or smallest value of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Sense, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{signal, trace};
+use crate::common::{NOT_NEGATIVE, signal, trace};
 
 /// `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
 ///
-/// Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A minimum, and
+/// Which values are better depends on the signal: `demand` asks for at most that value, the pair `good` and `bad` for either
+/// side. Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A minimum, and
 /// any value that may be zero or negative, is demanded by the pair `good` and `bad` rather than by `demand`.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (the peak norm of a signal).
@@ -59,6 +60,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        if self.of == Extremum::Absolute { Sense::Less } else { Sense::Open }
+    }
+
+    fn range(&self) -> [f64; 2] {
+        if self.of == Extremum::Absolute { NOT_NEGATIVE } else { [f64::NEG_INFINITY, f64::INFINITY] }
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

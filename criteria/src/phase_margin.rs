@@ -1,10 +1,12 @@
 //! Phase margin of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use std::f64::consts::PI;
+
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, capped, feedback};
+use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 
 /// The phase margin: `min |pi + arg L(j w)|` over the frequencies at which `|L(j w)| = 1`, in rad. The model is the loop
 /// transfer function L, with unity negative feedback around it.
@@ -12,8 +14,7 @@ use crate::common::{Channel, LinearCriterion, capped, feedback};
 /// Crossings are found exactly, not on a grid; a delay of the model enters exactly. Of several crossings the one with the
 /// smallest turn to -1, either way, counts.
 ///
-/// Range: -pi to pi. More is better, so that a demand is the pair `good` and `bad`, such as `good = "60 deg"`, `bad =
-/// "45 deg"`. Negative where the closed loop is unstable, so that the value passes 0 where stability is lost. Where `|L|` never
+/// Range: -pi to pi. More is better: `demand = "45 deg"` asks for at least 45 degrees. Negative where the closed loop is unstable, so that the value passes 0 where stability is lost. Where `|L|` never
 /// is 1 it counts as pi.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
@@ -37,8 +38,8 @@ impl CriterionSpec for PhaseMargin {
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
-        let value = |system| Ok(capped(feedback(system)?.phase_margin(), std::f64::consts::PI));
-        Ok(LinearCriterion::boxed(channel, Unit::known("rad"), value))
+        let value = |system| Ok(capped(feedback(system)?.phase_margin()?, PI));
+        Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("rad"), Sense::More).within(-PI, PI), value))
     }
 }
 

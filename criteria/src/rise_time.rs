@@ -1,19 +1,19 @@
 //! Rise time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions, number, second};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 
 /// `t_high - t_low`, in s, where `t_f` is the first time at which `(y - from)/(target - from) >= f`.
 ///
 /// `low` and `high` are 0.1 and 0.9 where absent: the rise time from 10 % to 90 % of the step.
 ///
-/// Range: from 0 to the length of the simulation. A response that never gets to `high` has the time that is left from
-/// `t_low` (or from the step, if it does not get there either) to the end, noted `not risen at the end`.
+/// Less is better. Range: from 0 to the length of the simulation. A response that never gets to `high` has no rise time and
+/// meets no demand, noted `not risen at the end`.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -72,18 +72,32 @@ impl Criterion for Bound {
         vec![self.step.signal.clone()]
     }
 
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
+    }
+
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
         let answer = self.step.answer(analysis)?;
         let begin = answer.first_reaching(self.low)?.unwrap_or(0.0);
         Ok(match answer.first_reaching(self.high)? {
             Some(end) => (end - begin).into(),
-            None => Value::noted(answer.length() - begin, "not risen at the end"),
+            None => return answer.not_reached(answer.length(), self.high, "not risen at the end"),
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use mops_core::Missed;
+
     use super::*;
     use crate::common::testing::{assert_near, mistake, second_order, simulated, value};
 
@@ -114,13 +128,15 @@ mod tests {
     }
 
     #[test]
-    fn a_response_that_stays_low_has_the_time_that_is_left() {
-        let note = "not risen at the end";
-        let half = simulated(10.0, |t| 0.5 * (1.0 - (-t).exp()));
-        let left = value(&rise(), &half);
-        assert_near(left.number, 10.0 + 0.8f64.ln(), 1e-10);
-        assert_eq!(left.note, Some(note));
-        assert_eq!(value(&rise(), &simulated(10.0, |t| 0.001 * t)), Value::noted(10.0, note));
+    fn a_response_that_stays_low_has_not_risen_and_is_the_better_the_nearer_it_comes() {
+        let low = RiseTime { from: Some(0.0.into()), ..rise() };
+        let at = |level: f64| value(&low, &simulated(10.0, move |_| level));
+        assert_near(at(0.5).number, 10.0 * (1.0 + 0.4 / 0.41), 1e-9);
+        assert!(at(0.8).number < at(0.5).number && at(-3.0).number > at(0.5).number);
+        assert_eq!(
+            (at(0.5).missed, at(0.5).note),
+            (Some(Missed { horizon: Some(10.0) }), Some("not risen at the end"))
+        );
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! Root mean square difference from a measurement.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, signal};
+use crate::common::{NOT_NEGATIVE, compare, signal};
 
 /// `sqrt(mean_i (y_simulated - y_measured)(t_i)^2)`, in the unit of the signal.
 ///
 /// All samples count alike; the simulation is read from its curve at their times. It is evaluated in the experiments
-/// that measure the signal. Range: from 0 up; a model that lacks nothing leaves the standard deviation of the noise. To
+/// that measure the signal. Less is better. Range: from 0 up; a model that lacks nothing leaves the standard deviation of the noise. To
 /// calibrate, minimise `fit` or `normalised-error`, whose residuals least-squares solvers use, and monitor this one.
 ///
 /// Source: L. Ljung, System Identification (2nd ed., 1999), chapter 16.
@@ -47,6 +47,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {

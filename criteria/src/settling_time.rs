@@ -1,12 +1,13 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Trace, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Trace, Unit,
+    Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions, positive, second};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions, positive, second};
 
 /// `sup { t : |y - target| > band }`, counted from the step, in s: from then on the signal stays within the band.
 ///
@@ -14,8 +15,8 @@ use crate::common::{Step, StepOptions, positive, second};
 /// where neither is given. Touching the edge of the band does not leave it. The time is where the curve crosses the
 /// edge, not where a sample lies outside; it jumps where an extremum comes to touch the edge.
 ///
-/// Range: from 0 to the length of the simulation. A signal that is outside at the end has that length as its settling
-/// time, noted `not settled at the end`. Without a `target` the signal settles at its own last value, whatever that is:
+/// Less is better. Range: from 0 to the length of the simulation. A signal that is outside at the end has no settling time
+/// and meets no demand, noted `not settled at the end`. Without a `target` the signal settles at its own last value, whatever that is:
 /// give one wherever it is known.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
@@ -84,6 +85,18 @@ impl Criterion for Bound {
         vec![self.step.signal.clone()]
     }
 
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
+    }
+
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
         let answer = self.step.answer(analysis)?;
         let band = match self.band {
@@ -94,7 +107,7 @@ impl Criterion for Bound {
         if left < answer.trace.end() {
             Ok((left - answer.time).into())
         } else {
-            Ok(Value::noted(answer.length(), "not settled at the end"))
+            Ok(answer.missed(answer.length(), answer.target, band, "not settled at the end"))
         }
     }
 
@@ -124,6 +137,8 @@ fn last_outside(trace: &Trace, low: f64, high: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::Missed;
+
     use super::*;
     use crate::common::testing::{analysis, assert_near, mistake, quantity, second_order, simulated, value};
 
@@ -176,11 +191,16 @@ mod tests {
     }
 
     #[test]
-    fn a_response_outside_the_band_at_the_end_is_noted_and_lasts_as_long_as_the_simulation() {
+    fn a_response_outside_the_band_at_the_end_has_not_settled() {
         let lag = simulated(4.0, |t| 1.0 - (-t).exp());
-        assert_eq!(value(&settling(0.01), &lag), Value::noted(4.0, "not settled at the end"));
+        // Mean distance over the last tenth of the time from the step.
+        let mean = |tenth: f64| ((tenth - 4.0).exp() - (-4.0_f64).exp()) / tenth;
+        let exact = |length: f64| length * (1.0 + mean(0.1 * length) / (mean(0.1 * length) + 0.01));
+        let missed = value(&settling(0.01), &lag);
+        assert_near(missed.number, exact(4.0), 1e-9);
+        assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(4.0) }), Some("not settled at the end")));
         let later = SettlingTime { step_time: Some(1.0.into()), ..settling(0.01) };
-        assert_eq!(value(&later, &lag).number, 3.0);
+        assert_near(value(&later, &lag).number, exact(3.0), 1e-9);
         assert_eq!(value(&settling(2.0), &lag), Value::from(0.0));
     }
 

@@ -1,16 +1,16 @@
 //! Slowest pole.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Channel, LinearCriterion, Of, poles};
+use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 
 /// The largest real part of all poles, `max Re p`, in 1/s: negative for a stable system, and the more so the faster its slowest
 /// mode dies out. With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
 /// Poles that neither input nor output touches count too.
 ///
-/// Range: any number. It is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay
+/// Less is better. Range: any number. It is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay
 /// has no finite number of poles, and no value.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 7.4 (stability degree).
@@ -41,7 +41,7 @@ impl CriterionSpec for SlowestPole {
             let poles = poles(&system, of)?;
             Ok(poles.iter().map(|p| p.re).fold(f64::NEG_INFINITY, f64::max).into())
         };
-        Ok(LinearCriterion::boxed(channel, Unit::known("1/s"), value))
+        Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("1/s"), Sense::Less), value))
     }
 }
 

@@ -1,17 +1,18 @@
 //! Steady-state error.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{number, part, positive, second, signal, trace};
+use crate::common::{NOT_NEGATIVE, number, part, positive, second, signal, trace};
 
 /// `|y(t_end) - target|`, in the unit of the signal; with a `window` of length w,
 /// `|mean of y over [t_end - w, t_end] - target|`.
 ///
-/// Range: from 0 up. The mean is taken before the absolute value, so that a window of whole periods averages a lasting
+/// Less is better. Range: from 0 up. The mean is taken before the absolute value, so that a window of whole periods averages a lasting
 /// oscillation out.
 ///
 /// Source: K. Ogata, Modern Control Engineering (5th ed., 2010), section 5-8.
@@ -52,6 +53,14 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -1,8 +1,8 @@
 //! Distance of a response from an envelope.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Trace, Unit, Value,
-    Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Trace, Unit,
+    Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -16,7 +16,7 @@ use crate::common::{number, part, second, signal, step_time, trace};
 /// same time are a step. At least one bound is needed. Example: `upper = [[0, 1.2], [5, 1.2], [5, 1.02]]`,
 /// `lower = [[3, 0.9], [10, 0.98]]`.
 ///
-/// Range: any number. A demand is positive; to ask that the response stays inside, use the pair `good = -0.1`,
+/// Less is better. Range: any number. A demand is positive; to ask that the response stays inside, use the pair `good = -0.1`,
 /// `bad = 0`: the scaled value is 1 where the response touches its envelope, 0 with a margin of 0.1.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
@@ -104,6 +104,10 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.signal.name.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

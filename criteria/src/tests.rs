@@ -71,6 +71,7 @@ fn every_page_of_the_manual_opens_with_a_formula_and_names_its_source() {
         let about = page.lines().nth(2).unwrap_or_default();
         assert!(about.contains('`'), "{page}");
         assert!(page.contains("Source: ") && page.contains("Range:"), "{page}");
+        assert!(page.contains(" better"), "the page says which values are better: {page}");
         let schema = (kind.schema)();
         let options = schema.as_value()["properties"].as_object().expect("a criterion has options").clone();
         assert!(options.values().all(|option| option["description"].is_string()), "{page}");

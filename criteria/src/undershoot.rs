@@ -1,12 +1,12 @@
 //! Undershoot of a step response: how far it first goes the wrong way.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Step, StepOptions};
+use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 
 /// `max(0, max_t (from - y)/(target - from))`, dimensionless: 0.2 is 20 % of the step, to the wrong side.
 ///
@@ -14,7 +14,7 @@ use crate::common::{Step, StepOptions};
 /// itself, in the unit of the signal: `max(0, from - min_t y)` for a step upwards, `max(0, max_t y - from)` for one
 /// downwards.
 ///
-/// Range: from 0 up. The whole response counts, so that one that swings back beyond `from` later has an undershoot too.
+/// Less is better. Range: from 0 up. The whole response counts, so that one that swings back beyond `from` later has an undershoot too.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -61,6 +61,18 @@ impl Criterion for Bound {
 
     fn signals(&self) -> Vec<String> {
         vec![self.step.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -179,10 +179,10 @@ impl Catalogue {
         self
     }
 
-    /// Adds an effect.
+    /// Adds an effect, as in `catalogue.with_effect(effect::<EddyBrake>())`.
     #[must_use]
-    pub fn with_effect(mut self, effect: impl Effect + 'static) -> Self {
-        self.effects.push(Arc::new(effect));
+    pub fn with_effect(mut self, effect: Arc<dyn Effect>) -> Self {
+        self.effects.push(effect);
         self
     }
 

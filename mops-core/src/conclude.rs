@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::catalogue::SolverChoice;
 use crate::experiment::{Channel, Role};
 use crate::front;
-use crate::identification::{self, Local};
+use crate::identification::{self, Local, Point, SensitivityReport};
 use crate::model::Analysis;
 use crate::outcome::{
     self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Findings, Outcome, ParameterReport,
@@ -27,7 +27,7 @@ pub struct Ending {
     pub seconds: f64,
 }
 
-/// Concludes a run: estimates the free start values of experiments that move no parameter, and fills in the outcome.
+/// Concludes a run: estimates the tuners that are local to selection and validation experiments, and fills in the outcome.
 /// Returns it with the evaluation it reports.
 ///
 /// Of a run that was asked to end it reports what is known, and the rest as far as the simulations of the conclusion are let
@@ -42,12 +42,19 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let mut simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
     let mut warnings = study.warnings.clone();
 
+    // Experiments whose local tuners no criterion shows.
+    let mut unknown = Vec::new();
     for case in 0..study.cases.len() {
         if study.cases[case].role() == Role::Calibration || ending.stop == Stop::Interrupted || ended_early {
             continue;
         }
         let part = Problem::of_case(Arc::clone(&study), case, &best.tuners);
-        if part.active().is_empty() || part.simulations() == 0 {
+        if part.active().is_empty() {
+            continue;
+        }
+        if part.simulations() == 0 {
+            warnings.push(unknown_warning(&part, case));
+            unknown.push(case);
             continue;
         }
         let mut run = Run::new(&part, Budget { evaluations: 2000 }, &());
@@ -62,10 +69,12 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
 
     let calibration =
         (study.task == Task::Calibration || study.cases.iter().any(|c| c.experiment.is_some())).then(|| {
-            let local = identification::local(problem, &best.tuners, study.tasks.sensitivity.zero);
-            let experiments = experiments(problem, &best);
+            let point = if ending.stop == Stop::Interrupted { Point::Elsewhere } else { Point::Minimum };
+            let local = identification::local(problem, &best.tuners, point, study.tasks.sensitivity.zero);
+            let experiments = experiments(problem, &best, &unknown);
             let mut sensitivity = local.as_ref().map(|local| identification::report_of(problem, &best.tuners, local));
-            if let Some(found) = sensitivity.as_mut().filter(|found| found.of == "residuals") {
+            let shows_noise = |found: &&mut SensitivityReport| found.of == "residuals" && point == Point::Minimum;
+            if let Some(found) = sensitivity.as_mut().filter(shows_noise) {
                 found.words.extend(whiteness_words(&experiments));
             }
             CalibrationReport {
@@ -176,20 +185,22 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
     problem.active().iter().filter_map(at_bound).collect()
 }
 
-/// Standard errors of the active tuners: the roots of the diagonal of `s^2 (J' J)^-1`, with `s^2` the mean square of the
-/// residuals per degree of freedom. To first order, and for white residuals. Source: L. Ljung, System Identification,
-/// 2nd edition (1999), section 9.4. NaN along directions that the data do not determine.
+/// Confidence of the intervals of a calibration's parameters.
+const LEVEL: f64 = 0.95;
+
+/// Standard errors of the active tuners, to first order ([`identification::Covariance`]), and intervals by Student's t. NaN where
+/// the data do not determine a tuner.
 fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) -> Vec<ParameterReport> {
     let study = problem.study();
     let report = |(k, &i): (usize, &usize)| {
         let tuner = &study.tuners[i];
         let value = best.tuners[i];
-        let error = local.map_or(f64::NAN, |local| local.deviation * local.sensitivity.together[k]);
-        let half = 1.96 * error;
+        let spread = local.map(|local| local.spread(k));
+        let half = spread.map_or(f64::NAN, |spread| spread.half_width(LEVEL));
         ParameterReport {
             name: tuner.name.clone(),
             value,
-            std_error: error,
+            std_error: spread.map_or(f64::NAN, |spread| spread.deviation),
             // What lies beyond a bound was excluded beforehand.
             interval95: [value - half, value + half].map(|end| end.clamp(tuner.bounds[0], tuner.bounds[1])),
             unit: tuner.unit.to_string(),
@@ -198,14 +209,27 @@ fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) 
     problem.active().iter().enumerate().map(report).collect()
 }
 
-fn experiments(problem: &Problem, best: &Evaluation) -> Vec<ExperimentReport> {
+/// That tuners are local to a case in which no criterion shows them.
+fn unknown_warning(part: &Problem, case: usize) -> String {
+    let study = part.study();
+    let local: Vec<String> = part.active().iter().map(|&i| format!("`{}`", study.tuners[i].name)).collect();
+    format!(
+        "no criterion of `{}` can tell {}, which belong to it alone: they keep their start values, and the errors of `{0}` are \
+         not reported; give it a criterion to minimise, such as `fit`",
+        study.cases[case].name,
+        local.join(", ")
+    )
+}
+
+/// How well every experiment is met; those in `unknown` have no errors.
+fn experiments(problem: &Problem, best: &Evaluation, unknown: &[usize]) -> Vec<ExperimentReport> {
     let study = problem.study();
     let mut reports = Vec::new();
     for (index, case) in study.cases.iter().enumerate() {
         let Some(experiment) = &case.experiment else { continue };
         let mut channels = Vec::new();
         for (job, _) in study.jobs.iter().enumerate().filter(|(_, plan)| plan.case == index) {
-            let analysis = problem.analyse_all(job, &best.tuners, None).ok();
+            let analysis = problem.analyse_all(job, &best.tuners, None).ok().filter(|_| !unknown.contains(&index));
             let signals = &study.models[study.jobs[job].model].1.interface().signals;
             for channel in &experiment.channels {
                 if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {

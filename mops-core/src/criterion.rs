@@ -1,10 +1,11 @@
-//! What a criterion is, and how a value is scaled by its demand.
+//! What a criterion is: a number for every analysis, with its unit, its sense and its range.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
 use crate::model::{Analysis, AnalysisKind, Interface};
+use crate::samples::Samples;
 use crate::study::Mistake;
 use crate::unit::Unit;
 
@@ -49,6 +50,21 @@ pub trait Criterion: Send + Sync {
     /// A response for which the criterion is not defined: one sentence.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
 
+    /// Which values are better; the study says it where a criterion does not.
+    fn sense(&self) -> Sense {
+        Sense::Open
+    }
+
+    /// The smallest and the largest value it can have, in its unit; a demand beyond them is a mistake.
+    fn range(&self) -> [f64; 2] {
+        [f64::NEG_INFINITY, f64::INFINITY]
+    }
+
+    /// What it assumes where an option is absent, in one sentence, to be noted when the study is checked.
+    fn assumption(&self) -> Option<String> {
+        None
+    }
+
     /// The demand where the study gives none; without one, a criterion that is more than watched needs its own.
     fn natural_demand(&self) -> Option<f64> {
         None
@@ -67,14 +83,35 @@ pub trait Criterion: Send + Sync {
         Ok(Value {
             number: slope((&high.number, &low.number)),
             residuals: high.residuals.iter().zip(&low.residuals).map(slope).collect(),
-            note: None,
+            ..Value::default()
         })
+    }
+
+    /// The samples that its residuals compare with: the standard errors of a calibration rest on their noise. `None`, the
+    /// default, where there are no residuals, or where nothing is known of them but that they have one variance.
+    fn samples(&self, _case: &Case) -> Option<Samples> {
+        None
     }
 
     /// Levels to draw beside the signals, where the criterion has some; `limit` is the value that scales to 1.
     fn marks(&self, _limit: Option<f64>, _analysis: &Analysis) -> Vec<Mark> {
         Vec::new()
     }
+}
+
+/// Which values of a criterion are better.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Sense {
+    /// Smaller ones: a demand is the largest that is accepted.
+    Less,
+    /// Larger ones: a demand is the smallest that is accepted.
+    More,
+    /// Those near a target: a demand alone is ambiguous.
+    Target,
+    /// The kind does not say, as for the value of a signal: a demand is the largest that is accepted, and a pair `good`, `bad`
+    /// says it either way.
+    #[default]
+    Open,
 }
 
 /// Where a derivative is taken, and along what.
@@ -90,6 +127,10 @@ pub struct Tangent<'a> {
     pub reach: f64,
 }
 
+/// Share by which a criterion that is missed exceeds 1 at least: above what rounding may take a constraint beyond its demand
+/// ([`crate::FEASIBLE`]), so that nothing that was missed is ever met.
+const LEAST_MISS: f64 = 1e-5;
+
 /// The value of a criterion.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Value {
@@ -99,6 +140,19 @@ pub struct Value {
     pub residuals: Vec<f64>,
     /// What a reader must know of the number, such as `not settled at the end`.
     pub note: Option<&'static str>,
+    /// What the criterion asks for was never reached. `number` then only tells how far it was, see [`Missed`].
+    pub missed: Option<Missed>,
+}
+
+/// What a criterion asks for, such as that a response settles, was not reached in a simulation or at any frequency.
+///
+/// The criterion has no value then, and no demand is met. So that solvers still see which way is better, it has the number
+/// `h (1 + e/(e + b))`: `h` is the time in which it could have been reached (1 where the criterion is no time), `e` the distance
+/// of the response from where it should be and `b` what counts as near. [`crate::Demand::scaled`] says how it counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// The time in which it could have been reached, s; `None` where the criterion is no time.
+    pub horizon: Option<f64>,
 }
 
 impl From<f64> for Value {
@@ -110,18 +164,26 @@ impl From<f64> for Value {
 impl Value {
     /// A number with something to know about it.
     pub fn noted(number: f64, note: &'static str) -> Self {
-        Self { number, residuals: Vec::new(), note: Some(note) }
+        Self { number, note: Some(note), ..Self::default() }
+    }
+
+    /// Nothing was reached: within `horizon` in s, where the criterion is a time; `distance` is that of the response from where
+    /// it should be, `near` what counts as near, in the same unit.
+    pub fn missed(horizon: Option<f64>, distance: f64, near: f64, note: &'static str) -> Self {
+        let share = (distance / (distance + near)).clamp(LEAST_MISS, 1.0);
+        let number = horizon.unwrap_or(1.0) * (1.0 + if share.is_nan() { 1.0 } else { share });
+        Self { number, note: Some(note), missed: Some(Missed { horizon }), ..Self::default() }
     }
 
     /// The derivative of [`Value::sum_of_squares`], given the residuals and their derivatives.
     pub fn slope_of_squares(residuals: &[f64], slopes: Vec<f64>) -> Self {
         let number = residuals.iter().zip(&slopes).map(|(r, slope)| 2.0 * r * slope).sum();
-        Self { number, residuals: slopes, note: None }
+        Self { number, residuals: slopes, ..Self::default() }
     }
 
     /// The sum of squares of `residuals`.
     pub fn sum_of_squares(residuals: Vec<f64>) -> Self {
-        Self { number: residuals.iter().map(|r| r * r).sum(), residuals, note: None }
+        Self { number: residuals.iter().map(|r| r * r).sum(), residuals, ..Self::default() }
     }
 }
 
@@ -140,42 +202,6 @@ pub enum Usage {
     Monitor,
 }
 
-/// How a value is scaled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Demand {
-    /// Divided by this positive number.
-    Value(f64),
-    /// 0 at `good`, 1 at `bad`, either way round.
-    Pair {
-        /// Scaled value 0.
-        good: f64,
-        /// Scaled value 1.
-        bad: f64,
-    },
-    /// Nothing was asked for: the criterion is only watched, and its scaled value is NaN.
-    None,
-}
-
-impl Demand {
-    /// The scaled value: `c/d`, or `(c - good)/(bad - good)`.
-    pub fn scale(&self, value: f64) -> f64 {
-        match *self {
-            Self::Value(demand) => value / demand,
-            Self::Pair { good, bad } => (value - good) / (bad - good),
-            Self::None => f64::NAN,
-        }
-    }
-
-    /// The value that scales to 1.
-    pub fn limit(&self) -> Option<f64> {
-        match *self {
-            Self::Value(demand) => Some(demand),
-            Self::Pair { bad, .. } => Some(bad),
-            Self::None => None,
-        }
-    }
-}
-
 /// A level of a signal that a criterion looks at, to be drawn in plots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
@@ -185,16 +211,4 @@ pub struct Mark {
     pub label: String,
     /// Where it lies, in the signal's unit.
     pub level: f64,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_demand_scales_by_division_and_a_pair_either_way_round() {
-        assert_eq!(Demand::Value(0.1).scale(0.05), 0.05 / 0.1);
-        let margin = Demand::Pair { good: 12.0, bad: 6.0 };
-        assert_eq!((margin.scale(12.0), margin.scale(6.0), margin.scale(3.0)), (0.0, 1.0, 1.5));
-    }
 }

@@ -9,9 +9,11 @@ mod catalogue;
 mod conclude;
 mod criterion;
 pub mod data;
+mod demand;
 mod diagnostic;
 mod differences;
 mod effect;
+pub mod enclosure;
 mod evaluator;
 mod experiment;
 pub mod expression;
@@ -31,6 +33,7 @@ mod problem;
 mod random;
 mod robustness;
 mod run;
+mod samples;
 mod scalar;
 mod slopes;
 mod solver;
@@ -50,7 +53,8 @@ pub use catalogue::{
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Demand, Mark, Tangent, Usage, Value};
+pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Sense, Tangent, Usage, Value};
+pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
@@ -61,7 +65,7 @@ pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
-pub use linearised::{Linearise, Linearised, Resting};
+pub use linearised::{Linearise, Linearised, Resting, Rough};
 pub use model::{
     Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
     Variable, WithTangents, Work,
@@ -71,7 +75,7 @@ pub use outcome::{
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
 pub use placement::{Augment, EffectDraft};
-pub use plant::{Instant, Open, Opening, Plant};
+pub use plant::{Instant, Open, Opening, Plant, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
@@ -82,6 +86,7 @@ pub use robustness::{
     UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
 };
 pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch};
+pub use samples::Samples;
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use slopes::{CriterionSlopes, SlopesReport};
 pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};

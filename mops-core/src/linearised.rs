@@ -1,12 +1,13 @@
 //! A model's linearisation as a model of its own: the same parameters, at an operating point, between chosen signals.
 
+use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::linear::{Balance, NoEquilibrium, StateSpace, equilibrium};
+use crate::linear::{Balance, NoEquilibrium, Point, StateSpace, equilibrium};
 use crate::model::{Analysis, AnalysisKind, Failure, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::study::Mistake;
 use crate::unit::Quantity;
@@ -55,6 +56,32 @@ pub struct Resting {
     pub rates: Vec<f64>,
     /// The joints whose dry friction is left out, by the names of their positions.
     pub frictionless: Vec<String>,
+    /// Slopes that the model does not have there.
+    pub rough: Vec<Rough>,
+}
+
+/// A rate or an output without a slope at an operating point: it jumps there, has a kink, or is infinitely steep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rough {
+    /// The state whose rate it is, or the output.
+    pub of: String,
+    /// Whether it is the rate of a state.
+    pub is_rate: bool,
+    /// The state or input along which there is no slope, and its value.
+    pub along: String,
+    /// The value of that, in its unit.
+    pub at: f64,
+}
+
+impl fmt::Display for Rough {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { of, is_rate, along, at } = self;
+        let what = if *is_rate { "the rate of " } else { "" };
+        write!(
+            f,
+            "{what}`{of}` has no slope along `{along}` at {along} = {at}: it jumps, has a kink or is infinite there"
+        )
+    }
 }
 
 impl Linearised {
@@ -152,9 +179,31 @@ impl Linearised {
             };
             point = equilibrium(balance, &point, free).map_err(|why| Failure::Undefined(self.restless(&why)))?;
         }
-        let Local { rates, slopes, frictionless, .. } = local(&point)?;
+        let here = local(&point)?;
+        let rough = self.rough(&point, &here, |point| local(point).ok());
+        let Local { rates, slopes, frictionless, .. } = here;
         let inputs = point.split_off(n);
-        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless })
+        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless, rough })
+    }
+
+    /// The rates and outputs that have no slope at a point, among those that are part of the system.
+    fn rough(&self, point: &[f64], here: &Local, local: impl Fn(&[f64]) -> Option<Local>) -> Vec<Rough> {
+        let n = self.states.len();
+        let values = |at: &Local| [&at.rates[..], &at.signals].concat();
+        let rows: Vec<usize> = (0..n).chain(self.outputs.iter().map(|i| n + i)).collect();
+        let columns: Vec<usize> = (0..n).chain(self.inputs.iter().map(|j| n + j)).collect();
+        let at = Point { x: point, values: &values(here), slopes: &here.slopes };
+        let of = self.model.interface();
+        let found = at.rough(|point| local(point).map(|local| values(&local)), &rows, &columns);
+        found
+            .into_iter()
+            .map(|(row, column)| Rough {
+                of: if row < n { self.states[row].name.clone() } else { of.signals[row - n].name.clone() },
+                is_rate: row < n,
+                along: if column < n { self.states[column].name.clone() } else { of.inputs[column - n].name.clone() },
+                at: point[column],
+            })
+            .collect()
     }
 
     /// Why there is no equilibrium, and what may help.
@@ -205,7 +254,11 @@ impl Model for Linearised {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        self.at(job.case, job.parameters).map(|resting| Analysis::Linear(resting.system))
+        let resting = self.at(job.case, job.parameters)?;
+        match resting.rough.first() {
+            Some(rough) => Err(Failure::Undefined(format!("the model cannot be linearised there: {rough}"))),
+            None => Ok(Analysis::Linear(resting.system)),
+        }
     }
 }
 

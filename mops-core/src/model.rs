@@ -299,6 +299,8 @@ pub struct Work {
     pub rejected: usize,
     /// Evaluations of the right-hand side.
     pub derivatives: usize,
+    /// Accepted steps in which rounding of the states, not the tolerance, decided over the error of one of them.
+    pub rough: usize,
 }
 
 /// Why an analysis gave nothing.
@@ -311,6 +313,8 @@ pub enum Failure {
     StepLimit(f64),
     /// The step size became too small for the clock at this time, s: the equations are stiff or singular there.
     StepTooSmall(f64),
+    /// Events come closer and closer, or conditions never agree on whose turn it is, at this time, s; which, and the way out.
+    EventsAccumulate(f64, String),
     /// Parameter values for which the model is not defined.
     Undefined(String),
     /// A criterion has no value for this response.
@@ -328,6 +332,7 @@ impl Failure {
             Self::Diverged(_) => "diverged",
             Self::StepLimit(_) => "step limit",
             Self::StepTooSmall(_) => "step too small",
+            Self::EventsAccumulate(..) => "events accumulate",
             Self::Undefined(_) => "model undefined",
             Self::Criterion(_) => "criterion undefined",
             Self::RecordLimit(_) => "record limit",
@@ -344,6 +349,7 @@ impl fmt::Display for Failure {
                 write!(f, "took too many steps, the last at {t:.4} s: stiff equations, or too tight a tolerance")
             }
             Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
+            Self::EventsAccumulate(t, why) => write!(f, "events accumulate at {t:.4} s: {why}"),
             Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
             Self::RecordLimit(t) => {
                 write!(

@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::criterion::{Demand, Usage};
+use crate::criterion::Usage;
+use crate::demand::Demand;
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
-use crate::problem::{Evaluation, FEASIBLE};
+use crate::problem::Evaluation;
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
 use crate::slopes::SlopesReport;
 use crate::solver::Stop;
@@ -203,14 +204,22 @@ pub struct CriterionReport {
     /// Value that scales to 1, where given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bad: Option<f64>,
-    /// The value.
+    /// The value; null where what the criterion asks for was never reached, or nothing could be computed.
     pub value: f64,
-    /// By its demand.
+    /// The scaled value, at most 1 where the demand is met. A demand `d` is the largest value that is accepted for a kind of which
+    /// less is better, and scales `c/d`; it is the smallest for one of which more is better, and scales `1 + (d - c)/|d|`. A pair
+    /// scales `(c - good)/(bad - good)`. What was never reached counts `max(1, h/d) (1 + e/(e + b))`: `h` is the time in
+    /// which it could have been reached, `e` the mean distance of the signal from where it should be over the last tenth of that
+    /// time, `b` the half-width of the band (for levels 1 % of the step); `1 + e/(e + b)` under a pair, and for a kind
+    /// that is no time.
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,
-    /// Whether the demand is met; true where there is none.
+    /// Whether the demand is met; true where there is none, never where the value was not reached.
     pub met: bool,
+    /// Whether more is asked for, not less.
+    #[serde(skip)]
+    pub at_least: bool,
     /// What a reader must know of the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<&'static str>,
@@ -250,9 +259,10 @@ pub struct ParameterReport {
     pub name: String,
     /// Estimate.
     pub value: f64,
-    /// Standard error to first order, for white residuals; null where the data do not tell.
+    /// Standard error to first order; null where the data do not determine it.
     pub std_error: f64,
-    /// Estimate +- 1.96 standard errors, within the bounds.
+    /// 95 % interval: estimate +- t quantile times standard error, within the bounds; null where the data do not determine
+    /// it.
     pub interval95: [f64; 2],
     /// Unit of all of these.
     pub unit: String,
@@ -323,7 +333,7 @@ pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport>
         let plan = &study.jobs[row.job];
         let scaled = reading.map_or(f64::NAN, |r| r.scaled);
         let (demand, good, bad) = match row.demand {
-            Demand::Value(demand) => (Some(demand), None, None),
+            Demand::AtMost(demand) | Demand::AtLeast(demand) => (Some(demand), None, None),
             Demand::Pair { good, bad } => (None, Some(good), Some(bad)),
             Demand::None => (None, None, None),
         };
@@ -338,11 +348,8 @@ pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport>
             value: reading.map_or(f64::NAN, |r| r.value),
             scaled,
             unit: row.unit.to_string(),
-            met: match row.usage {
-                _ if row.demand == Demand::None => true,
-                Usage::Equality => (scaled - 1.0).abs() <= FEASIBLE,
-                _ => scaled <= 1.0 + FEASIBLE,
-            },
+            met: row.is_met(scaled),
+            at_least: row.demand.asks_for_more(),
             note: reading.and_then(|r| r.note),
         }
     };

@@ -1,5 +1,6 @@
 //! A model opened at its ports: what effects that it lacks act on.
 
+use crate::enclosure::Enclosure;
 use crate::model::Failure;
 use crate::scalar::{Along, Scalar};
 
@@ -15,6 +16,19 @@ pub struct Instant<'a, S> {
     /// What is added to the right-hand sides, one for every [`crate::Port::Process`] in the order of
     /// [`crate::Interface::ports`]; 0 in the declared model.
     pub w: &'a [S],
+}
+
+/// What is known of a plant over a time: bounds of what an [`Instant`] gives.
+#[derive(Debug, Clone, Copy)]
+pub struct Span<'a> {
+    /// Time, s.
+    pub time: Enclosure,
+    /// The states.
+    pub x: &'a [Enclosure],
+    /// The inputs.
+    pub u: &'a [Enclosure],
+    /// What is added to the right-hand sides.
+    pub w: &'a [Enclosure],
 }
 
 /// `x' = f(t, x, u, w)` at given parameters, in modes of its own between which guards switch.
@@ -43,6 +57,30 @@ pub trait Plant<S: Scalar> {
     /// A guard became negative: changes the mode; where the state jumps, `x` is the state behind it. Returns what happened.
     fn switch(&mut self, _index: usize, _at: &Instant<'_, S>, _x: &mut [S]) -> &str {
         ""
+    }
+
+    /// Whether it encloses guards.
+    fn has_bounds(&self) -> bool {
+        false
+    }
+
+    /// Bounds of a guard and of its rate over a time, as [`Plant::guard`].
+    fn enclose_guard(&self, _index: usize, _over: &Span<'_>) -> Enclosure {
+        Enclosure::UNKNOWN
+    }
+
+    /// The events of a guard accumulate, in intervals below `close` in s: writes the state in which they end to `x` and returns
+    /// what happened.
+    ///
+    /// # Errors
+    /// There is no such state: which events accumulate, and the way out.
+    fn rest(&mut self, _index: usize, _at: &Instant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
+        Err("a mode of the model changes to and fro without end".to_owned())
+    }
+
+    /// The typical size of a state, in its unit; `None` where only the simulation tells it.
+    fn scale(&self, _state: usize) -> Option<f64> {
+        None
     }
 
     /// Inputs or forces jumped, also called once at the start: finds the mode.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use rand::Rng;
 use rayon::prelude::*;
 
-use crate::criterion::{Demand, Tangent, Usage, Value};
+use crate::criterion::{Tangent, Usage, Value};
+use crate::demand::Demand;
 use crate::experiment::Role;
 use crate::known::{JobValues, Kept, KeptSlopes, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Failure, Job};
@@ -62,10 +63,12 @@ impl Evaluation {
 /// The value of a criterion in a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// In the criterion's unit.
+    /// In the criterion's unit; NaN where it was never reached.
     pub value: f64,
-    /// By its demand.
+    /// The scaled value, under its demand.
     pub scaled: f64,
+    /// Derivative of the scaled value with respect to the number of the criterion.
+    pub(crate) slope: f64,
     /// What a reader must know of it.
     pub note: Option<&'static str>,
 }
@@ -117,13 +120,11 @@ impl Problem {
         Self::with(study, active, base, own_usage)
     }
 
-    /// The problem of one case alone: its free start values are active, all else keeps the values in `tuners`. This is how
-    /// start values are estimated again on data that must move no parameter.
+    /// The problem of one case alone: the tuners of this case (free start values, and all with `per-case = true`) are active,
+    /// all else keeps the values in `tuners`. This estimates what is local to an experiment whose data must move no parameter
+    /// of the study.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
-        let starts: Vec<&str> =
-            study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect();
-        let moves =
-            |tuner: &Tuner| tuner.active && tuner.case == Some(case) && starts.contains(&tuner.parameter.as_str());
+        let moves = |tuner: &Tuner| tuner.active && tuner.case == Some(case);
         let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
@@ -320,8 +321,7 @@ impl Problem {
                     for (row, value) in values {
                         match value {
                             Ok(value) => {
-                                let scaled = study.rows[row].demand.scale(value.number);
-                                readings[row] = Some(Reading { value: value.number, scaled, note: value.note });
+                                readings[row] = Some(study.rows[row].reading(&value));
                                 residuals[row] = value.residuals;
                             }
                             Err(why) => {
@@ -361,7 +361,7 @@ impl Problem {
     /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
     /// has no exact ones. `reach` is the distance within which they are to describe the problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
-        self.scaled_slopes(self.row_slopes(at, reach)?)
+        self.scaled_slopes(at, self.row_slopes(at, reach)?)
     }
 
     /// The same where the derivatives of the rows may be known already.
@@ -375,7 +375,7 @@ impl Problem {
         let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
         // Of derivatives that were cut off nothing is known.
         let learned = (new && (rows.is_some() || !self.is_cancelled())).then(|| rows.clone());
-        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(rows)), learned }
+        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
     }
 
     /// Whether known derivatives are all that this problem asks for.
@@ -409,14 +409,13 @@ impl Problem {
     }
 
     /// Slopes of the scaled values and of the weighted residuals.
-    fn scaled_slopes(&self, of_rows: KnownSlopes) -> Option<Slopes> {
-        let study = &self.study;
-        let n = self.active.len();
-        let mut rows = vec![vec![0.0; n]; study.rows.len()];
-        let mut residuals = vec![vec![Vec::new(); study.rows.len()]; n];
+    fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes) -> Option<Slopes> {
+        let (count, n) = (self.study.rows.len(), self.active.len());
+        let mut rows = vec![vec![0.0; n]; count];
+        let mut residuals = vec![vec![Vec::new(); count]; n];
         for (row, slopes) in of_rows.into_iter().filter(|(row, _)| self.shape.rows[*row].0 != Usage::Monitor) {
             for (j, slope) in slopes.into_iter().enumerate() {
-                rows[row][j] = study.rows[row].demand.scale(slope.number) - study.rows[row].demand.scale(0.0);
+                rows[row][j] = slope.number * at.readings[row].map_or(f64::NAN, |reading| reading.slope);
                 residuals[j][row] = slope.residuals;
             }
         }
@@ -486,18 +485,26 @@ impl Problem {
         if self.shape.objective != Objective::Sum {
             return all;
         }
-        for ((row, (usage, weight)), residuals) in self.study.rows.iter().zip(&self.shape.rows).zip(of_rows) {
-            if *usage != Usage::Minimise {
-                continue;
-            }
-            let Demand::Value(demand) = row.demand else { return Vec::new() };
-            if residuals.is_empty() {
-                return Vec::new();
-            }
-            let factor = (weight / demand).sqrt();
+        for (row, residuals) in of_rows.into_iter().enumerate().filter(|(row, _)| self.is_minimised(*row)) {
+            let Some(factor) = self.residual_factor(row).filter(|_| !residuals.is_empty()) else { return Vec::new() };
             all.extend(residuals.into_iter().map(|r| factor * r));
         }
         all
+    }
+
+    /// Whether a row enters the objective.
+    pub(crate) fn is_minimised(&self, row: usize) -> bool {
+        self.shape.rows[row].0 == Usage::Minimise
+    }
+
+    /// Factor of the residuals of a row in the residual vector: the root of weight / demand; `None` without such a demand.
+    pub(crate) fn residual_factor(&self, row: usize) -> Option<f64> {
+        match self.study.rows[row] {
+            Row { demand: Demand::AtMost(demand), reversed: false, .. } => {
+                Some((self.shape.rows[row].1 / demand).sqrt())
+            }
+            _ => None,
+        }
     }
 }
 
@@ -523,7 +530,7 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
 /// Values of a job as they are kept where nobody needs the terms of sums of squares.
 fn without_residuals(values: &JobValues) -> JobValues {
     let bare = |(row, value): &RowValue| {
-        let value = value.as_ref().map(|v| Value { number: v.number, residuals: Vec::new(), note: v.note });
+        let value = value.as_ref().map(|v| Value { residuals: Vec::new(), ..v.clone() });
         (*row, value.map_err(Clone::clone))
     };
     values.as_ref().map(|values| values.iter().map(bare).collect()).map_err(Clone::clone)

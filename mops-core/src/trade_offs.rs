@@ -93,12 +93,8 @@ impl TradeOffs {
         let nearest = (0..points.len()).min_by(|&a, &b| worst(a).total_cmp(&worst(b)))?;
         let ranges = front::ranges(&scaled, m);
         // A scaled value, with its weight, per unit of the criterion: negative where more is better.
-        let slopes: Vec<f64> = rows
-            .iter()
-            .map(|&row| {
-                study.rows[row].weight * (study.rows[row].demand.scale(1.0) - study.rows[row].demand.scale(0.0))
-            })
-            .collect();
+        let slopes: Vec<f64> =
+            rows.iter().map(|&row| study.rows[row].weight * study.rows[row].demand.slope()).collect();
         let spread: Vec<f64> =
             ranges.iter().zip(&slopes).map(|([low, high], slope)| (high - low) / slope.abs()).collect();
         let weights = |of: &[f64]| {

@@ -32,9 +32,10 @@ pub struct ProfileReport {
     /// The interval within which the likelihood ratio stays below its limit; an end is null where the data set none.
     pub interval: [f64; 2],
     /// What ends the interval below and above: `data`, `bound` (the profile meets a bound of the tuner first), or `open`
-    /// (nothing did within the distance that was tried).
+    /// (the end was not found: simulations failed on the way to it, or the run was interrupted).
     pub ends: [&'static str; 2],
-    /// The interval to first order: estimate +- t quantile times standard error.
+    /// The interval to first order: estimate +- t quantile times standard error; null where the data do not determine the
+    /// parameter.
     pub linear_interval: [f64; 2],
     /// Value of the parameter, and the signed root of the likelihood ratio: `(S - S_min)^(1/2) / s`, negative below the
     /// estimate; on a straight line where the model is linear.

@@ -122,7 +122,8 @@ fn fixed(study: &Study) -> Vec<Vec<String>> {
 
 fn demand(demand: Demand) -> String {
     match demand {
-        Demand::Value(value) => number(value),
+        Demand::AtMost(value) => number(value),
+        Demand::AtLeast(value) => format!("at least {}", number(value)),
         Demand::Pair { good, bad } => format!("{} .. {}", number(good), number(bad)),
         Demand::None => String::new(),
     }

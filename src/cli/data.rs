@@ -28,8 +28,8 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         print(&excitation(&file, column, &arguments.file.display().to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let time = names.iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
-    let times = time.map(|name| file.column(name)).transpose()?.map(|column| column.values);
+    let time = file.time_column();
+    let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
     let longest = times.map_or(f64::INFINITY, longest_step);
     let mut rows = Vec::new();
     let mut sampling = String::new();
@@ -39,7 +39,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         let finite = || column.values.iter().copied().filter(|v| v.is_finite());
         let (mut count, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
         finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
-        if matches!(name.to_lowercase().as_str(), "t" | "time") {
+        if time.as_ref() == Some(name) {
             sampling = sample_time(name, &finite().collect::<Vec<f64>>());
         }
         rows.push(vec![
@@ -74,7 +74,7 @@ fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagno
         return Err(Diagnostic::new(format!("`{name}` has a gap at row {}", gap + 1))
             .with_help("an input must be known throughout: fill the gap, or cut the file"));
     }
-    let time = file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"));
+    let time = file.time_column();
     let step = match time {
         Some(time) => spacing(file.column(&time)?.values).ok_or_else(|| {
             Diagnostic::new(format!("the samples are not equally spaced in `{time}`"))

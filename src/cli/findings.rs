@@ -96,7 +96,11 @@ fn sensitivity(found: &SensitivityReport) -> String {
                 (text, _) => text,
             },
             known(t.inflation),
-            if t.trust == "undetermined" || t.std_error.is_finite() { t.trust.to_owned() } else { String::new() },
+            match t.trust {
+                "weak" if t.relative_error > 1.0 => "practically not identifiable".to_owned(),
+                trust if trust == "undetermined" || t.std_error.is_finite() => trust.to_owned(),
+                _ => String::new(),
+            },
         ]
     });
     let header = ["tuner", "value", "unit", "effect", "std. error", "alone", "relative", "factor", ""];

@@ -5,20 +5,25 @@ use mops_core::linear::{Complex, FrequencyResponse, eigenvalues, zeros};
 
 use crate::report::{Curve, CurveStyle, Ink, Plot, Sweep, bode, frequencies};
 
-/// The plots of a system with one input and one output, with the names of their files.
-pub(super) fn plots(system: &StateSpace, name: &str) -> Result<Vec<(&'static str, Plot)>, String> {
+/// The plots of a system with one input and one output, with the names of their files; or why one is not drawn.
+pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Result<Plot, String>)> {
+    let mut all = match of_frequencies(system, name) {
+        Ok([magnitude, phase, nyquist]) => {
+            vec![("bode-magnitude", Ok(magnitude)), ("bode-phase", Ok(phase)), ("nyquist", Ok(nyquist))]
+        }
+        Err(why) => ["bode-magnitude", "bode-phase", "nyquist"].map(|kind| (kind, Err(why.clone()))).into(),
+    };
+    all.push(("root-locus", root_locus(system, name)));
+    all
+}
+
+fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> {
     let response = system.response()?;
     let omegas = frequencies(system)?;
     let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
     let of_result = Sweep { name: String::new(), values: &values, ..Sweep::default() };
     let [magnitude, phase] = bode(&omegas, &[of_result], name);
-    let nyquist = nyquist(&response, &values, name);
-    Ok(vec![
-        ("bode-magnitude", magnitude),
-        ("bode-phase", phase),
-        ("nyquist", nyquist),
-        ("root-locus", root_locus(system, name)?),
-    ])
+    Ok([magnitude, phase, nyquist(&response, &values, name)])
 }
 
 fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
@@ -61,7 +66,11 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         if next >= 1e15 || (1.0 + k * direct) * (1.0 + next * direct) <= 0.0 {
             break;
         }
-        let roots = closed(next)?;
+        // A gain at which the poles are not found is passed over.
+        let Ok(roots) = closed(next) else {
+            k = next;
+            continue;
+        };
         let moved = matched(&branches, roots);
         let inside = |z: &Complex| z.norm() < 3.0 * size;
         let farthest = branches.iter().zip(&moved).map(|(b, z)| (b, (z - b[b.len() - 1]).norm()));

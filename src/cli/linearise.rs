@@ -1,23 +1,25 @@
 //! `mops linearise`: a model of a study as a linear system, and the design of state feedback for it.
 
-use std::path::{Path, PathBuf};
+mod feedback;
+mod files;
+mod text;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::linear::{Complex, TransferFunction, eigenvalues, lqr, place, zeros};
+use mops_core::linear::{Complex, TransferFunction, zeros};
 use mops_core::{
     Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, Linearise, Linearised, Mistake, Quantity, Resting,
-    StateSpace, Study, Unit, Variable, suggestion,
+    StateSpace, Study, suggestion,
 };
 use serde_json::{Value, json};
 
-use super::families::folded;
+use self::feedback::Wanted;
+use self::text::MANY;
 use super::study::{StudyArguments, open};
-use super::tables::{number, table};
-use super::{Trouble, cannot_write, linear_plots, print};
-use crate::files;
-use crate::report::file_name;
+use super::{Trouble, print};
 
 /// What is linearised, and what is done with it.
 #[derive(Args)]
@@ -66,63 +68,87 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     let interface = study.models[model].1.interface();
     let system = narrowed(&found.system, arguments)?;
 
+    let wanted = Wanted::of(&system, arguments)?;
+
     print(&format!("{name} in case {}\n", case.name))?;
     let states = study.models[model].1.equation_states();
     if !states.is_empty() {
-        print(&format!("\n{}", operating_point(&states, &interface.inputs, &found)))?;
+        print(&format!("\n{}", text::operating_point(&states, &interface.inputs, &found)))?;
         for joint in &found.frictionless {
             print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"))?;
         }
+        for rough in found.rough.iter().filter(|rough| system.outputs.contains(&rough.of)) {
+            print(&format!("note: {rough}; C and D hold on one side\n"))?;
+        }
     }
-    let unit = |name: &str| unit_of(name, &states, &interface.inputs, &interface.signals);
-    print(&matrices(&system, &unit))?;
-    let poles = system.poles().map_err(Trouble::Failure)?;
-    print(&poles_table("pole", &poles))?;
-    let mut channels = Vec::new();
+    let unit = |name: &str| text::unit_of(name, &states, &interface.inputs, &interface.signals);
+    print(&text::matrices(&system, &unit))?;
+    let poles = system.poles();
+    match &poles {
+        Ok(poles) => print(&(text::poles_table("pole", poles) + &text::undecided_note(&system.a)))?,
+        Err(why) => print(&format!("\nnote: no poles: {why}\n"))?,
+    }
+    let known: &[Complex] = poles.as_deref().unwrap_or_default();
+    let channels = channels(&system, known, arguments.out.is_some())?;
+    let feedback = wanted.map(|wanted| wanted.design(&system, &unit));
+    if let Some(Ok((text, _))) = &feedback {
+        print(text)?;
+    }
+    if let Some(folder) = &arguments.out {
+        let feedback = match &feedback {
+            Some(Ok((_, value))) => value.clone(),
+            _ => Value::Null,
+        };
+        let content = json!({
+            "model": name, "case": case.name, "states": system.states, "inputs": system.inputs, "outputs": system.outputs,
+            "a": rows(&system.a), "b": rows(&system.b), "c": rows(&system.c), "d": rows(&system.d), "delay": system.delay,
+            "at": { "states": found.states, "inputs": found.inputs, "rates": found.rates },
+            "poles": poles.ok().map(|poles| complex(&poles)), "channels": channels, "feedback": feedback,
+        });
+        print(&files::write(folder, &system, &content)?)?;
+    }
+    // A design that fails drops nothing else.
+    feedback.transpose()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints zeros and transfer functions of the channels, and gives them as JSON: of `all`, or of those that are shown.
+fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Value>, Trouble> {
+    let mut values = Vec::new();
     let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
     for (count, (i, o)) in pairs.enumerate() {
-        if count >= MANY && arguments.out.is_none() {
+        if count >= MANY && !all {
             break;
         }
-        let (text, value) = channel(&system.channel(i, o), &poles).map_err(Trouble::Failure)?;
+        let channel = system.channel(i, o);
+        let (input, output) = (&channel.inputs[0], &channel.outputs[0]);
+        let found = zeros(&channel).and_then(|zeros| Ok((TransferFunction::of(&channel)?, zeros)));
+        let (text, value) = match found {
+            Ok((function, zeros)) => {
+                let TransferFunction { numerator, denominator, delay } = &function;
+                let value = json!({
+                    "input": input, "output": output, "zeros": complex(&zeros),
+                    "numerator": numerator, "denominator": denominator, "delay": delay,
+                });
+                (text::channel(&channel, &zeros, &function, poles), value)
+            }
+            Err(why) => {
+                let nothing =
+                    json!({ "input": input, "output": output, "zeros": null, "numerator": null, "denominator": null });
+                (format!("  note: no transfer function: {why}\n"), nothing)
+            }
+        };
         if count < MANY {
-            print(&text)?;
+            print(&format!("\n{output}/{input}\n{text}"))?;
         }
-        channels.push(value);
+        values.push(value);
     }
     let unseen = (system.inputs.len() * system.outputs.len()).saturating_sub(MANY);
     if unseen > 0 {
         print(&format!("\nand {unseen} more; --input and --output pick one, {WHERE} has all\n"))?;
     }
-    let feedback = match design(&system, arguments)? {
-        Some((heading, k)) => {
-            let closed = eigenvalues(&(&system.a - &system.b * &k)).map_err(Trouble::Failure)?;
-            let labels = |names: &[String]| labels(names, &unit);
-            let shown = rounded_matrix(&k);
-            print(&format!(
-                "\n{heading}, u = -K x\n\n{}",
-                named("K", &shown, &labels(&system.inputs), &labels(&system.states))
-            ))?;
-            print(&poles_table("closed-loop pole", &closed))?;
-            json!({ "k": rows(&k), "poles": complex(&closed) })
-        }
-        None => Value::Null,
-    };
-    if let Some(folder) = &arguments.out {
-        let content = json!({
-            "model": name, "case": case.name, "states": system.states, "inputs": system.inputs, "outputs": system.outputs,
-            "a": rows(&system.a), "b": rows(&system.b), "c": rows(&system.c), "d": rows(&system.d), "delay": system.delay,
-            "at": { "states": found.states, "inputs": found.inputs, "rates": found.rates },
-            "poles": complex(&system.poles().map_err(Trouble::Failure)?), "channels": channels, "feedback": feedback,
-        });
-        write(folder, &system, &content)?;
-        print(&format!("\nlinearised.json and plots are in {}\n", folder.display()))?;
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(values)
 }
-
-/// From how many states and channels on the terminal does not show all.
-const MANY: usize = 12;
 
 /// Where what is not shown can be found.
 const WHERE: &str = "linearised.json (--out DIR)";
@@ -204,6 +230,7 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
                     inputs: Vec::new(),
                     rates: Vec::new(),
                     frictionless: Vec::new(),
+                    rough: Vec::new(),
                     system,
                 };
                 Ok(none)
@@ -214,7 +241,13 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
     let options =
         Linearise { at, equilibrium: arguments.equilibrium, free: arguments.free.clone(), ..Linearise::default() };
     let told = |Mistake { message, help, .. }: Mistake| Diagnostic { help, ..Diagnostic::new(message) };
-    Linearised::new(Arc::clone(model), &options).map_err(told)?.at(case, parameters).map_err(undefined)
+    let found = Linearised::new(Arc::clone(model), &options).map_err(told)?.at(case, parameters).map_err(undefined)?;
+    match found.rough.iter().find(|rough| rough.is_rate) {
+        Some(rough) => Err(Trouble::Failure(format!(
+            "the model cannot be linearised there: {rough}; --at chooses another operating point"
+        ))),
+        None => Ok(found),
+    }
 }
 
 /// The system with the inputs and outputs that are asked for.
@@ -244,228 +277,10 @@ fn narrowed(system: &StateSpace, arguments: &Arguments) -> Result<StateSpace, Di
     })
 }
 
-fn operating_point(states: &[Variable], inputs: &[Variable], found: &Resting) -> String {
-    let of_states = states.iter().zip(found.states.iter().zip(&found.rates));
-    let of_states =
-        of_states.map(|(v, (value, rate))| vec![v.name.clone(), number(*value), v.unit.to_string(), number(*rate)]);
-    let of_inputs = inputs.iter().zip(&found.inputs);
-    let of_inputs = of_inputs.map(|(v, value)| vec![v.name.clone(), number(*value), v.unit.to_string(), String::new()]);
-    let header = ["operating point", "value", "unit", "rate per s"];
-    let mut text = table(&header, &[1, 3], folded(of_states.chain(of_inputs).collect(), 0));
-    if found.rates.iter().any(|rate| rate.abs() > 1e-9) {
-        text += "note: the model does not rest there; --equilibrium searches where it does\n";
-    }
-    text
-}
-
-fn unit_of(name: &str, states: &[Variable], inputs: &[Variable], signals: &[Variable]) -> String {
-    let variable = states.iter().chain(inputs).chain(signals).find(|v| v.name == name);
-    variable.map(|v| v.unit.to_string()).filter(|unit| unit != "1").unwrap_or_default()
-}
-
-/// Names with their units.
-fn labels(names: &[String], unit: &dyn Fn(&str) -> String) -> Vec<String> {
-    let label = |name: &String| match unit(name) {
-        unit if unit.is_empty() => name.clone(),
-        unit => format!("{name} [{unit}]"),
-    };
-    names.iter().map(label).collect()
-}
-
-fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> String {
-    let rate = |name: &String| match unit(name) {
-        unit if unit.is_empty() => format!("{name}' [1/s]"),
-        unit => format!("{name}' [{}]", Unit::known(&unit).power(1, -1)),
-    };
-    let (states, rates) = (labels(&system.states, unit), system.states.iter().map(rate).collect());
-    let (inputs, outputs) = (labels(&system.inputs, unit), labels(&system.outputs, unit));
-    let mut text = String::new();
-    if system.order() > MANY {
-        text += &format!("\nA, B, C and D, with {} states, are in {WHERE}\n", system.order());
-    }
-    for (name, matrix, rows, columns) in [
-        ("A", &system.a, &rates, &states),
-        ("B", &system.b, &rates, &inputs),
-        ("C", &system.c, &outputs, &states),
-        ("D", &system.d, &outputs, &inputs),
-    ] {
-        if system.order() > MANY {
-            break;
-        }
-        text += &format!("\n{}", named(name, matrix, rows, columns));
-    }
-    if system.delay != 0.0 {
-        text += &format!("\ninputs act with a delay of {} s\n", number(system.delay));
-    }
-    text
-}
-
-fn named(name: &str, matrix: &nalgebra::DMatrix<f64>, rows: &[String], columns: &[String]) -> String {
-    let header: Vec<&str> = [name].into_iter().chain(columns.iter().map(String::as_str)).collect();
-    let numeric: Vec<usize> = (1..=columns.len()).collect();
-    let line = |(i, row): (usize, &String)| {
-        [row.clone()].into_iter().chain(matrix.row(i).iter().map(|x| number(*x))).collect()
-    };
-    table(&header, &numeric, rows.iter().enumerate().map(line).collect())
-}
-
-/// Numbers of which nothing is left that is rounding beside the largest of `all`.
-fn rounded(numbers: &[Complex], all: &[Complex]) -> Vec<Complex> {
-    let largest = all.iter().chain(numbers).map(|z| z.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
-    // Poles of one system may well lie nine decades apart.
-    let part = |part: f64, size: f64| if part.abs() < 1e-12 * largest || part.abs() < 1e-9 * size { 0.0 } else { part };
-    numbers.iter().map(|z| Complex::new(part(z.re, z.norm()), part(z.im, z.norm()))).collect()
-}
-
-/// A matrix without what is rounding beside its largest entry.
-fn rounded_matrix(matrix: &nalgebra::DMatrix<f64>) -> nalgebra::DMatrix<f64> {
-    let largest = matrix.amax();
-    matrix.map(|x| if x.abs() < 1e-9 * largest { 0.0 } else { x })
-}
-
-/// A polynomial, its highest power first, without the terms that are rounding beside the others at every frequency of the
-/// poles.
-fn rounded_polynomial(coefficients: &[f64], poles: &[Complex]) -> Vec<f64> {
-    let degree = coefficients.len().saturating_sub(1);
-    let poles = rounded(poles, poles);
-    let frequencies: Vec<f64> = poles.iter().map(|pole| pole.norm()).filter(|size| *size > 0.0).collect();
-    let term = |i: usize, omega: f64| coefficients[i].abs() * omega.powi((degree - i) as i32);
-    let counts = |i: usize, omega: f64| {
-        let largest = (0..=degree).map(|j| term(j, omega)).fold(0.0, f64::max);
-        term(i, omega) >= 1e-9 * largest
-    };
-    let frequencies = if frequencies.is_empty() { vec![1.0] } else { frequencies };
-    let kept = |(i, &c): (usize, &f64)| if frequencies.iter().any(|&omega| counts(i, omega)) { c } else { 0.0 };
-    coefficients.iter().enumerate().map(kept).collect()
-}
-
-fn spelled(z: Complex) -> String {
-    match z.im {
-        0.0 => number(z.re),
-        im => format!("{} {} {}i", number(z.re), if im > 0.0 { "+" } else { "-" }, number(im.abs())),
-    }
-}
-
-fn poles_table(what: &str, poles: &[Complex]) -> String {
-    let mut sorted = rounded(poles, poles);
-    sorted.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
-    let row = |p: &Complex| {
-        let damping = if p.norm() == 0.0 { String::new() } else { number(-p.re / p.norm()) };
-        let constant = if p.re < 0.0 { number(-1.0 / p.re) } else { String::new() };
-        vec![spelled(*p), damping, number(p.norm()), constant]
-    };
-    let header = [&format!("{what} (1/s)"), "damping", "frequency (rad/s)", "time constant (s)"];
-    format!("\n{}", table(&header, &[1, 2, 3], sorted.iter().map(row).collect()))
-}
-
-/// Zeros and transfer function of one channel, as text and as JSON.
-fn channel(system: &StateSpace, poles: &[Complex]) -> Result<(String, Value), String> {
-    let zeros = zeros(system)?;
-    let function = TransferFunction::of(system)?;
-    let spelled_zeros: Vec<String> = rounded(&zeros, poles).iter().map(|z| spelled(*z)).collect();
-    let spelled_zeros = match spelled_zeros.len() {
-        count if count > MANY => vec![format!("{count} of them, in {WHERE}")],
-        _ => spelled_zeros,
-    };
-    let (input, output) = (&system.inputs[0], &system.outputs[0]);
-    let is_zero = function.numerator.iter().all(|c| *c == 0.0);
-    let text = match (is_zero, spelled_zeros.is_empty()) {
-        (true, _) => "  0\n".to_owned(),
-        (false, empty) => format!(
-            "{}  zeros (1/s): {}\n",
-            if system.order() > MANY { String::new() } else { format!("  {}\n", quotient(&function, poles)) },
-            if empty { "none".to_owned() } else { spelled_zeros.join(", ") }
-        ),
-    };
-    let value = json!({
-        "input": input, "output": output, "zeros": complex(&zeros),
-        "numerator": function.numerator, "denominator": function.denominator, "delay": function.delay,
-    });
-    Ok((format!("\n{output}/{input}\n{text}"), value))
-}
-
-fn quotient(function: &TransferFunction, poles: &[Complex]) -> String {
-    let polynomial = |coefficients: &[f64]| {
-        let degree = coefficients.len() - 1;
-        let mut text = String::new();
-        for (i, &c) in coefficients.iter().enumerate().filter(|(_, c)| **c != 0.0) {
-            let sign = match (text.is_empty(), c < 0.0) {
-                (true, false) => "",
-                (true, true) => "-",
-                (false, false) => " + ",
-                (false, true) => " - ",
-            };
-            let power = match degree - i {
-                0 => String::new(),
-                1 => "s".to_owned(),
-                power => format!("s^{power}"),
-            };
-            let factor = if c.abs() == 1.0 && !power.is_empty() { String::new() } else { number(c.abs()) };
-            let space = if factor.is_empty() || power.is_empty() { "" } else { " " };
-            text += &format!("{sign}{factor}{space}{power}");
-        }
-        text
-    };
-    let delay = if function.delay == 0.0 { String::new() } else { format!(" exp(-{} s)", number(function.delay)) };
-    let [numerator, denominator] =
-        [&function.numerator, &function.denominator].map(|p| polynomial(&rounded_polynomial(p, poles)));
-    format!("({numerator})/({denominator}){delay}")
-}
-
-/// The state feedback that is asked for.
-fn design(
-    system: &StateSpace,
-    arguments: &Arguments,
-) -> Result<Option<(&'static str, nalgebra::DMatrix<f64>)>, Diagnostic> {
-    let (n, m) = (system.order(), system.inputs.len());
-    if let Some(text) = &arguments.place {
-        let poles: Vec<Complex> = text
-            .split(',')
-            .map(|part| {
-                let part: String = part.split_whitespace().collect();
-                part.parse().map_err(|_| {
-                    Diagnostic::new(format!("`--place`: `{part}` is no number"))
-                        .with_help("write real poles as -5, pairs as -2+3i,-2-3i")
-                })
-            })
-            .collect::<Result<_, _>>()?;
-        let k = place(&system.a, &system.b, &poles).map_err(|why| Diagnostic::new(format!("`--place`: {why}")))?;
-        return Ok(Some(("pole placement", k)));
-    }
-    let Some(text) = &arguments.lqr else { return Ok(None) };
-    let weights: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    if weights.len() != n + m || text.split(',').count() != n + m {
-        return Err(Diagnostic::new(format!("`--lqr` takes {n} weights of states and {m} of inputs, not `{text}`"))
-            .with_help(format!("in the order {}, {}", system.states.join(", "), system.inputs.join(", "))));
-    }
-    let diagonal = |list: &[f64]| nalgebra::DMatrix::from_diagonal(&nalgebra::DVector::from_column_slice(list));
-    let k = lqr(&system.a, &system.b, &diagonal(&weights[..n]), &diagonal(&weights[n..]));
-    Ok(Some(("linear-quadratic feedback", k.map_err(|why| Diagnostic::new(format!("`--lqr`: {why}")))?)))
-}
-
 fn rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 fn complex(numbers: &[Complex]) -> Vec<[f64; 2]> {
     numbers.iter().map(|z| [z.re, z.im]).collect()
-}
-
-fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<(), Trouble> {
-    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-    let path = folder.join("linearised.json");
-    let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
-    files::write(&path, text).map_err(cannot_write(&path))?;
-    for i in 0..system.inputs.len() {
-        for o in 0..system.outputs.len() {
-            let channel = system.channel(i, o);
-            let name = format!("{}/{}", channel.outputs[0], channel.inputs[0]);
-            for (kind, plot) in linear_plots::plots(&channel, &name).map_err(Trouble::Failure)? {
-                let path = folder.join(file_name(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0])));
-                files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
-                plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
-            }
-        }
-    }
-    Ok(())
 }

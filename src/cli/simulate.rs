@@ -152,6 +152,9 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     let mut text = table(&header, &[2, 3, 4, 5, 6, 7], folded(rows.collect(), 0));
     let work = response.work;
     text += &format!("\n{} steps, {} rejected, {} derivatives\n", work.steps, work.rejected, work.derivatives);
+    if work.rough > 0 {
+        text += &format!("in {} steps rounding limits the accuracy, not the tolerance\n", work.rough);
+    }
     for event in response.events.iter().take(20) {
         text += &format!("{:>12} s  {}\n", number(event.time), event.what);
     }

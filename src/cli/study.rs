@@ -1,6 +1,7 @@
 //! Opens studies, and shows what is wrong with them.
 
 use std::borrow::Cow;
+use std::convert::Infallible;
 use std::io::{ErrorKind, IsTerminal, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,14 +13,15 @@ use mops_core::{Catalogue, Diagnostic, Shipped, Source, suggestion};
 
 use crate::files;
 use crate::plain::plain;
+use crate::toml_text::quoted;
 
 /// Which study, and what goes over it.
 #[derive(Args)]
 pub(super) struct StudyArguments {
     /// A study file, or the name of a shipped study (see `mops list`).
     pub study: String,
-    /// Replace or add a value of the study: --set tuners.k.start=5.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    /// Replace or add a value of the study: --set tuners.k.start=5 --set study.task=sensitivity. What is not TOML is a text.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = as_toml)]
     pub settings: Vec<String>,
 }
 
@@ -70,6 +72,19 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
 /// Reads and checks a study.
 pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<StudyFile, Diagnostic> {
     open_as(catalogue, arguments, &[])
+}
+
+/// A setting as TOML: a value that is none is a text, `criteria.settling.demand=12 s`. Values that begin as TOML does, and
+/// numbers with a decimal comma, are left as they are, so that their mistakes are told.
+fn as_toml(setting: &str) -> Result<String, Infallible> {
+    let is_toml = toml::de::DeTable::parse(setting).is_ok();
+    let Some((key, value)) = setting.split_once('=').filter(|_| !is_toml) else { return Ok(setting.to_owned()) };
+    let value = value.trim();
+    let is_decimal_comma = value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || "+-,.".contains(c));
+    if value.is_empty() || value.starts_with(['"', '\'', '{', '[']) || is_decimal_comma {
+        return Ok(setting.to_owned());
+    }
+    Ok(format!("{key}={}", quoted(value)))
 }
 
 /// The same with more settings.

@@ -44,6 +44,7 @@ fn criteria_without(
     };
     let rows = start.iter().zip(best).map(|(start, best)| {
         let demand = match (best.demand, best.good, best.bad) {
+            (Some(demand), ..) if best.at_least => format!("at least {}", number(demand)),
             (Some(demand), ..) => number(demand),
             (None, Some(good), Some(bad)) => format!("{} .. {}", number(good), number(bad)),
             _ => String::new(),
@@ -62,8 +63,8 @@ fn criteria_without(
             best.name.clone(),
             usage(best.usage).to_owned(),
             demand,
-            number(start.value),
-            number(best.value),
+            beside_its_demand(start),
+            beside_its_demand(best),
             best.unit.clone(),
             scaled(start),
             scaled(best),
@@ -77,6 +78,12 @@ fn criteria_without(
         [] => table(&header, &[3, 4, 5, 7, 8], rows.collect()),
         left_out => without(left_out, &header, rows.collect()),
     }
+}
+
+/// The value of a criterion, with as many digits as it takes to tell it from a demand that it misses.
+fn beside_its_demand(criterion: &CriterionReport) -> String {
+    let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
+    crate::report::apart(criterion.value, limit, 6)
 }
 
 /// A table without some of its columns; those of numbers are the ones that hold nothing else.

@@ -13,8 +13,9 @@ pub(super) fn section(calibration: &CalibrationReport) -> Markup {
         @if !calibration.parameters.is_empty() {
             h3 { "Parameters" }
             p {
-                "Standard errors are to first order and for white residuals; where residuals are correlated, or the model is "
-                "wrong, they are too small."
+                "Standard errors are to first order, by the sandwich: they hold whatever the weights and the numbers of samples. "
+                "Intervals are by Student's t. Where residuals are correlated, or the model is wrong, intervals hold the truth less "
+                "often than 95 %."
             }
             (scrolling("Parameters", parameters(calibration)))
         }

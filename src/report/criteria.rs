@@ -4,12 +4,13 @@ use maud::{Markup, html};
 use mops_core::{CriterionReport, Task, Usage};
 
 use super::Report;
-use super::numbers::{number, significant, with_unit};
+use super::numbers::{apart, number, significant, with_unit};
 use super::page::scrolling;
 
 /// What a criterion is asked for, with its unit; `None` where it is only watched and nothing was asked.
 pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
     match (criterion.demand, criterion.good, criterion.bad) {
+        (Some(demand), _, _) if criterion.at_least => Some(format!("at least {}", with_unit(demand, &criterion.unit))),
         (Some(demand), _, _) => Some(with_unit(demand, &criterion.unit)),
         (None, Some(good), Some(bad)) => {
             let side = if good > bad { "at least" } else { "at most" };
@@ -54,8 +55,8 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                         @if models { td { (now.model) } }
                         td { (usage_name(now.usage, *usage)) @if *weight != 1.0 { small { "weight " (number(*weight)) } } }
                         td class="number" { @if asked.is_some() { (limit(now)) } @else { "none" } }
-                        @if two { td class="number" { (number(start.value)) } }
-                        td class="number" { strong { (number(now.value)) } }
+                        @if two { td class="number" { (beside_its_demand(start)) } }
+                        td class="number" { strong { (beside_its_demand(now)) } }
                         td { (now.unit) }
                         @if two { td class="number" { @if asked.is_some() { (scaled_number(start.scaled)) } } }
                         td { @if asked.is_some() { (scaled(now)) } }
@@ -68,10 +69,10 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
     html! {
         p {
             @if outcome.task == Task::Calibration {
-                "The objective is the sum of the scaled values of the calibration data, each the value by its demand: "
+                "The objective is the sum of the scaled values (value / demand) of the calibration data: "
                 strong { (number(outcome.objective)) } @if two { ", at the start " (number(outcome.start.objective)) } ". "
             } @else {
-                "A scaled value is the value by its demand: 0 is ideal, up to 1 the demand is met. "
+                "Scaled value = value / demand: 0 is ideal, at most 1 means the demand is met. "
             }
             @if outcome.task == Task::Design { "The design lowers the largest scaled value of the criteria that are minimised." }
         }
@@ -79,11 +80,20 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
     }
 }
 
+/// The value of a criterion, with as many digits as it takes to tell it from a demand that it misses.
+fn beside_its_demand(criterion: &CriterionReport) -> String {
+    let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
+    apart(criterion.value, limit, 5)
+}
+
 /// What is asked for, without the unit: it has a column of its own.
 fn limit(criterion: &CriterionReport) -> Markup {
     match (criterion.demand, criterion.good, criterion.bad) {
         (None, Some(good), Some(bad)) => html! { (number(bad)) small { "good: " (number(good)) } },
-        (demand, _, _) => html! { (number(demand.unwrap_or(f64::NAN))) },
+        (demand, _, _) => html! {
+            @if criterion.at_least { "at least " }
+            (number(demand.unwrap_or(f64::NAN)))
+        },
     }
 }
 

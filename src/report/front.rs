@@ -1,7 +1,7 @@
 //! The front: its points over every pair of criteria, the tuners along it, and a table of all of them.
 
 use maud::{Markup, html};
-use mops_core::{Analysis, Demand, Pareto, TradeOffs, Tuner};
+use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
 
 use super::Report;
 use super::figures::{Figure, Group};
@@ -67,11 +67,7 @@ fn criteria(report: &Report<'_>, found: &TradeOffs) -> Vec<Quantity> {
     let quantity = |k: usize| {
         let criterion = &found.criteria[k];
         let row = study.rows.iter().position(|row| study.key(row) == criterion.key).expect("a row of the study");
-        let demand = match study.rows[row].demand {
-            Demand::Value(demand) => Some(demand),
-            Demand::Pair { bad, .. } => Some(bad),
-            Demand::None => None,
-        };
+        let demand = study.rows[row].demand.limit();
         Quantity {
             name: if study.cases.len() > 1 { criterion.key.replace('/', ", ") } else { study.rows[row].name.clone() },
             unit: criterion.unit.clone(),

@@ -47,7 +47,7 @@ use mops_discrepancy::Diagnosis;
 use crate::files;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
-pub(crate) use numbers::{FileNames, file_name, significant};
+pub(crate) use numbers::{FileNames, apart, file_name, significant};
 pub(crate) use page::document;
 use pictures::Pictures;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};

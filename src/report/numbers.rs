@@ -5,6 +5,16 @@ pub(super) fn number(value: f64) -> String {
     significant(value, 5)
 }
 
+/// A number to so many significant digits, or to as many more as tell it from the limit that it misses.
+pub(crate) fn apart(value: f64, limit: Option<f64>, digits: usize) -> String {
+    /// Decimal digits that a number has.
+    const ALL: usize = 17;
+    let differs = |&digits: &usize| limit.is_none_or(|limit| significant(value, digits) != significant(limit, digits));
+    let digits =
+        if value.is_nan() || Some(value) == limit { digits } else { (digits..ALL).find(differs).unwrap_or(ALL) };
+    significant(value, digits)
+}
+
 /// A number to so many significant digits, without trailing zeros.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value.is_nan() {

@@ -45,7 +45,10 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
                 "range, where a value is 0). Along a direction with "
                 "a small eigenvalue the tuners may move together and hardly change anything. Slopes are "
                 (if found.slopes == "tangents" { "exact (tangents of the simulation)" } else { "central differences" })
-                "; singular values below " (number(found.zero)) " of the largest count as zero."
+                "; they do not resolve singular values below " (number(found.zero)) " of the largest."
+                @if measured {
+                    " A direction along which one standard error moves a tuner through its whole range is not determined."
+                }
             }
             (scrolling("Directions", directions(found)))
         }
@@ -107,6 +110,7 @@ fn verdict(tuner: &TunerSensitivity, measured: bool) -> Markup {
     match tuner.trust {
         "undetermined" => html! { span class="missed" { "not determined" } },
         _ if !measured => html! {},
+        "weak" if tuner.relative_error > 1.0 => html! { span class="missed" { "practically not identifiable" } },
         "weak" => html! { span class="above" { "uncertain" } },
         _ if tuner.std_error.is_finite() => html! { span class="met" { "determined" } },
         _ => html! {},

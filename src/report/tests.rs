@@ -156,6 +156,7 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
             case: study.case_of(row).name.clone(),
             usage: row.usage,
             demand: row.demand.limit(),
+            at_least: row.demand.asks_for_more(),
             good: None,
             bad: None,
             value: reading.map_or(f64::NAN, |r| r.value),

@@ -21,15 +21,16 @@ pub(super) fn section(found: &UncertaintyReport) -> Markup {
             p {
                 "One parameter is held, all others are estimated again. The root of the likelihood ratio, in standard errors, is a "
                 "straight line where the model is linear; where it is bent, the interval to first order is wrong. The interval ends "
-                "where the root meets the t quantile."
+                "where the root meets the t quantile. A parameter that the data do not determine has no interval to first order."
             }
             (scrolling("Profiles", profiles(&found.profiles)))
         }
         @if let Some(bootstrap) = &found.bootstrap {
             h3 { "Bootstrap" }
             p {
-                "Residuals are drawn anew in blocks of " (blocks(bootstrap)) " samples, and everything is estimated again: this holds "
-                "where residuals are correlated over less than a block. Intervals are percentiles of the replicates."
+                "Residuals, scaled to the noise that the standard errors rest on, are resampled in blocks of " (blocks(bootstrap))
+                " samples, and everything is estimated again: this holds where residuals are correlated over less than a block. "
+                "Intervals are percentiles of the replicates."
             }
             (scrolling("Bootstrap", replicates(bootstrap)))
         }
@@ -51,7 +52,7 @@ fn blocks(found: &BootstrapReport) -> String {
 
 fn end(value: f64, why: &str) -> Markup {
     html! {
-        @if value.is_finite() { (number(value)) } @else { "none found" }
+        @if value.is_finite() { (number(value)) } @else { "open" }
         @if why == "bound" { small { "bound of the tuner" } }
     }
 }
@@ -77,8 +78,9 @@ fn profiles(list: &[ProfileReport]) -> Markup {
                         td class="number" { (number(one.value)) }
                         td class="number" { (end(one.interval[0], one.ends[0])) }
                         td class="number" { (end(one.interval[1], one.ends[1])) }
-                        td class="number" { (number(one.linear_interval[0])) }
-                        td class="number" { (number(one.linear_interval[1])) }
+                        @for end in one.linear_interval {
+                            td class="number" { @if end.is_finite() { (number(end)) } }
+                        }
                         td { (one.unit) }
                     }
                 }
@@ -161,14 +163,15 @@ fn profile(one: &ProfileReport) -> Figure {
     let half = (one.linear_interval[1] - one.value) / one.limit;
     let ends = [one.points.first(), one.points.last()].map(|p| p.map_or(one.value, |p| p.0));
     let first_order = ends.map(|x| (x, (x - one.value) / half)).to_vec();
+    let first_order = line("to first order", first_order, Ink::Start, CurveStyle::Dashed);
     let ends = |y: f64| ends.map(|x| (x, y)).to_vec();
-    let curves = vec![
-        line("to first order", first_order, Ink::Start, CurveStyle::Dashed),
+    let mut curves: Vec<Curve> = half.is_finite().then_some(first_order).into_iter().collect();
+    curves.extend([
         line("root of the likelihood ratio", one.points.clone(), Ink::Result, CurveStyle::Line),
         line("", one.points.clone(), Ink::Result, CurveStyle::Dots),
         line("t quantile", ends(one.limit), Ink::Demand, CurveStyle::Line),
         line("", ends(-one.limit), Ink::Demand, CurveStyle::Line),
-    ];
+    ]);
     let plot = Plot {
         title: format!("Profile of {}", one.parameter),
         x_label: labelled(&one.parameter, &one.unit),

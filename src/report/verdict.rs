@@ -152,6 +152,13 @@ fn missed(criterion: &CriterionReport) -> String {
         (Some(demand), _) if criterion.usage == Usage::Equality => {
             format!("{place} is {}, but must be {}", with_unit(*value, unit), with_unit(demand, unit))
         }
+        (Some(demand), _) if value.is_nan() => {
+            let note = criterion.note.unwrap_or("no value");
+            format!("{place} is demanded to be {}: {note}", with_unit(demand, unit))
+        }
+        (Some(_), _) if criterion.at_least => {
+            format!("{place} falls short of its demand by {}", percent(criterion.scaled - 1.0))
+        }
         (Some(_), _) => format!("{place} exceeds its demand by {}", percent(criterion.scaled - 1.0)),
         (None, bad) => format!(
             "{place} is {}, where {} is demanded",

@@ -63,7 +63,7 @@ pub(super) fn slopes(bytes: &[u8]) -> Option<RowSlopes> {
     let mut slopes = RowSlopes::new();
     for (row, numbers) in lists(bytes)? {
         let (number, residuals) = numbers.split_first()?;
-        let slope = Value { number: *number, residuals: residuals.to_vec(), note: None };
+        let slope = Value { number: *number, residuals: residuals.to_vec(), ..Value::default() };
         match slopes.last_mut().filter(|(last, _)| *last == row) {
             Some((_, along)) => along.push(slope),
             None => slopes.push((row, vec![slope])),

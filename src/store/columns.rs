@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use mops_core::{Failure, JobValues, Known, Study, Value};
+use mops_core::{Failure, JobValues, Known, Missed, Study, Value};
 use rusqlite::Row;
 use serde_json::json;
 
@@ -24,6 +24,7 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
                     Failure::Diverged(t) => ("diverged", Some(t), None),
                     Failure::StepLimit(t) => ("step-limit", Some(t), None),
                     Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
+                    Failure::EventsAccumulate(t, why) => ("events-accumulate", Some(t), Some(why)),
                     Failure::Undefined(why) => ("undefined", None, Some(why)),
                     Failure::RecordLimit(t) => ("record-limit", Some(t), None),
                     Failure::Criterion(why) => ("criterion", None, Some(why)),
@@ -38,8 +39,11 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
                         Err(why) => failures.push(json!({ "row": row, "why": why })),
                         Ok(value) => {
                             criteria[*row] = value.number;
-                            if let Some(note) = value.note {
-                                notes.insert(row.to_string(), json!(note));
+                            let missed = value.missed.map(|missed| missed.horizon.map(|h| h.to_string()));
+                            match (value.note, missed) {
+                                (None, None) => {}
+                                (Some(note), None) => drop(notes.insert(row.to_string(), json!(note))),
+                                (note, Some(horizon)) => drop(notes.insert(row.to_string(), json!([note, horizon]))),
                             }
                             if !value.residuals.is_empty() {
                                 residuals.push((*row, &value.residuals));
@@ -87,8 +91,13 @@ pub(super) fn known(
                 return Some(Err(why["why"].as_str().unwrap_or_default().to_owned()));
             }
             let number = *criteria.get(index).filter(|number| number.is_finite())?;
-            let note = notes[index.to_string()].as_str().map(&mut *intern);
-            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note }))
+            // A note; or a note and a horizon, where nothing was reached.
+            let written = &notes[index.to_string()];
+            let missed = written
+                .is_array()
+                .then(|| Missed { horizon: written[1].as_str().and_then(|horizon| horizon.parse().ok()) });
+            let note = written.as_str().or(written[0].as_str()).map(&mut *intern);
+            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note, missed }))
         };
         let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
         let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();
@@ -106,6 +115,7 @@ fn failure_of(written: &serde_json::Value) -> Failure {
         Some("diverged") => Failure::Diverged(at),
         Some("step-limit") => Failure::StepLimit(at),
         Some("step-too-small") => Failure::StepTooSmall(at),
+        Some("events-accumulate") => Failure::EventsAccumulate(at, why),
         Some("record-limit") => Failure::RecordLimit(at),
         Some("criterion") => Failure::Criterion(why),
         _ => Failure::Undefined(why),

@@ -44,7 +44,7 @@ CREATE TABLE points (
     run INTEGER NOT NULL REFERENCES runs (id),
     tuners BLOB NOT NULL UNIQUE,       -- values of all tuners (and uncertain parameters), float64 little-endian
     criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN where there is none
-    notes TEXT,                        -- JSON: row -> what a reader must know of its value
+    notes TEXT,                        -- JSON: row -> note on its value, or [note, horizon] where it was never reached
     failures TEXT,                     -- JSON: jobs that failed, rows without a value
     residuals BLOB                     -- lists: row, length, float64; absent where none are needed or room is short
 );

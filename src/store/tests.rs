@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mops_core::file::{Files, StudyFile};
-use mops_core::{Failure, Known, Problem, RowSlopes, RowValue, Study, Value};
+use mops_core::{Failure, Known, Missed, Problem, RowSlopes, RowValue, Study, Value};
 
 use super::database::{Database, PointRow};
 use super::{FILE, Identity, Keeper, Refusal, RunState, Start, bytes, row};
@@ -51,12 +51,14 @@ fn what_is_written_of_a_point_is_read_bit_by_bit() {
     let odd = [0.1 + 0.2, -0.0, f64::MIN_POSITIVE / 3.0, 1e308];
     let value = |(i, row): (usize, usize)| -> RowValue {
         let note = (i == 0).then_some("not settled at the end");
-        (row, Ok(Value { number: odd[i % 4], residuals: if i == 1 { odd.to_vec() } else { Vec::new() }, note }))
+        let missed = (i < 2).then_some(Missed { horizon: (i == 0).then_some(0.1 + 0.2) });
+        (row, Ok(Value { number: odd[i % 4], residuals: if i == 1 { odd.to_vec() } else { Vec::new() }, note, missed }))
     };
     let failures = [
         Failure::Diverged(1.0 / 3.0),
         Failure::StepLimit(f64::INFINITY),
         Failure::StepTooSmall(0.1),
+        Failure::EventsAccumulate(0.3, "they come closer".into()),
         Failure::Undefined("a \"word\"".into()),
         Failure::Criterion("none".into()),
         Failure::RecordLimit(1e-3),
@@ -86,7 +88,7 @@ fn what_is_written_of_a_point_is_read_bit_by_bit() {
 #[test]
 fn derivatives_are_read_as_they_were_written_and_so_is_that_there_are_none() {
     let study = file("pid-design", &[]).study;
-    let slope = |number: f64, residuals: &[f64]| Value { number, residuals: residuals.to_vec(), note: None };
+    let slope = |number: f64, residuals: &[f64]| Value { number, residuals: residuals.to_vec(), ..Value::default() };
     let rows: RowSlopes = vec![
         (0, vec![slope(0.1 + 0.2, &[1.0, -0.0]), slope(-3.0, &[0.5, 1e-300])]),
         (1, vec![slope(1.0, &[]), slope(2.0, &[])]),

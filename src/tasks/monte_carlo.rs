@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::statistics::{Sampling, Summary, draw, quantile, quantile_interval, share_interval};
 use mops_core::{
-    Demand, DistributionReport, Evaluation, FEASIBLE, MonteCarloReport, MonteCarloTask, Problem, QuantileReport, Row,
+    Demand, DistributionReport, Evaluation, MonteCarloReport, MonteCarloTask, Problem, QuantileReport, Row,
     ShareReport, Study, Subject, Usage, Watch, stream, uncertain_reports,
 };
 
@@ -74,10 +74,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 
 /// Whether a sample meets the demand of a row; one without a value does not.
 fn met(row: &Row, at: &Evaluation, index: usize) -> bool {
-    at.readings[index].is_some_and(|reading| match row.usage {
-        Usage::Equality => (reading.scaled - 1.0).abs() <= FEASIBLE,
-        _ => reading.scaled <= 1.0 + FEASIBLE,
-    })
+    at.readings[index].is_some_and(|reading| row.is_met(reading.scaled))
 }
 
 #[allow(clippy::cast_precision_loss)]
@@ -92,7 +89,8 @@ fn distribution(
     answers: &[Evaluation],
     task: &MonteCarloTask,
 ) -> DistributionReport {
-    let mut values: Vec<f64> = answers.iter().filter_map(|e| e.readings[index].map(|r| r.value)).collect();
+    let values = answers.iter().filter_map(|e| e.readings[index].map(|r| r.value));
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
     values.sort_by(f64::total_cmp);
     let Summary { mean, deviation, min, max } = Summary::of(&values);
     let one = |&share: &f64| QuantileReport {

@@ -1,8 +1,8 @@
 //! `task = "sensitivity"`: which tuners, or which combinations of them, the data or the criteria determine; or which
 //! uncertain parameters matter.
 
-use mops_core::identification::sensitivity_at;
-use mops_core::{SensitivityMethod, Study, Watch};
+use mops_core::identification::{Point, sensitivity_at};
+use mops_core::{Place, SensitivityMethod, Study, Watch};
 
 use super::{at, global_sensitivity};
 use crate::solve::{Options, Solved, Unsuitable};
@@ -16,7 +16,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     }
     // A calibration has found it already.
     let known = solved.outcome.calibration.as_mut().and_then(|calibration| calibration.sensitivity.take());
-    let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, task.zero));
+    let point = if task.at == Place::Optimum { Point::Minimum } else { Point::Elsewhere };
+    let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, point, task.zero));
     if found.is_none() && watch.wants_stop() {
         solved.outcome.stop = watch.halt().into();
     } else if found.is_none() {

@@ -142,7 +142,7 @@ impl Live {
         let told = reports.into_iter().map(|criterion| {
             json!({
                 "name": criterion.name, "case": criterion.case, "usage": criterion.usage, "unit": criterion.unit,
-                "demand": criterion.demand.or(criterion.bad), "at_least": criterion.good > criterion.bad,
+                "demand": criterion.demand.or(criterion.bad), "at_least": criterion.at_least,
                 "value": criterion.value, "scaled": criterion.scaled, "met": criterion.met,
                 "constraint": matches!(criterion.usage, Usage::Inequality | Usage::Equality),
             })

@@ -1,8 +1,8 @@
 //! The integral criteria of the control error: they differ in the integrand only.
 
-use mops_core::{Analysis, Case, Criterion, Mistake, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, Mistake, Sense, Unit, Value, Variable};
 
-use super::{Step, StepOptions};
+use super::{NOT_NEGATIVE, Step, StepOptions};
 
 /// `integral f(t, |e|) dt` from the step to the end, with `e = y - target` and `t` counted from the step.
 pub struct ErrorIntegral {
@@ -32,6 +32,18 @@ impl Criterion for ErrorIntegral {
 
     fn signals(&self) -> Vec<String> {
         vec![self.step.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::Less
+    }
+
+    fn assumption(&self) -> Option<String> {
+        self.step.assumption()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        NOT_NEGATIVE
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

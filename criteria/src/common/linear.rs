@@ -1,7 +1,7 @@
 //! What criteria of linear systems share: the channel they read, and a value computed from it.
 
 use mops_core::linear::Loop;
-use mops_core::{Analysis, Case, Criterion, Interface, Mistake, StateSpace, Unit, Value, Variable, suggestion};
+use mops_core::{Analysis, Case, Criterion, Interface, Mistake, Sense, StateSpace, Unit, Value, Variable, suggestion};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -67,30 +67,56 @@ fn pick(key: &str, name: Option<&String>, known: &[Variable]) -> Result<usize, M
     }
 }
 
+/// What the values of a criterion are.
+#[derive(Debug, Clone)]
+pub struct Values {
+    unit: Unit,
+    sense: Sense,
+    range: [f64; 2],
+}
+
+impl Values {
+    /// Values of which any number is possible.
+    pub fn of(unit: Unit, sense: Sense) -> Self {
+        Self { unit, sense, range: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// Only values from `low` to `high` are possible.
+    pub fn within(self, low: f64, high: f64) -> Self {
+        Self { range: [low, high], ..self }
+    }
+}
+
 /// A criterion that is computed from one channel of a linear system.
 pub struct LinearCriterion<F> {
-    /// The channel.
-    pub channel: Channel,
-    /// Unit of the value.
-    pub unit: Unit,
+    channel: Channel,
+    values: Values,
     /// The value for the system of the channel.
-    pub value: F,
+    value: F,
 }
 
 impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync + 'static> LinearCriterion<F> {
     /// The criterion, ready to be given away.
-    pub fn boxed(channel: Channel, unit: Unit, value: F) -> Box<dyn Criterion> {
-        Box::new(Self { channel, unit, value })
+    pub fn boxed(channel: Channel, values: Values, value: F) -> Box<dyn Criterion> {
+        Box::new(Self { channel, values, value })
     }
 }
 
 impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for LinearCriterion<F> {
     fn unit(&self) -> Unit {
-        self.unit.clone()
+        self.values.unit.clone()
     }
 
     fn signals(&self) -> Vec<String> {
         vec![self.channel.signal.clone()]
+    }
+
+    fn sense(&self) -> Sense {
+        self.values.sense
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.values.range
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

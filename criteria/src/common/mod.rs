@@ -12,9 +12,12 @@ use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable, suggestion};
 
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
-pub use linear::{Channel, LinearCriterion, Of, capped, feedback, poles};
+pub use linear::{Channel, LinearCriterion, Of, Values, capped, feedback, poles};
 pub use part::part;
 pub use step::{Step, StepOptions};
+
+/// The range of values that are never negative.
+pub const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// The signal of that name.
 pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, Mistake> {

@@ -2,9 +2,12 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Mark, Mistake, Quantity, Trace, Unit, Variable};
+use mops_core::{Analysis, Mark, Mistake, Quantity, Trace, Unit, Value, Variable};
 
 use super::{optional, part, signal, step_time, trace};
+
+/// Share of a step that counts as near a level.
+const NEAR: f64 = 0.01;
 
 /// The options that say which step is looked at.
 pub struct StepOptions<'a> {
@@ -52,6 +55,12 @@ impl StepOptions<'_> {
 }
 
 impl Step {
+    /// What is assumed of the target where the study gives none.
+    pub fn assumption(&self) -> Option<String> {
+        let text = "no `target` is given: the value of the signal at the end of the simulation counts as the target";
+        self.target.is_none().then(|| text.to_owned())
+    }
+
     /// The response to the step.
     pub fn answer<'a>(&self, analysis: &'a Analysis) -> Result<Answer<'a>, String> {
         let whole = trace(analysis, &self.signal)?;
@@ -113,6 +122,22 @@ impl Answer<'_> {
     pub fn first_reaching(&self, fraction: f64) -> Result<Option<f64>, String> {
         let level = self.from + fraction * self.height()?;
         Ok(self.trace.first_reaching(level, self.rises()).map(|t| t - self.time))
+    }
+
+    /// What was asked for was never reached: the signal should have been at `level`, within `near` of it, in the last tenth of
+    /// the time from the step to the end.
+    pub fn missed(&self, horizon: f64, level: f64, near: f64, note: &'static str) -> Value {
+        let end = self.trace.end();
+        let tenth = 0.1 * self.length();
+        let tail = part(&self.trace, &[end - tenth, end], |_, y| y);
+        let distance = tail.integral_of_deviation(level, |_, e| e) / tenth;
+        Value::missed(Some(horizon), distance, near, note)
+    }
+
+    /// As [`Answer::missed`], where the signal should have come at least `fraction` of the way: near is 1 % of the step.
+    pub fn not_reached(&self, horizon: f64, fraction: f64, note: &'static str) -> Result<Value, String> {
+        let height = self.height()?;
+        Ok(self.missed(horizon, self.from + fraction * height, NEAR * height.abs(), note))
     }
 
     /// Time from the step to the end of the simulation, s.

@@ -3,9 +3,9 @@
 use mops_core::Mistake;
 use mops_core::expression::{Comparison, Form, Function, Node};
 
-use super::definition::Text;
+use super::definition::{Text, under};
 use super::graph::{Id, Level, Op};
-use super::lower::{Kinks, Lowering, Switch};
+use super::lower::{Kinks, Lowering, Order, Switch};
 
 impl Lowering<'_> {
     pub(super) fn call(
@@ -28,6 +28,7 @@ impl Lowering<'_> {
             let place = format!("in `{}`", function.name());
             values.push(self.without_rates(text, &argument.span, affine, &place)?);
         }
+        self.in_order(text, function, arguments, &values)?;
         let x = values[0];
         let one = self.graph.number(1.0);
         let zero = self.graph.number(0.0);
@@ -73,6 +74,36 @@ impl Lowering<'_> {
             Function::Table => self.table(x, &values[1..], kinks),
             smooth => self.graph.function(smooth, x),
         })
+    }
+
+    /// Limits and the x of a table must rise: numbers and constants are refused where they do not; what parameters decide is
+    /// looked at when a simulation begins.
+    fn in_order(&mut self, text: &Text, function: Function, nodes: &[Node], values: &[Id]) -> Result<(), Mistake> {
+        let (places, strict): (Vec<usize>, bool) = match function {
+            Function::Clip | Function::Deadzone => (vec![1, 2], false),
+            Function::Table => ((1..values.len()).step_by(2).collect(), true),
+            _ => return Ok(()),
+        };
+        let what = if strict { "the x of a `table`" } else { "the limits" };
+        for pair in places.windows(2) {
+            let (low, high) = (values[pair[0]], values[pair[1]]);
+            let wrong = |low: f64, high: f64| low > high || strict && low == high;
+            match (self.graph.constant(low), self.graph.constant(high)) {
+                (Some(a), Some(b)) if wrong(a, b) => {
+                    let fact = format!("{what} must rise, but {b} follows {a}");
+                    let mistake = Mistake::here(fact).with_help("write the smaller one first");
+                    return Err(under(&text.path, mistake.at(nodes[pair[1]].span.clone())));
+                }
+                (Some(_), Some(_)) => {}
+                _ if self.graph.level(low).max(self.graph.level(high)) < Level::Variable => {
+                    let place = text.path.join(".");
+                    let what = format!("{what} of `{}` in {place}", function.name());
+                    self.orders.push(Order { low, high, strict, what });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// `table(x, x1, y1, ..)`: the line that holds is found from the left.

@@ -54,6 +54,12 @@ pub struct Happening {
     pub guard: Program,
     /// Gives the new values of these states.
     pub resets: (Vec<usize>, Program),
+    /// Gives the values of these states where its events accumulate; no states where nothing is known of a rest.
+    pub at_rest: (Vec<usize>, Program),
+    /// What is reported where it comes to rest.
+    pub rests: String,
+    /// What is reported where it leaves its rest.
+    pub leaves: String,
 }
 
 /// A compiled model.
@@ -61,6 +67,8 @@ pub struct Happening {
 pub struct Compiled {
     /// Number of states.
     pub states: usize,
+    /// Their typical sizes, where they are declared.
+    pub scales: Vec<Option<f64>>,
     /// Number of parameters of the equations, without those that only are start values.
     pub parameters: usize,
     /// Registers.
@@ -73,6 +81,8 @@ pub struct Compiled {
     pub signals: Vec<Signal>,
     /// Conditions.
     pub switches: Vec<Switch>,
+    /// What must rise for a message and whether strictly; gives pairs of low and high.
+    pub orders: (Vec<(String, bool)>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,
     /// Events.
@@ -123,12 +133,14 @@ impl Compiled {
         for switch in &system.switches {
             wanted.push(vec![graph.sub(switch.left, switch.right), switch.right]);
         }
+        wanted.push(system.orders.iter().flat_map(|order| [order.low, order.high]).collect());
         for c in &system.contacts {
             wanted.push(vec![c.torque, c.limit, c.coulomb, system.derivatives[c.velocity]]);
         }
         for happening in &system.happenings {
             wanted.push(vec![happening.guard]);
             wanted.push(happening.resets.iter().map(|(_, id)| *id).collect());
+            wanted.push(happening.at_rest.iter().map(|(_, id)| *id).collect());
         }
         let starts: Vec<(usize, Id)> =
             system.starts.iter().enumerate().filter_map(|(s, start)| Some((s, (*start)?))).collect();
@@ -148,6 +160,7 @@ impl Compiled {
         let switches =
             system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
         let switches = switches.collect();
+        let orders = (system.orders.iter().map(|order| (order.what.clone(), order.strict)).collect(), next());
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
@@ -155,19 +168,16 @@ impl Compiled {
             slides: format!("{} slides", names[contact.position]),
         };
         let joints = system.contacts.iter().map(|contact| joint(contact, next())).collect();
-        let happening = |h: &super::system::Happening, guard, resets| Happening {
+        let states = |values: &[(usize, Id)]| values.iter().map(|(state, _)| *state).collect();
+        let happening = |h: &super::system::Happening| Happening {
             name: h.name.clone(),
-            guard,
-            resets: (h.resets.iter().map(|(state, _)| *state).collect(), resets),
+            guard: next(),
+            resets: (states(&h.resets), next()),
+            at_rest: (states(&h.at_rest), next()),
+            rests: format!("{}: at rest", h.name),
+            leaves: format!("{}: leaves its rest", h.name),
         };
-        let happenings = system
-            .happenings
-            .iter()
-            .map(|h| {
-                let guard = next();
-                happening(h, guard, next())
-            })
-            .collect();
+        let happenings = system.happenings.iter().map(happening).collect();
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
         let matrices = system.matrices.iter().map(|_| next()).collect();
         let signals = system
@@ -188,12 +198,14 @@ impl Compiled {
         let columns = grouped(&pattern, names.len());
         Ok(Self {
             states: names.len(),
+            scales: system.scales.clone(),
             parameters,
             layout,
             setup,
             derivative,
             signals,
             switches,
+            orders,
             joints,
             happenings,
             starts,

@@ -68,6 +68,8 @@ pub struct When {
     pub guard: Text,
     /// New values of states.
     pub resets: Vec<(String, Text)>,
+    /// Values of states at which its events end where they accumulate.
+    pub at_rest: Vec<(String, Text)>,
 }
 
 /// A model as it is written, checked as far as one table at a time tells.
@@ -75,6 +77,8 @@ pub struct When {
 pub struct Definition {
     /// States, in order.
     pub states: Vec<Declared>,
+    /// Their typical sizes, where they are declared.
+    pub scales: Vec<Option<f64>>,
     /// Inputs, in order.
     pub inputs: Vec<Declared>,
     /// Parameters, in order.
@@ -164,7 +168,15 @@ impl Definition {
     pub fn read(options: &EquationsOptions) -> Result<Self, Mistake> {
         let mut d = Self::default();
         for (key, state) in &options.states.0 {
-            d.states.extend(declared("states", key, &state.0.unit, state.0.about.as_deref())?);
+            let states = declared("states", key, &state.0.unit, state.0.about.as_deref())?;
+            let scale = state.0.scale.as_ref().map(|scale| scale.to(&states[0].unit)).transpose();
+            let wrong = |why| under(&path(&["states", key, "scale"]), Mistake::here(why));
+            let scale = scale.map_err(wrong)?;
+            if let Some(scale) = scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
+                return Err(wrong(format!("expected a positive size, found {scale}")));
+            }
+            d.scales.extend(states.iter().map(|_| scale));
+            d.states.extend(states);
         }
         if d.states.is_empty() {
             return Err(Mistake::new("states", "the model has no state").with_help("as in states = { x = \"m\" }"));
@@ -295,16 +307,19 @@ impl Definition {
         let states = self.state_names();
         for (name, when) in &options.when.0 {
             let guard = Text::expression(path(&["when", name, "guard"]), &when.guard, None)?;
-            let mut resets = Vec::new();
-            for (state, formula) in &when.reset.0 {
-                let place = path(&["when", name, "reset", state]);
-                if !states.contains(state) {
-                    return Err(under(&place, Mistake::here(format!("the model has no state `{state}`")))
-                        .with_help(suggestion(state, states.iter().map(String::as_str))));
-                }
-                resets.push((state.clone(), Text::expression(place, formula, None)?));
-            }
-            self.when.push(When { name: name.clone(), guard, resets });
+            let values = |table: &str, entries: &[(String, Formula)]| {
+                let value = |(state, formula): &(String, Formula)| {
+                    let place = path(&["when", name, table, state]);
+                    if !states.contains(state) {
+                        return Err(under(&place, Mistake::here(format!("the model has no state `{state}`")))
+                            .with_help(suggestion(state, states.iter().map(String::as_str))));
+                    }
+                    Ok((state.clone(), Text::expression(place, formula, None)?))
+                };
+                entries.iter().map(value).collect::<Result<Vec<_>, _>>()
+            };
+            let (resets, at_rest) = (values("reset", &when.reset.0)?, values("at-rest", &when.at_rest.0)?);
+            self.when.push(When { name: name.clone(), guard, resets, at_rest });
         }
         for (name, port) in &options.ports.0 {
             self.ports.push((name.clone(), port.joint.clone(), path(&["ports", name, "joint"])));

@@ -40,6 +40,19 @@ pub struct Switch {
     pub jumps: bool,
 }
 
+/// Two arguments that parameters decide and that must rise.
+#[derive(Debug, Clone)]
+pub struct Order {
+    /// The first of them.
+    pub low: Id,
+    /// The second.
+    pub high: Id,
+    /// Whether they must differ.
+    pub strict: bool,
+    /// What they are, for a message.
+    pub what: String,
+}
+
 /// Definitions within definitions that one may lead to: each takes a part of the stack.
 const DEEPEST: usize = 200;
 
@@ -79,6 +92,8 @@ pub struct Lowering<'d> {
     pub graph: Graph,
     /// Switches so far.
     pub switches: Vec<Switch>,
+    /// What must rise, so far.
+    pub orders: Vec<Order>,
     /// Number of modes so far.
     pub modes: usize,
     /// What stands for each input.
@@ -125,6 +140,7 @@ impl<'d> Lowering<'d> {
             lets: HashMap::new(),
             graph: Graph::default(),
             switches: Vec::new(),
+            orders: Vec::new(),
             modes: 0,
             inputs: Vec::new(),
             depth: 0,

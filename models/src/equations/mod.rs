@@ -1,10 +1,12 @@
 //! Models written in the study file: their equations are read and compiled once, and run on a tape of their own.
 
 mod bank;
+mod bounds;
 mod branches;
 mod compiled;
 mod definition;
 mod graph;
+mod happenings;
 mod interface;
 mod key;
 mod layout;

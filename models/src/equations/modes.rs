@@ -4,7 +4,7 @@ use mops_core::{Failure, OperatingPoint, Scalar};
 
 use super::bank::Bank;
 use super::running::Running;
-use crate::kernel::{Dynamics, rests};
+use crate::kernel::{Dynamics, Tolerance, rests};
 
 impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X, B> {
     pub(super) fn set_mode(&mut self, mode: usize, value: f64) {
@@ -25,20 +25,22 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
     fn settle_switches(&mut self, t: f64, x: &[S]) {
         for k in 0..self.model.switches.len() {
             let switch = &self.model.switches[k];
-            let [difference, right] = self.results(&switch.sides, t, x).map(Scalar::value);
+            let sides @ [difference, _] = self.results(&switch.sides, t, x).map(Scalar::value);
             let holds = difference > 0.0 || difference == 0.0 && !switch.strict;
             self.set_mode(switch.mode, f64::from(u8::from(holds)));
-            self.set_slack(k, 0.0, right);
+            self.set_slack(k, sides);
         }
     }
 
-    /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly, or
-    /// from where rounding left it.
-    pub(super) fn set_slack(&mut self, k: usize, guard: f64, right: f64) {
-        self.slack[k] = if self.model.switches[k].jumps {
-            (-guard).max(0.0)
-        } else {
-            0.1 * (self.tolerance.absolute + self.tolerance.relative * right.abs())
+    /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly. The size that
+    /// the tolerance is relative to is that of the sides of the condition, now or where it was looked at before.
+    pub(super) fn set_slack(&mut self, k: usize, [difference, right]: [f64; 2]) {
+        let Tolerance { relative, absolute, .. } = self.tolerance;
+        let size = &mut self.spans[k];
+        *size = size.max(difference.abs()).max(right.abs());
+        self.slack[k] = match self.model.switches[k].jumps {
+            true => 0.0,
+            false => 0.1 * (absolute.unwrap_or(0.0) + relative * *size),
         };
     }
 
@@ -126,6 +128,16 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
                 )));
             }
         }
+        let (orders, tape) = &self.model.orders;
+        let mut bank = self.bank.borrow_mut();
+        tape.run(&mut *bank);
+        for ((what, strict), pair) in orders.iter().zip(tape.results.chunks(2)) {
+            let [low, high] = [pair[0], pair[1]].map(|register| bank.get(register).value());
+            if low > high || *strict && low == high {
+                return Err(Failure::Undefined(format!("{what} must rise, but {high} follows {low}")));
+            }
+        }
+        drop(bank);
         let mut slope = x.clone();
         self.derivative(0.0, x, &mut slope);
         if slope.as_ref().iter().all(|d| d.value().is_finite()) {

@@ -43,8 +43,8 @@ use crate::kernel::Tolerance;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EquationsOptions {
-    /// States and their units: `th = "rad"`, `"T[1..100]" = "K"`.
-    pub(super) states: Entries<Short<Described>>,
+    /// States and their units: `th = "rad"`, `"T[1..100]" = "K"`; or a table with `unit`, `scale`, `about`.
+    pub(super) states: Entries<Short<StateOptions>>,
     /// Inputs and their units; 0 where no case or experiment drives them.
     #[serde(default)]
     pub(super) inputs: Entries<Short<Described>>,
@@ -72,7 +72,8 @@ pub struct EquationsOptions {
     /// Friction of joints, by their position or speed.
     #[serde(default)]
     pub(super) friction: Entries<Friction>,
-    /// Events: `bounce = { guard = "h", reset = { v = "-e*v" } }` happens when `h` becomes negative.
+    /// Events: `bounce = { guard = "h", reset = { v = "-e*v" }, at-rest = { h = 0, v = 0 } }` happens when `h` becomes
+    /// negative.
     #[serde(default)]
     pub(super) when: Entries<When>,
     /// Names for joints as places of effects: `arm = { joint = "phi" }`; the position's own where absent.
@@ -98,6 +99,25 @@ pub(super) struct Described {
 impl From<String> for Described {
     fn from(unit: String) -> Self {
         Self { unit, about: None }
+    }
+}
+
+/// A state's unit, size and meaning.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct StateOptions {
+    /// Unit.
+    pub unit: String,
+    /// Typical size, positive: errors of the simulation count relative to it where the state is near 0. Where it is absent
+    /// the largest absolute value that the state has had takes its place.
+    pub scale: Option<Quantity>,
+    /// What it is, in one line.
+    pub about: Option<String>,
+}
+
+impl From<String> for StateOptions {
+    fn from(unit: String) -> Self {
+        Self { unit, scale: None, about: None }
     }
 }
 
@@ -162,6 +182,10 @@ pub(super) struct When {
     /// New values of states, from the values just before; states that are not named stay.
     #[serde(default)]
     pub reset: Entries<Formula>,
+    /// Values of states where events that come closer and closer end. These states are held there until their rates would
+    /// make the guard rise. Without it events that accumulate are a failure of the simulation.
+    #[serde(default)]
+    pub at_rest: Entries<Formula>,
 }
 
 /// A place that gets a name.

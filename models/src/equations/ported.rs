@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use mops_core::{Along, Failure, Instant, Open, Plant, Port, Scalar, Tolerance};
+use mops_core::enclosure::Enclosure;
+use mops_core::{Along, Failure, Instant, Open, Plant, Port, Scalar, Span, Tolerance};
 
 use super::Equations;
 use super::bank::{Bank, Large, Small};
@@ -115,6 +116,27 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Ported<'_, S, B> {
         let what = self.running.get_mut().switch(index, at.t, next);
         x.copy_from_slice(next);
         what
+    }
+
+    fn has_bounds(&self) -> bool {
+        true
+    }
+
+    fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
+        self.running.borrow().enclose(index, over.time, over.x, over.u.iter().chain(over.w).copied())
+    }
+
+    fn rest(&mut self, index: usize, at: &Instant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
+        self.hold(at);
+        let next = self.x.get_mut();
+        next.copy_from_slice(at.x);
+        let what = self.running.get_mut().rest(index, at.t, close, next)?;
+        x.copy_from_slice(next);
+        Ok(what)
+    }
+
+    fn scale(&self, state: usize) -> Option<f64> {
+        self.running.borrow().scale(state)
     }
 
     fn settle(&mut self, at: &Instant<'_, S>) {

@@ -3,10 +3,14 @@
 use std::cell::RefCell;
 use std::marker::PhantomData;
 
+use mops_core::enclosure::Enclosure;
+use mops_core::expression::Comparison;
 use mops_core::{Dual, Failure, Instant, Scalar};
 
 use super::bank::{Bank, Large};
+use super::bounds::{self, moved, signed};
 use super::compiled::{Compiled, Signal};
+use super::happenings::Phase;
 use super::program::Program;
 use crate::kernel::drive::Drive;
 use crate::kernel::{Dynamics, Tolerance};
@@ -15,18 +19,28 @@ use crate::kernel::{Dynamics, Tolerance};
 pub struct Running<'a, S, X, B> {
     pub(super) model: &'a Compiled,
     pub(super) bank: RefCell<B>,
-    drives: Vec<Drive<'a, S>>,
-    parameters: &'a [S],
+    pub(super) drives: Vec<Drive<'a, S>>,
+    pub(super) parameters: &'a [S],
     pub(super) tolerance: Tolerance,
     started: bool,
     /// Present values of the modes.
     pub(super) modes: Vec<f64>,
     /// What is added to the guard of a switch: a kink is only left when it is clear that it is.
     pub(super) slack: Vec<f64>,
+    /// The largest size of the sides of each switch where it was looked at.
+    pub(super) spans: Vec<f64>,
     /// How often each switch has switched.
     flips: Vec<usize>,
-    /// Whether an event waits for its guard to become negative, rather than positive again, and where the guard began.
-    armed: Vec<(bool, f64)>,
+    /// What each event waits for.
+    pub(super) phases: Vec<Phase>,
+    /// By how much the event of the moment comes later: tangents without a value.
+    delay: S,
+    /// States that are held where events have come to rest.
+    pub(super) held: Vec<usize>,
+    /// Largest absolute values of the states where the simulation begins and at events.
+    pub(super) sizes: Vec<f64>,
+    /// Registers with bounds, from their first use on.
+    bounds: RefCell<Vec<Enclosure>>,
     /// Registers in which the Jacobian is computed, from its first use on.
     jacobian: RefCell<Option<Large<Dual<CHUNK>>>>,
     state: PhantomData<X>,
@@ -34,6 +48,13 @@ pub struct Running<'a, S, X, B> {
 
 /// Columns of the Jacobian that are computed at once.
 const CHUNK: usize = 8;
+
+/// A condition that has switched that often is blamed where a simulation runs out of steps: a thousandth of those there are.
+const FLIPS: usize = 100;
+
+/// What is said of conditions that never agree with themselves.
+const TO_AND_FRO: &str =
+    "a condition of `sign` or `if` switches to and fro without end; dry friction is written under `friction`";
 
 /// What a mode's guard is about.
 enum Guard {
@@ -57,8 +78,13 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
             started: false,
             modes: vec![0.0; model.switches.len() + 2 * model.joints.len()],
             slack: vec![0.0; model.switches.len()],
+            spans: vec![0.0; model.switches.len()],
             flips: vec![0; model.switches.len()],
-            armed: vec![(true, 0.0); model.happenings.len()],
+            phases: vec![Phase::Armed(0.0); model.happenings.len()],
+            delay: S::from(0.0),
+            held: Vec::new(),
+            sizes: vec![0.0; model.states],
+            bounds: RefCell::new(Vec::new()),
             state: PhantomData,
         }
     }
@@ -109,6 +135,9 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         for (dx, &register) in dx.iter_mut().zip(&tape.results) {
             *dx = bank.get(register);
         }
+        for &state in &self.held {
+            dx[state] = S::from(0.0);
+        }
     }
 
     /// Holds the inputs at these values.
@@ -138,49 +167,102 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         }
     }
 
-    /// Whether the guard of an event rises along the solution, by its exact derivative with respect to time.
-    fn rises(&self, happening: usize, t: f64, x: &X) -> bool {
-        let mut slope = x.clone();
-        self.derivative(t, x, &mut slope);
-        let mut bank = Large::<Dual<1>>::with(self.model.layout.registers);
-        set_up(self.model, &mut bank, self.parameters.iter().map(|p| Dual::from(p.value())));
+    /// Bounds of a guard over a time, with bounds of the states and of the inputs.
+    pub(super) fn enclose(
+        &self,
+        index: usize,
+        time: Enclosure,
+        x: &[Enclosure],
+        inputs: impl Iterator<Item = Enclosure>,
+    ) -> Enclosure {
         let layout = &self.model.layout;
+        let mut registers = self.bounds.borrow_mut();
+        if registers.is_empty() {
+            *registers = bounds::registers(&*self.bank.borrow(), layout.registers);
+        }
         for (mode, &value) in self.modes.iter().enumerate() {
-            bank.set(layout.mode(mode), Dual::from(value));
+            registers[usize::from(layout.mode(mode))] = Enclosure::from(value);
         }
-        for (i, (x, slope)) in x.as_ref().iter().zip(slope.as_ref()).enumerate() {
-            bank.set(layout.state(i), Dual { value: x.value(), tangent: [slope.value()] });
+        registers[usize::from(layout.state(0))..][..x.len()].copy_from_slice(x);
+        for (i, input) in inputs.enumerate() {
+            registers[usize::from(layout.input(i))] = input;
         }
-        for (i, drive) in self.drives.iter().enumerate() {
-            let [now, soon] = [drive.at(t), drive.at(t + 1e-6)].map(Scalar::value);
-            bank.set(layout.input(i), Dual { value: now, tangent: [(soon - now) * 1e6] });
+        registers[usize::from(layout.time())] = time;
+        match self.kind(index) {
+            Guard::Joint(j) => {
+                let joint = &self.model.joints[j];
+                if self.is(joint.contact.stuck) {
+                    joint.balance.enclose(&mut registers);
+                    let [torque, limit] = [0, 1].map(|k| registers[usize::from(joint.balance.results[k])]);
+                    let zero = Enclosure::from(0.0);
+                    limit - torque.holds(Comparison::AtLeast, zero).choose(torque, -torque)
+                } else {
+                    x[joint.contact.velocity] * Enclosure::from(self.modes[joint.contact.direction])
+                }
+            }
+            Guard::Switch(k) => {
+                let switch = &self.model.switches[k];
+                switch.sides.enclose(&mut registers);
+                let difference = registers[usize::from(switch.sides.results[0])];
+                moved(signed(!self.is(switch.mode), difference), self.slack[k])
+            }
+            Guard::Happening(k) => self.enclose_happening(k, &mut registers),
         }
-        bank.set(layout.time(), Dual::variable(t, 0));
-        let tape = &self.model.happenings[happening].guard;
-        tape.run(&mut bank);
-        let guard: Dual<1> = bank.get(tape.results[0]);
-        guard.tangent[0] > 0.0
     }
 
-    fn happening_guard(&self, k: usize, t: f64, x: &[S]) -> S {
-        self.results::<1>(&self.model.happenings[k].guard, t, x)[0]
+    /// The guard of an event.
+    pub(super) fn guard_of(&self, happening: usize) -> usize {
+        self.model.joints.len() + self.model.switches.len() + happening
+    }
+
+    /// The derivatives, of states that are held too.
+    pub(super) fn free_rates(&self, t: f64, x: &[S], dx: &mut [S]) {
+        let mut bank = self.bank.borrow_mut();
+        let bank = &mut *bank;
+        self.load(bank, t, x);
+        self.model.derivative.run(bank);
+        for (dx, &register) in dx.iter_mut().zip(&self.model.derivative.results) {
+            *dx = bank.get(register);
+        }
+    }
+
+    /// Gives states new values, computed from those they have.
+    pub(super) fn assign(&self, (states, tape): &(Vec<usize>, Program), t: f64, x: &mut X) {
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, t, x.as_ref());
+        if S::DIRECTIONS > 0 {
+            let layout = &self.model.layout;
+            for (i, drive) in self.drives.iter().enumerate() {
+                bank.set(layout.input(i), drive.at(t) + self.delay * drive.slope(t));
+            }
+            bank.set(layout.time(), self.delay + t);
+        }
+        tape.run(&mut *bank);
+        for (&state, &register) in states.iter().zip(&tape.results) {
+            x.as_mut()[state] = bank.get(register);
+        }
+    }
+
+    fn note_sizes(&mut self, x: &[S]) {
+        for (size, x) in self.sizes.iter_mut().zip(x) {
+            *size = size.max(x.value().abs());
+        }
     }
 
     /// What went wrong where a simulation got nowhere: a condition that switched to and fro.
     pub fn explain(&self, failure: Failure) -> Failure {
-        let stalls = matches!(failure, Failure::StepLimit(_) | Failure::StepTooSmall(_));
-        let jumping = self.model.switches.iter().zip(&self.flips);
-        if stalls && jumping.into_iter().any(|(switch, &flips)| switch.jumps && flips >= 90) {
-            return Failure::Undefined(format!(
-                "{failure}: `sign` or `if` switches to and fro without end; dry friction is written under `friction`"
-            ));
+        let mut jumping = self.model.switches.iter().zip(&self.flips);
+        match failure {
+            Failure::StepLimit(t) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
+                Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
+            }
+            failure => failure,
         }
-        failure
     }
 }
 
 /// Writes the parameters into a bank, and all that follows from them alone.
-fn set_up<S: Scalar>(model: &Compiled, bank: &mut impl Bank<S>, parameters: impl Iterator<Item = S>) {
+pub(super) fn set_up<S: Scalar>(model: &Compiled, bank: &mut impl Bank<S>, parameters: impl Iterator<Item = S>) {
     for (i, value) in parameters.take(model.parameters).enumerate() {
         bank.set(model.layout.parameter(i), value);
     }
@@ -192,13 +274,9 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
 
     #[inline(always)]
     fn derivative(&self, t: f64, x: &X, dx: &mut X) {
-        let mut bank = self.bank.borrow_mut();
-        let bank = &mut *bank;
-        self.load(bank, t, x.as_ref());
-        let tape = &self.model.derivative;
-        tape.run(bank);
-        for (dx, &register) in dx.as_mut().iter_mut().zip(&tape.results) {
-            *dx = bank.get(register);
+        self.free_rates(t, x.as_ref(), dx.as_mut());
+        for &state in &self.held {
+            dx.as_mut()[state] = S::from(0.0);
         }
     }
 
@@ -207,38 +285,80 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
     }
 
     fn guard(&self, index: usize, t: f64, x: &X) -> S {
-        let x = x.as_ref();
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
                 if self.is(joint.contact.stuck) {
-                    let [torque, limit, ..] = self.results::<4>(&joint.balance, t, x);
+                    let [torque, limit, ..] = self.results::<4>(&joint.balance, t, x.as_ref());
                     limit - torque.abs()
                 } else {
-                    x[joint.contact.velocity] * self.modes[joint.contact.direction]
+                    x.as_ref()[joint.contact.velocity] * self.modes[joint.contact.direction]
                 }
             }
             Guard::Switch(k) => {
                 let switch = &self.model.switches[k];
-                let [difference, _] = self.results(&switch.sides, t, x);
+                let [difference, _] = self.results(&switch.sides, t, x.as_ref());
                 let sign = if self.is(switch.mode) { 1.0 } else { -1.0 };
                 difference * sign + self.slack[k]
             }
-            Guard::Happening(k) => {
-                let (armed, began) = self.armed[k];
-                let guard = self.happening_guard(k, t, x);
-                if armed { guard - began } else { -guard }
-            }
+            Guard::Happening(k) => self.happening_guard(k, t, x),
         }
     }
 
+    fn guard_rate(&self, index: usize, t: f64, x: &X) -> Option<f64> {
+        match self.kind(index) {
+            Guard::Joint(_) => None,
+            Guard::Switch(k) => {
+                let switch = &self.model.switches[k];
+                let rate = self.tape_rate(&switch.sides, 0, t, x);
+                Some(if self.is(switch.mode) { rate } else { -rate })
+            }
+            Guard::Happening(k) => match &self.phases[k] {
+                Phase::AtRest(_) => None,
+                phase => {
+                    let rate = self.tape_rate(&self.model.happenings[k].guard, 0, t, x);
+                    Some(if *phase == Phase::Passed { -rate } else { rate })
+                }
+            },
+        }
+    }
+
+    fn has_bounds(&self) -> bool {
+        true
+    }
+
+    fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        self.enclose(index, time, x, self.drives.iter().map(|drive| drive.enclose(time)))
+    }
+
+    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut X) -> Result<&str, String> {
+        match self.kind(index) {
+            Guard::Happening(k) => self.come_to_rest(k, t, close, x),
+            Guard::Joint(j) => Err(format!(
+                "a joint with dry friction does not settle: {}, again and again",
+                self.model.joints[j].slides
+            )),
+            Guard::Switch(_) => Err(TO_AND_FRO.to_owned()),
+        }
+    }
+
+    fn scale(&self, state: usize) -> Option<f64> {
+        self.model.scales[state]
+    }
+
     fn switch(&mut self, index: usize, t: f64, x: &mut X) -> &str {
+        self.note_sizes(x.as_ref());
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
+                let [torque, limit, ..] = self.results::<4>(&joint.balance, t, x.as_ref()).map(Scalar::value);
+                if limit == 0.0 {
+                    // Without friction the joint passes through its rest; which way it moves counts where friction comes.
+                    self.set_contact(j, -self.modes[joint.contact.direction]);
+                    return "";
+                }
                 if self.is(joint.contact.stuck) {
-                    let [torque, ..] = self.results::<4>(&joint.balance, t, x.as_ref());
-                    self.set_contact(j, if torque.value() > 0.0 { 1.0 } else { -1.0 });
+                    self.set_contact(j, if torque > 0.0 { 1.0 } else { -1.0 });
                 } else {
                     x.as_mut()[joint.contact.velocity] = S::from(0.0);
                     self.find_contacts(t, x.as_ref());
@@ -250,33 +370,19 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                 let holds = !self.is(switch.mode);
                 self.set_mode(switch.mode, f64::from(u8::from(holds)));
                 self.flips[k] += 1;
-                let [difference, right] = self.results(&switch.sides, t, x.as_ref()).map(Scalar::value);
-                self.set_slack(k, if holds { difference } else { -difference }, right);
+                let sides = self.results(&switch.sides, t, x.as_ref()).map(Scalar::value);
+                self.set_slack(k, sides);
                 if switch.jumps {
                     self.find_contacts(t, x.as_ref());
                 }
                 ""
             }
-            Guard::Happening(k) => {
-                let happening = &self.model.happenings[k];
-                if !self.armed[k].0 {
-                    self.armed[k] = (true, self.happening_guard(k, t, x.as_ref()).value().min(0.0));
-                    return "";
-                }
-                let (states, tape) = &happening.resets;
-                let mut bank = self.bank.borrow_mut();
-                self.load(&mut bank, t, x.as_ref());
-                tape.run(&mut *bank);
-                for (&state, &register) in states.iter().zip(&tape.results) {
-                    x.as_mut()[state] = bank.get(register);
-                }
-                drop(bank);
-                self.settle(t, x.as_ref());
-                let guard = self.happening_guard(k, t, x.as_ref()).value();
-                self.armed[k] = (guard > 0.0 || self.rises(k, t, x), guard.min(0.0));
-                &happening.name
-            }
+            Guard::Happening(k) => self.happen(k, t, x),
         }
+    }
+
+    fn delay_events(&mut self, delay: S) {
+        self.delay = delay;
     }
 
     fn shows(&self, signal: usize) -> Option<usize> {
@@ -319,7 +425,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
             model.derivative.run(bank);
             for (direction, group) in groups.iter().enumerate() {
                 for (column, rows) in group {
-                    for &row in rows {
+                    for &row in rows.iter().filter(|row| !self.held.contains(row)) {
                         entry(row, *column, bank.get(model.derivative.results[row]).tangent[direction]);
                     }
                 }
@@ -342,8 +448,10 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         }
         self.settle(t, x.as_ref());
         if !std::mem::replace(&mut self.started, true) {
-            for k in 0..self.armed.len() {
-                self.armed[k] = (self.happening_guard(k, t, x.as_ref()).value() >= 0.0, 0.0);
+            self.note_sizes(x.as_ref());
+            for k in 0..self.phases.len() {
+                let passed = self.happening_guard(k, t, x).value() < 0.0;
+                self.phases[k] = if passed { Phase::Passed } else { Phase::Armed(0.0) };
             }
         }
     }

@@ -6,7 +6,7 @@ use mops_core::{Mistake, suggestion};
 
 use super::definition::{Definition, Target, Text, under};
 use super::graph::{Block, Graph, Id, Op};
-use super::lower::{Affine, Lowering, Switch};
+use super::lower::{Affine, Lowering, Order, Switch};
 
 /// One equation: `sum of coefficients * derivatives = force`.
 #[derive(Debug, Clone)]
@@ -43,6 +43,8 @@ pub struct Happening {
     pub guard: Id,
     /// New values of states.
     pub resets: Vec<(usize, Id)>,
+    /// Values of states at which its events end where they accumulate.
+    pub at_rest: Vec<(usize, Id)>,
 }
 
 /// What a state's derivative is multiplied with in its own equation.
@@ -61,8 +63,12 @@ pub struct System {
     pub graph: Graph,
     /// Conditions that switch branches.
     pub switches: Vec<Switch>,
+    /// Arguments that must rise.
+    pub orders: Vec<Order>,
     /// Number of modes.
     pub modes: usize,
+    /// Typical sizes of the states, where they are declared.
+    pub scales: Vec<Option<f64>>,
     /// Derivatives of the states.
     pub derivatives: Vec<Id>,
     /// Signals: states, outputs, inputs.
@@ -169,12 +175,15 @@ impl System {
         for when in &d.when {
             let affine = l.text(&when.guard)?;
             let guard = with_rates(&mut l.graph, affine, &derivatives);
-            let mut resets = Vec::new();
-            for (name, text) in &when.resets {
-                let affine = l.text(text)?;
-                resets.push((state(name), with_rates(&mut l.graph, affine, &derivatives)));
-            }
-            happenings.push(Happening { name: when.name.clone(), guard, resets });
+            let mut values = |texts: &[(String, Text)]| {
+                let value = |(name, text): &(String, Text)| {
+                    let affine = l.text(text)?;
+                    Ok((state(name), with_rates(&mut l.graph, affine, &derivatives)))
+                };
+                texts.iter().map(value).collect::<Result<Vec<_>, Mistake>>()
+            };
+            let (resets, at_rest) = (values(&when.resets)?, values(&when.at_rest)?);
+            happenings.push(Happening { name: when.name.clone(), guard, resets, at_rest });
         }
         let start = |l: &mut Lowering<'_>, s: usize| {
             let name = &d.states[s].name;
@@ -182,17 +191,20 @@ impl System {
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
         // Definitions that nothing uses are checked too; what they would switch is forgotten.
-        let (switches, modes) = (l.switches.len(), l.modes);
+        let (switches, orders, modes) = (l.switches.len(), l.orders.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
         }
         l.switches.truncate(switches);
+        l.orders.truncate(orders);
         l.modes = modes;
-        let Lowering { graph, switches, modes, .. } = l;
+        let Lowering { graph, switches, orders, modes, .. } = l;
         Ok(Self {
             graph,
             switches,
+            orders,
             modes,
+            scales: d.scales.clone(),
             derivatives,
             signals,
             contacts,

@@ -188,8 +188,12 @@ impl<'g> Tape<'g> {
         Ok(self.register(id)?.expect("it had one before"))
     }
 
-    /// The nodes whose registers an instruction for this node reads, in the order in which they are computed.
+    /// The nodes whose registers an instruction for this node reads, in the order in which they are computed; none for a node
+    /// that has its register, whose operands this tape knows nothing of.
     fn needs(&mut self, id: Id) -> Vec<Id> {
+        if matches!(self.register(id), Ok(Some(_)) | Err(_)) {
+            return Vec::new();
+        }
         match self.graph.op(id) {
             Op::Add(a, b) | Op::Sub(a, b) => match (self.product(a), self.product(b)) {
                 (Some(a), Some(b)) => [a, b].concat(),

@@ -6,6 +6,11 @@ use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
 
 use super::{Equations, EquationsOptions, Target};
 
+mod dry_friction;
+mod events;
+mod order;
+mod scales;
+
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
 
 fn read(text: &str) -> Result<Equations, Mistake> {
@@ -172,7 +177,7 @@ fn it_is_the_compiled_model_to_the_tolerance_dry_friction_included() {
     ];
     let given: Vec<(&str, f64)> = p.iter().copied().chain([("th0", 2.2), ("thd0", 1.78)]).collect();
     let response = respond(&ours, &[("u", torque.clone())], &given, 6.0);
-    let compiled = Furuta::model(None, Tolerance { relative: 1e-10, absolute: 1e-12, ..Tolerance::default() });
+    let compiled = Furuta::model(None, Tolerance { relative: 1e-10, absolute: Some(1e-12), ..Tolerance::default() });
     let case = Case { inputs: vec![("u".into(), torque)], ..Case::default() };
     let parameters: Vec<f64> = p.iter().map(|(_, v)| *v).chain([0.0, 0.0, 2.2, 1.78]).collect();
     let job = Job { case: &case, parameters: &parameters, signals: &[0, 2], horizon: 6.0 };

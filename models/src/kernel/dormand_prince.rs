@@ -5,8 +5,9 @@
 
 use mops_core::{Scalar, Work};
 
+use super::Dynamics;
 use super::integrate::{Attempt, Method};
-use super::{Dynamics, Tolerance};
+use super::weights::Weights;
 
 /// The stages of a step.
 pub(super) struct DormandPrince<X> {
@@ -33,10 +34,10 @@ impl<S: Scalar, D: Dynamics<S>> Method<S, D> for DormandPrince<D::State> {
 
     #[inline]
     fn attempt(&mut self, f: &D, at: Attempt<'_, D::State>, next: &mut D::State, work: &mut Work) -> f64 {
-        let Attempt { t, h, x, tolerance } = at;
+        let Attempt { t, h, x, weights } = at;
         stages(f, (t, h), x, &mut self.k, &mut self.stage, next);
         work.derivatives += 6;
-        error_norm(h, x, next, &self.k, tolerance)
+        error_norm(h, x, next, &self.k, weights)
     }
 
     #[inline]
@@ -80,23 +81,17 @@ fn stages<S: Scalar, D: Dynamics<S>>(
     f.derivative(t + h, next, &mut k[6]);
 }
 
-/// Root mean square of the embedded error estimate over its tolerance.
-#[rustfmt::skip]
+/// Norm of the embedded error estimate.
 #[inline]
-fn error_norm<S: Scalar, X: AsRef<[S]>>(h: f64, x: &X, next: &X, k: &[X; 7], tolerance: &Tolerance) -> f64 {
-    let n = x.as_ref().len();
-    let mut sum = 0.0;
-    for j in 0..n {
+fn error_norm<S: Scalar, X: AsRef<[S]>>(h: f64, x: &X, next: &X, k: &[X; 7], weights: &Weights) -> f64 {
+    let error = |j: usize| {
         let kj = |i: usize| k[i].as_ref()[j].value();
-        let error = h * (71.0 / 57600.0 * kj(0) - 71.0 / 16695.0 * kj(2) + 71.0 / 1920.0 * kj(3)
-            - 17253.0 / 339_200.0 * kj(4) + 22.0 / 525.0 * kj(5) - 1.0 / 40.0 * kj(6));
-        let size = x.as_ref()[j].value().abs().max(next.as_ref()[j].value().abs());
-        let ratio = error / (tolerance.absolute + tolerance.relative * size);
-        sum += ratio * ratio;
-    }
-    #[allow(clippy::cast_precision_loss)]
-    let mean = sum / n.max(1) as f64;
-    mean.sqrt()
+        h * (71.0 / 57600.0 * kj(0) - 71.0 / 16695.0 * kj(2) + 71.0 / 1920.0 * kj(3) - 17253.0 / 339_200.0 * kj(4)
+            + 22.0 / 525.0 * kj(5)
+            - 1.0 / 40.0 * kj(6))
+    };
+    let size = |x: &X, j: usize| x.as_ref()[j].value().abs();
+    weights.norm(h, (0..x.as_ref().len()).map(|j| (error(j), [size(x, j).max(size(next, j)), size(&k[6], j)])))
 }
 
 #[rustfmt::skip]

@@ -1,6 +1,7 @@
 //! An input as a simulation meets it: smooth within a step, with its jumps at breaks.
 
 use mops_core::band_limited::{piece, polynomial};
+use mops_core::enclosure::Enclosure;
 use mops_core::{Hold, Input, Scalar};
 
 /// An input with its present value and slope.
@@ -40,6 +41,20 @@ impl Curve {
         }
     }
 
+    fn enclose(&self, time: Enclosure) -> Enclosure {
+        match self {
+            Self::Sine { amplitude, angular, phase } => {
+                let angle = time * Enclosure::from(*angular) + Enclosure::from(*phase);
+                angle.sin() * Enclosure::from(*amplitude)
+            }
+            Self::Piece { since, step, coefficients } => {
+                let share = (time - Enclosure::from(*since)) / Enclosure::from(*step);
+                let horner = |sum: Enclosure, c: &f64| sum * share + Enclosure::from(*c);
+                coefficients.iter().rev().fold(Enclosure::from(0.0), horner)
+            }
+        }
+    }
+
     fn slope(&self, t: f64) -> f64 {
         match self {
             Self::Sine { amplitude, angular, phase } => amplitude * angular * (angular * t + phase).cos(),
@@ -69,6 +84,15 @@ impl<'a, S: Scalar> Drive<'a, S> {
         match &self.curve {
             Some(curve) => self.value + curve.at(t),
             None => self.value + self.slope * (t - self.since),
+        }
+    }
+
+    /// Bounds over a time between two breaks.
+    pub fn enclose(&self, time: Enclosure) -> Enclosure {
+        let value = Enclosure::from(self.value.value());
+        match &self.curve {
+            Some(curve) => value + curve.enclose(time),
+            None => value + (time - Enclosure::from(self.since)) * Enclosure::from(self.slope),
         }
     }
 

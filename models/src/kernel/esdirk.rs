@@ -12,9 +12,10 @@
 
 use mops_core::{Scalar, Work};
 
+use super::Dynamics;
 use super::banded::Banded;
-use super::integrate::{Attempt, Method, scaled_norm};
-use super::{Dynamics, Tolerance};
+use super::integrate::{Attempt, Method};
+use super::weights::Weights;
 
 /// The diagonal of every implicit stage.
 const GAMMA: f64 = 0.25;
@@ -177,7 +178,7 @@ impl<X: Clone> Esdirk<X> {
     where
         X: AsRef<[S]> + AsMut<[S]>,
     {
-        let Attempt { t, x, tolerance, .. } = *at;
+        let Attempt { t, h, x, weights } = *at;
         self.jacobian.clear();
         let jacobian = &mut self.jacobian;
         if f.jacobian(t, x, &mut |row, column, value| jacobian.set(row, column, value)) {
@@ -191,10 +192,11 @@ impl<X: Clone> Esdirk<X> {
         self.column.iter_mut().zip(slopes.as_ref()).for_each(|(c, s)| *c = s.value());
         for group in &self.groups {
             moved.as_mut().copy_from_slice(x.as_ref());
-            // Steps of the square root of the rounding, relative to the state or to where it begins to count.
+            // Steps of the square root of the rounding, relative to the state or to where it begins to count; a state that has
+            // always been 0 counts as what it becomes in the step.
             let step = |j: usize| {
-                let size = x.as_ref()[j].value().abs().max(tolerance.absolute / tolerance.relative);
-                f64::EPSILON.sqrt() * size
+                let size = x.as_ref()[j].value().abs().max(weights.small(j)).max(h * self.column[j].abs());
+                f64::EPSILON.sqrt() * if size > 1e-300 { size } else { 1.0 }
             };
             group.iter().for_each(|&j| moved.as_mut()[j] = x.as_ref()[j] + step(j));
             f.derivative(t, moved, slopes);
@@ -220,7 +222,7 @@ impl<X: Clone> Esdirk<X> {
     where
         X: AsRef<[S]> + AsMut<[S]>,
     {
-        let Attempt { t, h, x, tolerance } = *at;
+        let Attempt { t, h, x, weights } = *at;
         let n = x.as_ref().len();
         for j in 0..n {
             let mut sum = x.as_ref()[j];
@@ -238,8 +240,8 @@ impl<X: Clone> Esdirk<X> {
         self.contraction = self.contraction.max(1e-16).powf(0.8);
         for iteration in 0..ITERATIONS {
             self.newton_step(f, time, h, z, work);
-            let differences = self.update.as_ref().iter().zip(x.as_ref());
-            let size = scaled_norm(differences.map(|(d, x)| (d.value(), x.value().abs())), tolerance);
+            let sizes = x.as_ref().iter().zip(z.as_ref()).map(|(x, z)| [x.value().abs().max(z.value().abs()), 0.0]);
+            let size = weights.norm(h, self.update.as_ref().iter().map(|d| d.value()).zip(sizes));
             if !size.is_finite() {
                 return false;
             }
@@ -266,7 +268,7 @@ impl<X: Clone> Esdirk<X> {
             }
         }
         if converged && S::DIRECTIONS > 0 {
-            self.finish_tangents(f, time, h, z, tolerance, work);
+            self.finish_tangents(f, time, h, z, weights, work);
         }
         let k = &mut self.k[stage];
         for j in 0..n {
@@ -295,7 +297,7 @@ impl<X: Clone> Esdirk<X> {
         t: f64,
         h: f64,
         z: &mut X,
-        tolerance: &Tolerance,
+        weights: &Weights,
         work: &mut Work,
     ) where
         X: AsRef<[S]> + AsMut<[S]>,
@@ -307,7 +309,7 @@ impl<X: Clone> Esdirk<X> {
             }
             let largest =
                 |x: &X, direction: usize| x.as_ref().iter().fold(0.0, |m: f64, x| m.max(x.tangents()[direction].abs()));
-            let arrived = |d: usize| largest(&self.update, d) <= NEWTON * tolerance.relative * largest(z, d);
+            let arrived = |d: usize| largest(&self.update, d) <= NEWTON * weights.relative() * largest(z, d);
             if (0..S::DIRECTIONS).all(arrived) {
                 return;
             }
@@ -323,14 +325,17 @@ impl<X: Clone> Esdirk<X> {
     where
         X: AsRef<[S]>,
     {
-        let Attempt { h, x, tolerance, .. } = *at;
+        let Attempt { h, x, weights, .. } = *at;
         for (j, error) in self.column.iter_mut().enumerate() {
             let weight = |i: usize| if i < 5 { A[5][i] } else { GAMMA };
             *error = h * (0..6).map(|i| (weight(i) - EMBEDDED[i]) * self.k[i].as_ref()[j].value()).sum::<f64>();
         }
         self.factors.solve(&mut self.column);
-        let sizes = x.as_ref().iter().zip(next.as_ref()).map(|(a, b)| a.value().abs().max(b.value().abs()));
-        scaled_norm(self.column.iter().copied().zip(sizes), tolerance)
+        let sizes = (0..self.column.len()).map(|j| {
+            let size = |x: &X| x.as_ref()[j].value().abs();
+            [size(x).max(size(next)), size(&self.k[5])]
+        });
+        weights.norm(h, self.column.iter().copied().zip(sizes))
     }
 }
 
@@ -370,11 +375,11 @@ fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
 mod tests {
     use mops_core::{Dual, Failure};
 
-    use super::super::{IntegrationMethod, integrate};
+    use super::super::{IntegrationMethod, Tolerance, integrate};
     use super::*;
 
     fn stiff(relative: f64) -> Tolerance {
-        Tolerance { relative, absolute: relative * 1e-3, method: IntegrationMethod::Stiff, ..Tolerance::default() }
+        Tolerance { relative, method: IntegrationMethod::Stiff, ..Tolerance::DEFAULT }
     }
 
     /// `x'' = mu (1 - x^2) x' - x`.
@@ -407,14 +412,14 @@ mod tests {
             }
         }
         let fixed = |steps: u32| {
-            let tolerance = Tolerance { relative: 1e-10, absolute: 1e-10, ..stiff(1e-10) };
             let h = 2.0 / f64::from(steps);
             let (mut x, mut next, mut work) = ([1.0], [0.0], Work::default());
+            let weights = Weights::new::<f64, _>(&Rational, &x, 2.0, &stiff(1e-10));
             let mut method = <Esdirk<[f64; 1]> as Method<f64, Rational>>::new(&Rational, &x);
             for i in 0..steps {
                 let t = h * f64::from(i);
                 Method::<f64, Rational>::restart(&mut method, &Rational, t, &x, &mut work);
-                let attempt = Attempt { t, h, x: &x, tolerance: &tolerance };
+                let attempt = Attempt { t, h, x: &x, weights: &weights };
                 assert!(method.attempt(&Rational, attempt, &mut next, &mut work).is_finite());
                 x = next;
             }

@@ -1,74 +1,374 @@
-//! Events: the guard that becomes negative first within a step, located on the dense output.
+//! Events: when they happen, in which order, how often.
+//!
+//! **The guard.** A mode holds while its guards are not negative. An event is the first instant at which a guard is negative;
+//! [`Dynamics::switch`] then changes the mode, and the state where it jumps. An event does not depend on where steps end.
+//!
+//! **Locating.** Within a step the state is a polynomial of time, so that every guard is a function of time. Where the dynamics
+//! give bounds of a guard over a part of the step, and of its rate ([`Dynamics::enclose_guard`]), the first place where it is
+//! negative is found by branch and bound: a part whose bounds exclude negative values is done, one over which the guard is
+//! monotone is decided by its ends, any other is halved, the earlier half first. A guard that is negative for a moment only is
+//! found this way however long the step is, be it a guard on states, on inputs or on time. Where there are no bounds (models
+//! written in Rust, whose guards vary as smoothly as their states), the guard is looked at in four places of a step and where
+//! the quartic through these looks has a minimum below 0.
+//!
+//! **The instant.** A zero is located to the resolution of the clock, and the event happens at the end of the bracket where the
+//! guard *is* negative. So no rounding can leave it positive, and the same crossing is never met again: a guard that was passed
+//! is negative at the start of the next step, and what waits for it to be positive again starts from there.
+//!
+//! **Simultaneous events.** Instants closer than the resolution are one. At an instant inputs and clocks take their new values
+//! first ([`Dynamics::pass_break`]); then of the guards that are negative the one with the lowest number switches, until none
+//! is negative. An event therefore sees the inputs as they are from its instant on, at all rates of samples and events.
+//!
+//! **Arming.** Whether a guard is armed again after its event is part of its mode, and up to the dynamics.
+//!
+//! **Accumulation.** A guard accumulates that switches [`REPEATS`] times in a row in intervals that become shorter, all below
+//! [`CLOSE`] of the simulated time, or with no time between them ([`NONE`]). [`Dynamics::rest`] may then take the state to where
+//! it rests; else the simulation is a failure, as it cannot go beyond that instant.
+//!
+//! Source: T. Park, P. Barton, State event location in differential-algebraic models, ACM TOMACS 6 (1996) 137-165; J. Esposito,
+//! V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang, K. Johansson,
+//! J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
 
-use mops_core::Scalar;
+use mops_core::enclosure::Enclosure;
+use mops_core::{Failure, Scalar};
 
-use super::{Dynamics, Step};
+use super::step::Step;
+use super::{Dynamics, Sink};
 
-/// The guard that becomes negative first within the step, which is shortened to that time. Guards are looked at in four
-/// places of the step, so that one that dips below zero and comes back is rarely missed.
-#[inline]
-pub(super) fn first_event<S: Scalar, D: Dynamics<S>>(
-    f: &D,
-    step: &mut Step<D::State>,
-    x: &mut D::State,
-) -> Option<usize> {
-    const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-    let count = f.guards();
-    if count == 0 {
-        return None;
+/// How often a guard switches in a row, each time sooner, before its events are taken to accumulate: far more than a sequence
+/// that does not accumulate comes closer by chance, and few enough to stay above rounding.
+const REPEATS: u32 = 20;
+
+/// Share of the simulated time below which intervals between events are close: 1e5 to 1e6 times the resolution of the clock.
+const CLOSE: f64 = 1e-10;
+
+/// Share of the simulated time below which an interval between events of one guard is none: rounding of the states decides
+/// over it.
+const NONE: f64 = 1e-13;
+
+/// An interval counts as shorter than the last one when it is less than this part of it: events of a fixed rate never are.
+const SHORTER: f64 = 0.999;
+
+/// Instants that differ by this part of the time are one: what a few additions of times may be off.
+const RESOLUTION: f64 = 16.0 * f64::EPSILON;
+
+/// Width of the bracket in which an event is located, as a part of the resolution, so that an event stays one with the instant
+/// that it meets.
+const BRACKET: f64 = 0.25;
+
+/// Bounds that are computed for one guard in one step at most; what is undecided then is decided by the ends of its parts. A
+/// guard that crosses zero is found with some 20 bounds, one that touches it with some 100.
+const MOST_BOUNDS: usize = 500;
+
+/// Halvings of a step at most: a part of 1e-9 of it.
+const HALVINGS: u32 = 30;
+
+/// The events of a simulation.
+pub(super) struct Events {
+    /// Simulated time, s.
+    span: f64,
+    /// Values of the guards at the present instant.
+    values: Vec<f64>,
+    /// Of every guard when it switched.
+    past: Vec<Past>,
+    /// Bounds of the state over the step, and over a part of it.
+    whole: Vec<Enclosure>,
+    bounds: Vec<Enclosure>,
+}
+
+/// When a guard switched.
+#[derive(Debug, Clone, Copy)]
+struct Past {
+    /// Last time, s.
+    last: f64,
+    /// Interval before that, s.
+    interval: f64,
+    /// Intervals in a row that were close and shorter than the one before.
+    closer: u32,
+}
+
+impl Events {
+    pub(super) fn new(span: f64) -> Self {
+        Self { span, values: Vec::new(), past: Vec::new(), whole: Vec::new(), bounds: Vec::new() }
     }
-    let time = |theta: f64| step.start + theta * step.length;
-    for place in PLACES.windows(2) {
-        let (from, to) = (place[0], place[1]);
-        let mut first: Option<(usize, f64)> = None;
-        step.at(to, x);
-        for index in 0..count {
-            let here = f.guard(index, time(to), x).value();
-            if here < 0.0 {
-                let zero = first_zero(from, (to, here), |theta| {
-                    step.at(theta, x);
-                    f.guard(index, time(theta), x).value()
-                });
-                if first.is_none_or(|(_, earliest)| zero < earliest) {
-                    first = Some((index, zero));
+
+    /// Times that differ by less are one instant, s.
+    pub(super) fn resolution(&self, t: f64) -> f64 {
+        RESOLUTION * t.abs().max(1e-3 * self.span)
+    }
+
+    /// Lets all events of an instant happen: guards that are negative switch, the one with the lowest number first, until
+    /// none is negative.
+    pub(super) fn settle<S: Scalar, D: Dynamics<S>>(
+        &mut self,
+        dynamics: &mut D,
+        t: f64,
+        x: &mut D::State,
+        sink: &mut impl Sink<S, D>,
+    ) -> Result<(), Failure> {
+        let mut index = 0;
+        while index < dynamics.guards() {
+            let value = dynamics.guard(index, t, x).value();
+            self.values.resize(dynamics.guards(), 0.0);
+            self.values[index] = value;
+            if value >= 0.0 || value.is_nan() {
+                index += 1;
+                continue;
+            }
+            if self.accumulates(index, t) {
+                match dynamics.rest(index, t, CLOSE * self.span, x) {
+                    Ok(rest) => sink.event(t, rest),
+                    Err(why) => return Err(Failure::EventsAccumulate(t, why)),
                 }
-                step.at(to, x);
+                self.past[index].closer = 0;
+            } else {
+                sink.event(t, dynamics.switch(index, t, x));
+            }
+            index = 0;
+        }
+        Ok(())
+    }
+
+    /// Notes that a guard switches; whether its events accumulate.
+    fn accumulates(&mut self, index: usize, t: f64) -> bool {
+        let never = Past { last: f64::NEG_INFINITY, interval: f64::INFINITY, closer: 0 };
+        if self.past.len() <= index {
+            self.past.resize(index + 1, never);
+        }
+        let past = &mut self.past[index];
+        let interval = t - past.last;
+        let is_closer = interval <= NONE * self.span || interval < SHORTER * past.interval;
+        past.closer = if interval <= CLOSE * self.span && is_closer { past.closer + 1 } else { 0 };
+        (past.last, past.interval) = (t, interval);
+        past.closer >= REPEATS
+    }
+
+    /// The guard that is negative first within the step, which ends there; `arrival` is the time and state at its end.
+    pub(super) fn first<S: Scalar, D: Dynamics<S>>(
+        &mut self,
+        dynamics: &D,
+        step: &mut Step<D::State>,
+        arrival: (f64, &D::State),
+        x: &mut D::State,
+    ) -> Option<usize> {
+        let mut first = None;
+        let mut end = 1.0;
+        let has_bounds = dynamics.has_bounds() && dynamics.guards() > 0;
+        if has_bounds {
+            step.enclose(0.0, 1.0, &mut self.whole);
+        }
+        for index in 0..dynamics.guards() {
+            let mut value = |theta: f64| {
+                if theta >= 1.0 {
+                    return dynamics.guard(index, arrival.0, arrival.1).value();
+                }
+                step.at(theta, x);
+                dynamics.guard(index, step.time(theta), x).value()
+            };
+            let start = self.values[index];
+            let last = value(end);
+            let time = |from: f64, to: f64| Enclosure::of_time(step.time(from), step.time(to));
+            let whole = match has_bounds {
+                true => dynamics.enclose_guard(index, time(0.0, 1.0), &self.whole),
+                false => Enclosure::UNKNOWN,
+            };
+            let ends = [(0.0, start), (end, last)];
+            let bracket = if whole.value.low >= 0.0 {
+                None
+            } else if whole.value.low == f64::NEG_INFINITY {
+                looks(&mut value, ends)
+            } else {
+                let bounds = &mut self.bounds;
+                let mut enclose = |from: f64, to: f64| {
+                    step.enclose(from, to, bounds);
+                    dynamics.enclose_guard(index, time(from, to), bounds)
+                };
+                Search { value: &mut value, enclose: &mut enclose, length: step.length, left: MOST_BOUNDS }
+                    .first(ends, whole, HALVINGS)
+            };
+            // Most steps end without an event; the values at their end are those at the start of the next.
+            if first.is_none() {
+                self.values[index] = last;
+            }
+            if let Some(bracket) = bracket {
+                // The bracket may be far shorter than the step: its own time counts.
+                let width = BRACKET * self.resolution(step.time(bracket[1].0)) / step.length;
+                let place = zero_between(bracket, width, &mut value);
+                if first.is_none() || place < end {
+                    (first, end) = (Some(index), place);
+                }
             }
         }
-        if let Some((index, theta)) = first {
-            step.taken = theta * step.length;
-            return Some(index);
+        if first.is_some() {
+            step.end_at(end);
+        }
+        first
+    }
+}
+
+/// A place in a step, as a share of its length, and the value of a guard there.
+type Look = (f64, f64);
+
+/// Two looks between which a guard becomes negative.
+type Bracket = [Look; 2];
+
+/// The search for the first place where a guard is negative, by bounds.
+struct Search<'a, V, B> {
+    value: &'a mut V,
+    enclose: &'a mut B,
+    /// Of the step, s.
+    length: f64,
+    /// Bounds that may still be computed.
+    left: usize,
+}
+
+impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
+    /// The first bracket between two looks of which the earlier is not negative; `bounds` are those between them.
+    fn first(&mut self, [a, b]: Bracket, bounds: Enclosure, halvings: u32) -> Option<Bracket> {
+        let by_ends = (b.1 < 0.0).then_some([a, b]);
+        let (value, rate) = (bounds.value, bounds.rate);
+        if value.low >= 0.0 || rate.low >= 0.0 {
+            // Not negative anywhere, or nowhere less than at its start.
+            return None;
+        }
+        if rate.high <= 0.0 {
+            return by_ends;
+        }
+        // Nowhere below the lines from both ends with the extreme rates: their intersection, times the difference of the rates.
+        let width = (b.0 - a.0) * self.length;
+        let lowest = rate.high * a.1 - rate.low * b.1 + rate.low * rate.high * width;
+        if b.1 >= 0.0 && lowest >= 0.0 {
+            return None;
+        }
+        if halvings == 0 || self.left == 0 {
+            return by_ends;
+        }
+        let middle = 0.5 * (a.0 + b.0);
+        let middle = (middle, (self.value)(middle));
+        let first = self.half([a, middle], halvings);
+        // Where the middle is negative the first half has a bracket.
+        first.or_else(|| self.half([middle, b], halvings))
+    }
+
+    fn half(&mut self, [a, b]: Bracket, halvings: u32) -> Option<Bracket> {
+        self.left = self.left.saturating_sub(1);
+        let bounds = (self.enclose)(a.0, b.0);
+        self.first([a, b], bounds, halvings - 1)
+    }
+}
+
+/// Places of a step in which a guard without bounds is looked at.
+const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+
+/// The first bracket of a guard without bounds: between the looks, and where the quartic through them has a minimum below 0.
+fn looks(value: &mut impl FnMut(f64) -> f64, [start, last]: Bracket) -> Option<Bracket> {
+    let width = last.0;
+    let mut at = |place: f64| (place * width, value(place * width));
+    let look = [start, at(PLACES[1]), at(PLACES[2]), at(PLACES[3]), last];
+    for k in 1..look.len() {
+        if look[k].1 < 0.0 {
+            return Some(rise_before([look[k - 1], look[k]], value));
+        }
+        if let Some(place) = dip(&look.map(|(_, value)| value), k - 1) {
+            let dip = (place * width, value(place * width));
+            if dip.1 < 0.0 {
+                return Some(rise_before([look[k - 1], dip], value));
+            }
         }
     }
     None
 }
 
+/// Where the quartic through values at [`PLACES`] has a minimum below 0 between two of them, to a sixteenth of their distance.
+fn dip(values: &[f64; 5], between: usize) -> Option<f64> {
+    const PARTS: u32 = 16;
+    let (from, to) = (PLACES[between], PLACES[between + 1]);
+    // No quartic through positive values dips by more than they differ: most guards are far from 0.
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    if low > high - low {
+        return None;
+    }
+    let places = (1..PARTS).map(|k| from + (to - from) * f64::from(k) / f64::from(PARTS));
+    let (place, value) =
+        places.map(|p| (p, quartic(values, p))).fold((from, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
+    (value < 0.0).then_some(place)
+}
+
+/// The quartic through values at [`PLACES`], by Newton's divided differences.
+fn quartic(values: &[f64; 5], place: f64) -> f64 {
+    let mut d = *values;
+    for order in 1..5 {
+        for k in (order..5).rev() {
+            d[k] = (d[k] - d[k - 1]) / (PLACES[k] - PLACES[k - order]);
+        }
+    }
+    (0..4).rev().fold(d[4], |sum, k| d[k] + (place - PLACES[k]) * sum)
+}
+
+/// A guard that begins at zero, such as the speed of a joint that just broke away, may rise before it falls: looks closer.
+fn rise_before([a, b]: Bracket, value: &mut impl FnMut(f64) -> f64) -> Bracket {
+    if a.1 > 0.0 {
+        return [a, b];
+    }
+    let mut end = b;
+    for k in 1..=40 {
+        let theta = a.0 + (b.0 - a.0) * 0.5_f64.powi(k);
+        let look = (theta, value(theta));
+        if look.1 > 0.0 {
+            return [look, end];
+        }
+        if look.1 < 0.0 {
+            end = look;
+        }
+    }
+    [a, end]
+}
+
+/// A place where the value is negative, at most `resolution` behind one where it is not; the secant through both ends, moved by
+/// the resolution towards the end that it does not replace, and halving where that is slow.
+fn zero_between([mut a, mut b]: Bracket, resolution: f64, value: &mut impl FnMut(f64) -> f64) -> f64 {
+    let resolution = resolution.max(f64::EPSILON * a.0);
+    let mut width = b.0 - a.0;
+    let mut slow = 0;
+    while b.0 - a.0 > resolution {
+        let secant = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
+        let beside = if secant - a.0 < b.0 - secant { secant + resolution } else { secant - resolution };
+        let halve = slow > 1 || !(beside > a.0 && beside < b.0);
+        let middle = if halve { 0.5 * (a.0 + b.0) } else { beside };
+        if !(middle > a.0 && middle < b.0) {
+            break;
+        }
+        let look = (middle, value(middle));
+        *(if look.1 < 0.0 { &mut b } else { &mut a }) = look;
+        slow = if halve || b.0 - a.0 < 0.5 * width { 0 } else { slow + 1 };
+        width = b.0 - a.0;
+    }
+    b.0
+}
+
 /// The tangents of the time of an event, as a number without value: `dt = -dg / (dg/dt)` by the implicit function
-/// theorem, with the slope of the guard along the solution from the dense output. Where the guard only grazes zero the
-/// time has no derivative, and 0 stands for it.
+/// theorem, with the rate of the guard along the solution: exact where the dynamics give it, else from the dense output. Where
+/// the guard only grazes zero the time has no derivative, and 0 stands for it.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 /// I.14; jumps of tangents at events: S. Galan, W. Feehery, P. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
-pub(super) fn event_delay<S: Scalar, D: Dynamics<S>>(
-    f: &D,
-    index: usize,
-    step: &Step<D::State>,
-    x: &mut D::State,
-) -> S {
-    /// Part of the step between the two places that give the slope.
+pub(super) fn delay<S: Scalar, D: Dynamics<S>>(f: &D, index: usize, step: &Step<D::State>, x: &mut D::State) -> S {
+    /// Part of the step between the two places that give the rate.
     const APART: f64 = 1e-3;
     if S::DIRECTIONS == 0 {
         return S::from(0.0);
     }
-    let theta = step.taken / step.length;
+    let theta = step.share;
     let guard = |theta: f64, x: &mut D::State| {
         step.at(theta, x);
-        f.guard(index, step.start + theta * step.length, x)
+        f.guard(index, step.time(theta), x)
     };
-    let rise = guard(theta + APART, x).value() - guard(theta - APART, x).value();
-    let slope = rise / (2.0 * APART * step.length);
     let here = guard(theta, x);
-    let delay = -(here - here.value()) / slope;
+    let rate = f.guard_rate(index, step.time(theta), x).unwrap_or_else(|| {
+        let rise = guard(theta + APART, x).value() - guard(theta - APART, x).value();
+        rise / (2.0 * APART * step.length)
+    });
+    let delay = -(here - here.value()) / rate;
     if delay.tangents().iter().all(|d| d.is_finite()) { delay } else { S::from(0.0) }
 }
 
@@ -80,35 +380,4 @@ pub(super) fn shift<S: Scalar, D: Dynamics<S>>(f: &D, t: f64, x: &mut D::State, 
             *x += *dx * delay;
         }
     }
-}
-
-/// Where a guard that is not negative at `from` becomes so, before the place `to` where it is.
-fn first_zero(from: f64, to: (f64, f64), mut value: impl FnMut(f64) -> f64) -> f64 {
-    let mut before = (from, value(from));
-    // A guard that begins at zero, such as the speed of a joint that just broke away, may rise and fall again between
-    // two looks: look closer before it counts as an event on the spot.
-    if before.1 <= 0.0 {
-        let closer = (1..=40).map(|k| from + (to.0 - from) * 0.5_f64.powi(k));
-        before = closer.map(|theta| (theta, value(theta))).find(|(_, g)| *g > 0.0).unwrap_or(before);
-    }
-    if before.1 <= 0.0 { from } else { zero_between(before, to, &mut value) }
-}
-
-/// A zero between a place where `f` is positive and one where it is negative (Illinois method).
-fn zero_between(mut a: (f64, f64), mut b: (f64, f64), f: &mut impl FnMut(f64) -> f64) -> f64 {
-    for _ in 0..80 {
-        let middle = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
-        let middle = if middle > a.0.min(b.0) && middle < a.0.max(b.0) { middle } else { 0.5 * (a.0 + b.0) };
-        let here = (middle, f(middle));
-        if here.1 == 0.0 || (b.0 - a.0).abs() < 1e-14 {
-            return middle;
-        }
-        if here.1 * b.1 < 0.0 {
-            a = b;
-        } else {
-            a.1 *= 0.5;
-        }
-        b = here;
-    }
-    b.0
 }

@@ -8,64 +8,17 @@ use mops_core::{Failure, Scalar, Work};
 
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
-use super::events::{event_delay, first_event, shift};
+use super::events::{Events, delay, shift};
+use super::step::Step;
+use super::weights::Weights;
 use super::{Dynamics, IntegrationMethod, Simulated, Sink, Tolerance};
-
-/// An accepted step from `start` to `start + taken`, with its dense output.
-pub struct Step<X> {
-    /// Time at which it begins, s.
-    pub start: f64,
-    /// Length of the step for which the dense output was made, s.
-    pub length: f64,
-    /// Part of it that holds, s: less than `length` where an event ended it.
-    pub taken: f64,
-    dense: [X; 5],
-}
-
-impl<X> Step<X> {
-    /// The state at `start + s taken`, `s` in [0, 1].
-    #[inline]
-    pub fn state<S: Scalar>(&self, s: f64, x: &mut X)
-    where
-        X: AsRef<[S]> + AsMut<[S]>,
-    {
-        self.at(s * (self.taken / self.length), x);
-    }
-
-    /// One component of [`Step::state`].
-    #[inline]
-    pub(super) fn component<S: Scalar>(&self, s: f64, i: usize) -> S
-    where
-        X: AsRef<[S]>,
-    {
-        let theta = s * (self.taken / self.length);
-        let back = 1.0 - theta;
-        let [r0, r1, r2, r3, r4] = &self.dense;
-        let (r0, r1, r2, r3, r4) = (r0.as_ref()[i], r1.as_ref()[i], r2.as_ref()[i], r3.as_ref()[i], r4.as_ref()[i]);
-        r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
-    }
-
-    /// The state at `start + theta length`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
-    #[inline]
-    pub(super) fn at<S: Scalar>(&self, theta: f64, x: &mut X)
-    where
-        X: AsRef<[S]> + AsMut<[S]>,
-    {
-        let back = 1.0 - theta;
-        let [r0, r1, r2, r3, r4] = &self.dense;
-        let (r0, r1, r2, r3, r4) = (r0.as_ref(), r1.as_ref(), r2.as_ref(), r3.as_ref(), r4.as_ref());
-        for (i, x) in x.as_mut().iter_mut().enumerate() {
-            *x = r0[i] + (r1[i] + (r2[i] + (r3[i] + r4[i] * back) * theta) * back) * theta;
-        }
-    }
-}
 
 /// What a method is asked to do: a step of length `h` from `x` at `t`.
 pub(super) struct Attempt<'a, X> {
     pub(super) t: f64,
     pub(super) h: f64,
     pub(super) x: &'a X,
-    pub(super) tolerance: &'a Tolerance,
+    pub(super) weights: &'a Weights,
 }
 
 /// A one-step method with error estimate and dense output.
@@ -83,7 +36,7 @@ pub(super) trait Method<S: Scalar, D: Dynamics<S>> {
     /// The derivative at the start of the next step.
     fn slope(&self) -> &D::State;
 
-    /// Computes the state after the step, and its error over the tolerance; NaN where there is none.
+    /// Computes the state after the step, and the norm of its errors over their weights; NaN where there is none.
     fn attempt(&mut self, f: &D, at: Attempt<'_, D::State>, next: &mut D::State, work: &mut Work) -> f64;
 
     /// The step was accepted, and the next begins where it ended.
@@ -118,21 +71,25 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
     tolerance: &Tolerance,
     sink: &mut impl Sink<S, D>,
 ) -> Simulated<D::State> {
+    let span = end - t;
     let mut work = Work::default();
     let mut method = M::new(dynamics, &x);
+    let mut weights = Weights::new(dynamics, &x, span, tolerance);
+    let mut events = Events::new(span);
     let mut next = x.clone();
-    let mut at = x.clone();
     let mut spare = x.clone();
-    let mut step = Step { start: t, length: 0.0, taken: 0.0, dense: std::array::from_fn(|_| x.clone()) };
+    let mut step = Step::new(&x);
 
     dynamics.pass_break(t, &mut x);
+    events.settle(dynamics, t, &mut x, sink)?;
     method.restart(dynamics, t, &x, &mut work);
-    let mut h = initial_step(dynamics, (t, end), &x, method.slope(), tolerance, M::ERROR_ORDER);
+    let mut proposed = initial_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
     work.derivatives += 1;
     let mut last_log_error = LOG_SMALL_ERROR;
-    let mut rejected = false;
-    let mut events_here = 0;
-    let longest = dynamics.longest_step().min(if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY });
+    // Attempts at the present step that were rejected.
+    let mut rejected = 0;
+    let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
+    let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {
@@ -142,82 +99,86 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
             return Err(failure);
         }
         let stop = dynamics.next_break(t).min(end);
-        h = h.min(longest);
-        // A step that would leave a sliver before the stop is made to reach it.
-        let reaches = t + 1.01 * h >= stop;
-        if reaches {
-            h = stop - t;
-        } else if h <= 16.0 * f64::EPSILON * t.abs() {
+        proposed = proposed.min(longest);
+        // A step that would leave a sliver before the stop is made to reach it. It is cut, and what was proposed stands.
+        let reaches = t + 1.01 * proposed >= stop;
+        let h = if reaches { stop - t } else { proposed };
+        if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
             return Err(Failure::StepTooSmall(t));
         }
-        let error = method.attempt(dynamics, Attempt { t, h, x: &x, tolerance }, &mut next, &mut work);
+        work.derivatives += 2 * usize::from(weights.feel(dynamics, (t, &x), rejected));
+        let error = method.attempt(dynamics, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
         if !error.is_finite() || error > 1.0 {
-            if !error.is_finite() && (h < 1e-12 || !all_finite::<S>(x.as_ref())) {
+            if !error.is_finite() && (h < 1e-12 * span || !all_finite::<S>(x.as_ref())) {
                 return Err(Failure::Diverged(t));
             }
             // Hairer's factors: 0.9 as safety, at most a fifth at once.
-            h *= if error.is_finite() { (0.9 * error.powf(-1.0 / M::ERROR_ORDER)).max(0.2) } else { 0.1 };
+            proposed = h * if error.is_finite() { (0.9 * error.powf(-1.0 / M::ERROR_ORDER)).max(0.2) } else { 0.1 };
             work.rejected += 1;
-            rejected = true;
+            rejected += 1;
             continue;
         }
         work.steps += 1;
-        step.start = t;
-        step.length = h;
-        step.taken = h;
+        work.rough += usize::from(weights.is_rough(h, x.as_ref()));
+        step.begin(t, h);
         if sink.reads_steps() || dynamics.guards() > 0 || dynamics.remembers() {
             method.dense(h, &x, &next, &mut step.dense);
         }
-        let event = first_event(dynamics, &mut step, &mut spare);
+        let arrival = if reaches { stop } else { t + h };
+        let event = events.first(dynamics, &mut step, (arrival, &next), &mut spare);
         sink.step(&step, dynamics);
         if dynamics.remembers() {
             dynamics.accepted(&step);
         }
-        if let Some(index) = event {
-            step.state(1.0, &mut at);
-            // An event at the very start of a step is one at the same time as the last: modes that never agree on
-            // whose turn it is are a failure, not a hang.
-            events_here = if step.taken > 16.0 * f64::EPSILON * t.abs() { 0 } else { events_here + 1 };
-            if events_here > 100 {
-                return Err(Failure::StepTooSmall(t));
+        let factor = step_factor::<S, D, M>(error, &mut last_log_error, rejected > 0);
+        proposed = if reaches { proposed.max(h * factor) } else { h * factor };
+        rejected = 0;
+        let Some(index) = event else {
+            std::mem::swap(&mut x, &mut next);
+            t = arrival;
+            weights.follow(x.as_ref());
+            if !reaches {
+                method.advance();
+                continue;
             }
-            t += step.taken;
-            let delay = event_delay(dynamics, index, &step, &mut spare);
-            shift(dynamics, t, &mut at, &mut spare, delay);
-            sink.event(t, dynamics.switch(index, t, &mut at));
-            shift(dynamics, t, &mut at, &mut spare, -delay);
-            std::mem::swap(&mut x, &mut at);
-            rejected = false;
-            // An event within rounding of a break must not swallow it.
-            if t >= stop {
-                t = stop;
-                dynamics.pass_break(t, &mut x);
-            }
-            method.restart(dynamics, t, &x, &mut work);
-            continue;
-        }
-        events_here = 0;
-        std::mem::swap(&mut x, &mut next);
-        if reaches {
-            t = stop;
             dynamics.pass_break(t, &mut x);
+            events.settle(dynamics, t, &mut x, sink)?;
             if t < end {
                 method.restart(dynamics, t, &x, &mut work);
             }
+            continue;
+        };
+        // The tangents of the state at the event are those at the time to which a tuner moves it.
+        let delay = delay(dynamics, index, &step, &mut spare);
+        let here = step.time(step.share);
+        let at_stop = reaches && stop - here <= events.resolution(stop);
+        if at_stop {
+            t = stop;
+            std::mem::swap(&mut x, &mut next);
         } else {
-            t += h;
-            method.advance();
+            t = here;
+            step.at(step.share, &mut x);
         }
-        // PI step-size control with beta = 0.04, as in the authors' DOPRI5: `0.9 error^-(1/q - 0.75 beta) last_error^beta`.
-        let log_error = error.max(1e-10).ln();
-        let factor = 0.9 * (0.04 * last_log_error - (1.0 / M::ERROR_ORDER - 0.04 * 0.75) * log_error).exp();
-        let factor = factor.clamp(0.2, if rejected { 1.0 } else { 10.0 });
-        // A step cut short by a break says little about the next.
-        h = if reaches { (h * factor).max(h) } else { h * factor };
-        last_log_error = log_error.max(LOG_SMALL_ERROR);
-        rejected = false;
+        shift(dynamics, t, &mut x, &mut spare, delay);
+        if at_stop {
+            dynamics.pass_break(t, &mut x);
+        }
+        dynamics.delay_events(delay);
+        events.settle(dynamics, t, &mut x, sink)?;
+        dynamics.delay_events(S::from(0.0));
+        shift(dynamics, t, &mut x, &mut spare, -delay);
+        weights.follow(x.as_ref());
+        method.restart(dynamics, t, &x, &mut work);
     }
     if all_finite::<S>(x.as_ref()) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
+}
+
+/// PI step-size control with beta = 0.04, as in the authors' DOPRI5: `0.9 error^-(1/q - 0.75 beta) last_error^beta`.
+fn step_factor<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(error: f64, last: &mut f64, was_rejected: bool) -> f64 {
+    let log_error = error.max(1e-10).ln();
+    let factor = 0.9 * (0.04 * *last - (1.0 / M::ERROR_ORDER - 0.04 * 0.75) * log_error).exp();
+    *last = log_error.max(LOG_SMALL_ERROR);
+    factor.clamp(0.2, if was_rejected { 1.0 } else { 10.0 })
 }
 
 /// `ln 1e-4`: the error that an earlier step counts as having had at least.
@@ -227,43 +188,44 @@ fn all_finite<S: Scalar>(x: &[S]) -> bool {
     x.iter().all(|x| x.value().is_finite())
 }
 
-/// Root mean square of differences over their tolerance; each comes with the size it is relative to.
-#[inline]
-#[allow(clippy::cast_precision_loss)]
-pub(super) fn scaled_norm(differences: impl ExactSizeIterator<Item = (f64, f64)>, tolerance: &Tolerance) -> f64 {
-    let n = differences.len().max(1) as f64;
-    let ratio = |(difference, size)| difference / (tolerance.absolute + tolerance.relative * size);
-    (differences.map(ratio).map(|r: f64| r * r).sum::<f64>() / n).sqrt()
-}
-
-/// A first guess of the step size (algorithm II.4.14 of the source).
+/// A first guess of the step size (algorithm II.4.14 of the source), with times in units of the interval and each state in
+/// units of its size, or where it starts at 0 of what it becomes at its first rate in a thousandth of the interval: so that the
+/// guess depends on no unit.
 fn initial_step<S: Scalar, D: Dynamics<S>>(
     f: &D,
     (t, end): (f64, f64),
     x: &D::State,
     slope: &D::State,
-    tolerance: &Tolerance,
     order: f64,
 ) -> f64 {
-    let norm =
-        |v: &[S], x: &[S]| scaled_norm(v.iter().map(|v| v.value()).zip(x.iter().map(|x| x.value().abs())), tolerance);
-    let (mut stage, mut derivative) = (x.clone(), x.clone());
+    let span = end - t;
     let slope = slope.as_ref();
-    let (d0, d1) = (norm(x.as_ref(), x.as_ref()), norm(slope, x.as_ref()));
-    let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
-    let h0 = h0.min(end - t);
+    let size = |i: usize| match x.as_ref()[i].value().abs() {
+        0.0 => 1e-3 * span * slope[i].value().abs(),
+        size => size,
+    };
+    // Sizes over the tolerance of the default; the guess goes with its fifth root.
+    let scaled = |v: &[S]| {
+        let ratio = |i: usize| if size(i) > 0.0 { v[i].value() / (1e-8 * size(i)) } else { 0.0 };
+        #[allow(clippy::cast_precision_loss)]
+        let n = v.len().max(1) as f64;
+        ((0..v.len()).map(|i| ratio(i) * ratio(i)).sum::<f64>() / n).sqrt()
+    };
+    let (mut stage, mut derivative) = (x.clone(), x.clone());
+    let (d0, d1) = (scaled(x.as_ref()), span * scaled(slope));
+    let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { (0.01 * d0 / d1).min(1.0) };
     for (i, s) in stage.as_mut().iter_mut().enumerate() {
-        *s = x.as_ref()[i] + slope[i] * h0;
+        *s = x.as_ref()[i] + slope[i] * (h0 * span);
     }
-    f.derivative(t + h0, &stage, &mut derivative);
+    f.derivative(t + h0 * span, &stage, &mut derivative);
     for (i, s) in stage.as_mut().iter_mut().enumerate() {
         *s = derivative.as_ref()[i] - slope[i];
     }
-    let d2 = norm(stage.as_ref(), x.as_ref()) / h0;
+    let d2 = span * scaled(stage.as_ref()) / h0;
     let largest = d1.max(d2);
     let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / largest).powf(1.0 / order) };
-    let h = (100.0 * h0).min(h1).min(end - t);
-    if h.is_finite() && h > 0.0 { h } else { 1e-6_f64.min(end - t) }
+    let h = (100.0 * h0).min(h1).min(1.0) * span;
+    if h.is_finite() && h > 0.0 { h } else { 1e-6 * span }
 }
 
 #[cfg(test)]
@@ -280,8 +242,7 @@ mod tests {
         }
     }
 
-    const TIGHT: Tolerance =
-        Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000, method: IntegrationMethod::Explicit };
+    const TIGHT: Tolerance = Tolerance { relative: 1e-10, max_steps: 100_000, ..Tolerance::DEFAULT };
 
     #[test]
     fn the_harmonic_oscillator_comes_back_after_a_period() {

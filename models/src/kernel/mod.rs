@@ -12,16 +12,20 @@ mod local;
 pub mod mechanism;
 mod opened;
 mod record;
+mod step;
+mod weights;
 mod written;
 
+use mops_core::enclosure::Enclosure;
 use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 
 pub use mops_core::{IntegrationMethod, Tolerance};
 
-pub use integrate::{Step, integrate};
+pub use integrate::integrate;
 pub use local::{Equations, local, rates_and_signals, rests};
 pub use opened::{Holds, Opened};
 pub use record::{Recording, Simulate, Wanted, analyse, record, tangents, tangents_of, wanted};
+pub use step::Step;
 pub use written::{Kernel, Written};
 
 /// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
@@ -51,6 +55,40 @@ pub trait Dynamics<S: Scalar> {
     fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &str {
         ""
     }
+
+    /// The rate of a guard along the solution, per s; `None` where only values of the guard tell it.
+    fn guard_rate(&self, _index: usize, _t: f64, _x: &Self::State) -> Option<f64> {
+        None
+    }
+
+    /// Whether it encloses its guards.
+    fn has_bounds(&self) -> bool {
+        false
+    }
+
+    /// Bounds of a guard and of its rate over a time in which the states stay within their bounds `x`; asked for where
+    /// [`Dynamics::has_bounds`].
+    fn enclose_guard(&self, _index: usize, _time: Enclosure, _x: &[Enclosure]) -> Enclosure {
+        Enclosure::UNKNOWN
+    }
+
+    /// The events of a guard accumulate at this instant, in intervals below `close` in s: takes the state to where it rests
+    /// and returns what happened.
+    ///
+    /// # Errors
+    /// There is no such state: which events accumulate, and the way out. The simulation fails.
+    fn rest(&mut self, _index: usize, _t: f64, _close: f64, _x: &mut Self::State) -> Result<&str, String> {
+        Err("a mode of the model changes to and fro without end".to_owned())
+    }
+
+    /// The typical size of a state, in its unit; `None` where only the simulation tells it.
+    fn scale(&self, _state: usize) -> Option<f64> {
+        None
+    }
+
+    /// The events that follow happen later by this number, which has tangents and no value: that is how the parameters move
+    /// their time. What resets read of time and of inputs moves with it.
+    fn delay_events(&mut self, _delay: S) {}
 
     /// The state that a signal shows as it is; `None` where it must be computed.
     fn shows(&self, _signal: usize) -> Option<usize> {

@@ -82,6 +82,18 @@ impl<S: Scalar, D: Holds<S>, F: Fn(&D, usize, f64, &D::State) -> S> Plant<S> for
         what
     }
 
+    fn rest(&mut self, index: usize, at: &Instant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
+        let held = self.held.get_mut();
+        held.look(at);
+        let what = held.dynamics.rest(index, at.t, close, &mut held.x)?;
+        x.copy_from_slice(held.x.as_ref());
+        Ok(what)
+    }
+
+    fn scale(&self, state: usize) -> Option<f64> {
+        self.held.borrow().dynamics.scale(state)
+    }
+
     fn settle(&mut self, at: &Instant<'_, S>) {
         let held = self.held.get_mut();
         held.look(at);

@@ -4,6 +4,7 @@ use mops_core::{
     Along, Analysis, Cancellation, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
 };
 
+use super::weights::SHARE;
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
 /// A recorded simulation: the signals, and their derivative along every direction of the scalar.
@@ -111,6 +112,8 @@ struct Recorder<'a, X, F> {
 /// How well the steps resolve a computed signal.
 #[derive(Debug, Clone, Copy)]
 struct Resolved {
+    /// Largest absolute value so far.
+    size: f64,
     /// Slope at the end of the last step, per s; NaN before the first.
     slope: f64,
     /// The longest step whose quartic was compared with the signal and found right, s.
@@ -159,19 +162,20 @@ impl<X: Clone, F> Recorder<'_, X, F> {
         }
     }
 
-    /// What the quartic of values of this size may be off.
-    fn allowed(&self, size: f64) -> f64 {
-        OFF * (self.tolerance.absolute + self.tolerance.relative * size)
+    /// What the quartic of a signal may be off where its values are of this size: as the states, on a scale of its own.
+    fn allowed(&self, index: usize, size: f64) -> f64 {
+        let Tolerance { relative, absolute, .. } = self.tolerance;
+        OFF * (absolute.unwrap_or(SHARE * relative * self.resolved[index].size) + relative * size)
     }
 
     /// Whether the quartic through the values is what the signal is near both ends. What is not finite is left alone.
-    fn agrees<S: Scalar>(&self, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
+    fn agrees<S: Scalar>(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
         let [first, last] = [CHECK, 1.0 - CHECK].map(|s| signal(s).value());
         let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
             WEIGHTS.iter().enumerate().map(|(k, weight)| weight * values[node(k)].value()).sum()
         };
         let off = [quartic(&|k| k) - first, quartic(&|k| 4 - k) - last].map(f64::abs);
-        let allowed = self.allowed(largest(values).max(first.abs()).max(last.abs()));
+        let allowed = self.allowed(index, largest(values).max(first.abs()).max(last.abs()));
         off.iter().all(|off| off.is_nan() || *off <= allowed)
     }
 
@@ -182,7 +186,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
         let begin = slope(&|k| SLOPE[k]);
         let off = (begin - self.resolved[index].slope).abs() * length;
         self.resolved[index].slope = slope(&|k| -SLOPE[4 - k]);
-        length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(largest(values))
+        length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
     /// Adds the part `[from, to]` of a step to the traces of a signal, in halves where one quartic does not do.
@@ -203,7 +207,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
             signal(step.start + s * step.taken, &state)
         };
         let values = Trace::NODES.map(&mut at);
-        if halvings == 0 || self.taken > self.room || self.agrees(&values, &mut at) {
+        if halvings == 0 || self.taken > self.room || self.agrees(index, &values, &mut at) {
             self.push(index, step.start + to * step.taken, &values);
             return;
         }
@@ -240,13 +244,14 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
             let computed = |t: f64, x: &D::State| output(dynamics, *signal, t, x);
             let time = |s: f64| step.start + s * step.taken;
             let values: [S; 5] = std::array::from_fn(|node| computed(time(Trace::NODES[node]), &self.states[node]));
+            self.resolved[i].size = self.resolved[i].size.max(largest(&values));
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
                 let inside = |s: f64| {
                     step.state(s, &mut state);
                     computed(time(s), &state)
                 };
-                if !self.agrees(&values, inside) {
+                if !self.agrees(i, &values, inside) {
                     for half in [[0.0, 0.5], [0.5, 1.0]] {
                         self.refine(step, i, half, HALVINGS, &computed);
                     }
@@ -311,7 +316,7 @@ fn record_within<S: Scalar, D: Dynamics<S>>(
         traces: vec![vec![Trace::starting_at(0.0, segments); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
         states: std::array::from_fn(|_| start.clone()),
-        resolved: vec![Resolved { slope: f64::NAN, longest: 0.0 }; signals.len()],
+        resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
         tolerance,
     };
     let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;

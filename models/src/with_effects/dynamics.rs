@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar};
+use mops_core::enclosure::Enclosure;
+use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar, Span};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -586,6 +587,51 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, jumped).clone_into(&mut self.happened);
         self.settle_gaps(t, x);
         &self.happened
+    }
+
+    fn has_bounds(&self) -> bool {
+        self.plant.has_bounds()
+    }
+
+    /// Guards of the plant, as far as they do not depend on what effects make of inputs and forces.
+    fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        if index >= self.plant.guards() {
+            return Enclosure::UNKNOWN;
+        }
+        let acts_on = |i: usize| {
+            self.actors.iter().any(|actor| matches!(actor.place.site, Site::Actuator { input } if input == i))
+        };
+        let input = |(i, command): (usize, &Command<'_, S>)| match acts_on(i) {
+            true => Enclosure::UNKNOWN,
+            false => command.drive.enclose(time),
+        };
+        let u: Vec<Enclosure> = self.commands.iter().enumerate().map(input).collect();
+        let w = vec![Enclosure::UNKNOWN; self.forces];
+        self.plant.enclose_guard(index, &Span { time, x: &x[..self.own], u: &u, w: &w })
+    }
+
+    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut Vec<S>) -> Result<&str, String> {
+        let own = self.plant.guards();
+        if index >= own {
+            let what = if index < own + self.contacts.len() {
+                "a joint sticks and slides"
+            } else {
+                "a contact opens and closes"
+            };
+            return Err(format!("{what} again and again"));
+        }
+        let (mut u, mut w) = (Vec::new(), Vec::new());
+        let mut dx = vec![S::from(0.0); self.own];
+        self.balance(t, x, &mut u, &mut w, &mut dx);
+        let before = x[..self.own].to_vec();
+        let at = Instant { t, x: &before, u: &u, w: &w };
+        self.plant.rest(index, &at, close, &mut x[..self.own])?.clone_into(&mut self.happened);
+        self.settle_gaps(t, x);
+        Ok(&self.happened)
+    }
+
+    fn scale(&self, state: usize) -> Option<f64> {
+        (state < self.own).then(|| self.plant.scale(state)).flatten()
     }
 
     fn shows(&self, signal: usize) -> Option<usize> {

@@ -257,11 +257,14 @@ fn pushed(
     (signals.iter().map(|name| response.trace(name).expect("it was asked for").clone()).collect(), response.events)
 }
 
-/// The largest difference of two models' signals.
+/// The largest difference of two models' signals, each over the largest value of the signal or 1.
 fn apart(a: &[mops_core::Trace], b: &[mops_core::Trace]) -> f64 {
-    let at = |k: i32| f64::from(k) * 0.013;
-    let difference = |k: i32| a.iter().zip(b).map(move |(a, b)| (a.at(at(k)) - b.at(at(k))).abs()).fold(0.0, f64::max);
-    (0..460).map(difference).fold(0.0, f64::max)
+    let times = || (0..460).map(|k| f64::from(k) * 0.013);
+    let largest = |of: &dyn Fn(f64) -> f64| times().map(|t| of(t).abs()).fold(0.0, f64::max);
+    let relative = |(a, b): (&mops_core::Trace, &mops_core::Trace)| {
+        largest(&|t| a.at(t) - b.at(t)) / largest(&|t| a.at(t)).max(1.0)
+    };
+    a.iter().zip(b).map(relative).fold(0.0, f64::max)
 }
 
 const LUMPED: [(&str, f64); 7] =

@@ -49,6 +49,8 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
         if let Some(row) = column.bad {
             let span = layout.cell(&source.text, cell, row).expect("the row was read");
             skipped.push(format!("{name}: text (`{}`)", shortened(&source.text[span])));
+        } else if cell + 1 == header.names.len() && is_unnamed(&header, source) && !column.has_numbers {
+            // What a separator at the end of the header begins.
         } else {
             layout.cells.push(cell);
             let (name, unit, rows) = (name.clone(), unit.clone(), column.values.len());
@@ -61,6 +63,11 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
             .at(source, header.span));
     }
     Ok((variables, skipped, layout))
+}
+
+/// Whether the last cell of the header is empty.
+fn is_unnamed(header: &Header, source: &Arc<Source>) -> bool {
+    header.names.len() > 1 && source.text[header.span.clone()].ends_with(char::from(header.separator))
 }
 
 struct Header {
@@ -89,6 +96,7 @@ impl Header {
             let names = (1..=spans.len()).map(|k| (k.to_string(), None)).collect();
             return Ok(Self { separator, names, span, body: start });
         }
+        refuse_long_quotes(source, start, separator)?;
         let name = |(cell, k): (&Range<usize>, usize)| name_and_unit(&text[cell.clone()], k);
         let names: Vec<_> = spans.iter().zip(1..).map(name).collect();
         refuse_duplicates(source, &names, &spans)?;
@@ -177,14 +185,18 @@ fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Resu
         .delimiter(header.separator)
         .from_reader(&text.as_bytes()[header.body..]);
     let mut record = ByteRecord::new();
+    let mut marks = DecimalMarks::of(header.separator);
     while reader.read_byte_record(&mut record).expect("reading from memory does not fail") {
         let start = record.position().expect("a record that was read has a position").byte() as usize + header.body;
         // N.B.: the position may lie before the line feeds that the reader skipped.
         let start = start + text[start..].len() - text[start..].trim_start_matches(['\n', '\r']).len();
+        refuse_long_quotes(source, start, header.separator)?;
         if record.len() == 1 && columns.len() > 1 && record[0].trim_ascii().is_empty() {
             continue;
         }
-        if record.len() != columns.len() {
+        // A separator at the end of a row begins no cell.
+        let ends_with_separator = record.len() == columns.len() + 1 && record[columns.len()].trim_ascii().is_empty();
+        if record.len() != columns.len() && !ends_with_separator {
             return Err(uneven(source, start, record.len(), header));
         }
         if columns.len() == 1 {
@@ -196,8 +208,9 @@ fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Resu
             }
         }
         layout.rows.push(start);
-        for (column, cell) in columns.iter_mut().zip(&record) {
+        for (k, (column, cell)) in columns.iter_mut().zip(&record).enumerate() {
             column.push(number(cell, header.separator));
+            marks.refuse_both(source, cell, || layout.cell(text, k, layout.rows.len() - 1))?;
         }
     }
     if layout.rows.is_empty() {
@@ -215,12 +228,70 @@ fn blank_lines(text: &str, between: Range<usize>) -> impl Iterator<Item = usize>
     std::iter::from_fn(move || ends.next().filter(|_| ends.peek().is_some()))
 }
 
+/// Refuses a cell whose quotation mark never closes, or closes behind further rows: what it swallows would be lost without a
+/// word. A text of several lines is none of them.
+fn refuse_long_quotes(source: &Arc<Source>, start: usize, separator: u8) -> Result<(), Diagnostic> {
+    let text = &source.text;
+    let row: Vec<Range<usize>> = cells(text, start, separator).collect();
+    let Some(cell) = row.iter().find(|cell| text[(*cell).clone()].contains(['\n', '\r'])) else { return Ok(()) };
+    let inside = &text[cell.clone()];
+    let quotes = inside.bytes().filter(|&byte| byte == b'"').count();
+    // Between two stray marks in one column stand as many separators as a row has.
+    let swallows_a_row = inside.bytes().filter(|&byte| byte == separator).count() + 1 >= row.len();
+    let fact = if quotes % 2 == 1 {
+        "the quotation mark that opens here does not close"
+    } else if swallows_a_row {
+        "the quotation mark that opens here closes behind another row"
+    } else {
+        return Ok(());
+    };
+    let line = inside.find(['\n', '\r']).expect("the cell has a line break");
+    Err(Diagnostic::new(fact)
+        .with_label("opens here")
+        .with_help("remove the quotation mark, or close it on its line")
+        .at(source, cell.start..cell.start + line))
+}
+
+/// The decimal marks of a file whose cells no comma separates: `1,234` beside `1.5` may be a thousand or one and a bit.
+struct DecimalMarks {
+    /// Whether a comma may stand in a number.
+    with_commas: bool,
+    point: bool,
+    comma: bool,
+}
+
+impl DecimalMarks {
+    fn of(separator: u8) -> Self {
+        Self { with_commas: separator != b',', point: false, comma: false }
+    }
+
+    /// Refuses a number with another decimal mark than those before it.
+    fn refuse_both(
+        &mut self,
+        source: &Arc<Source>,
+        cell: &[u8],
+        span: impl FnOnce() -> Option<Range<usize>>,
+    ) -> Result<(), Diagnostic> {
+        if !self.with_commas || !cell.iter().all(|byte| b"0123456789+-.,eE \"".contains(byte)) {
+            return Ok(());
+        }
+        self.point |= cell.contains(&b'.');
+        self.comma |= cell.contains(&b',');
+        if !(self.point && self.comma) {
+            return Ok(());
+        }
+        Err(Diagnostic::new("a decimal point and a decimal comma stand in one file")
+            .with_help("write all numbers with the same mark, and without marks between thousands")
+            .at(source, span().unwrap_or(0..0)))
+    }
+}
+
 /// The number in a cell, NaN for a gap, none for text.
 fn number(cell: &[u8], separator: u8) -> Option<f64> {
     let cell = str::from_utf8(cell.trim_ascii()).ok()?;
     match cell {
         "" | "NA" => Some(f64::NAN),
-        _ if separator == b';' && cell.contains(',') => cell.replace(',', ".").parse().ok(),
+        _ if separator != b',' && cell.contains(',') => cell.replace(',', ".").parse().ok(),
         _ => cell.parse().ok(),
     }
 }

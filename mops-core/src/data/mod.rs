@@ -16,6 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Diagnostic, Source, suggestion};
+use crate::unit::Unit;
 
 /// What kind of file it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,6 +146,18 @@ impl DataFile {
         let (variables, skipped, layout) = read?;
         let index = index_of(&variables);
         Ok(Self { source, format: Format::Csv, variables, skipped, layout, index })
+    }
+
+    /// The column that is the time where nobody says which: the one called `t`, or `time` in any case; or `T` if its unit is one
+    /// of time, as a temperature has this name too.
+    pub fn time_column(&self) -> Option<String> {
+        let names = self.column_names();
+        let is_time = |name: &&String| name.as_str() == "t" || name.eq_ignore_ascii_case("time");
+        let in_seconds = |name: &&String| {
+            let unit = self.column(name).ok().and_then(|column| column.unit).map(Unit::parse);
+            name.as_str() == "T" && unit.is_some_and(|unit| unit.is_ok_and(|u| u.is_compatible(&Unit::known("s"))))
+        };
+        names.iter().find(is_time).or_else(|| names.iter().find(in_seconds)).cloned()
     }
 
     /// The column called `name`: a vector by its name, column k (from 1) of a matrix as `Data:3`, an element of a cell

@@ -109,13 +109,26 @@ mod csv {
         let gap = "write a number such as 1.5e-3; a gap is an empty cell, NaN or NA";
         let cells = "give every row as many cells, an empty one for a gap";
         let comma = "give every row as many cells; numbers with a decimal comma need `;` between cells";
+        let marks = "a decimal point and a decimal comma stand in one file; write all numbers with the same mark, and without \
+                     marks between thousands";
+        let (open, quote) =
+            ("the quotation mark that opens here", "remove the quotation mark, or close it on its line");
         let cases = [
             ("", "data: the data file is empty; write a header such as `t[s],u[N*m]` and rows of numbers below it", ""),
             ("t,y\n", "data:1:1: the header has no rows below it; add a row of numbers for each sample", "t,y"),
             ("t,y\n0,1\n1,x2\n", &format!("data:3:3: `x2` in column `y` is not a number; {gap}"), "x2"),
             ("t,y\n0,inf\n1,2\n", &format!("data:2:3: `inf` in column `y` is not finite; {gap}"), "inf"),
             ("t,y\n0,1e999\n", &format!("data:2:3: `1e999` in column `y` is not finite; {gap}"), "1e999"),
-            ("t;y\n0;1.234,5\n1;2", &format!("data:2:3: `1.234,5` in column `y` is not a number; {gap}"), "1.234,5"),
+            ("t;y\n0;1.234,5\n1;2", &format!("data:2:3: {marks}"), "1.234,5"),
+            ("t;y\n0;1.5\n1;1,234\n", &format!("data:3:3: {marks}"), "1,234"),
+            ("t\ty\n0,1\t2\n0.2\t3\n", &format!("data:3:1: {marks}"), "0.2"),
+            ("t,y,note\n0,1,\"a\n1,2,b\n2,3,c\n", &format!("data:2:5: {open} does not close; {quote}"), "\"a"),
+            ("t,y,\"note\n0,1,a\n1,2,b\n", &format!("data:1:5: {open} does not close; {quote}"), "\"note"),
+            (
+                "t,n,y\n0,\"a,1\n1,b\",2\n2,c,3\n",
+                &format!("data:2:3: {open} closes behind another row; {quote}"),
+                "\"a,1",
+            ),
             ("t,y\n0,1\n1\n", &format!("data:3:1: the row has 1 cell, the first line has 2; {cells}"), "1"),
             ("t,y\n0,1,5\n", &format!("data:2:1: the row has 3 cells, the first line has 2; {comma}"), "0,1,5"),
             (
@@ -131,6 +144,38 @@ mod csv {
         ];
         for (text, message, marked) in cases {
             assert_eq!(error(text), (message.to_owned(), marked.to_owned()));
+        }
+    }
+
+    #[test]
+    fn a_separator_at_the_end_of_a_line_begins_no_column() {
+        for text in ["t,y,\n0,1,\n1,2,\n", "t,y\n0,1,\n1,2,\n", "t;y;\n0;1\n", "t,y\n0,1,\n1,2\n"] {
+            let text = text.replace("t;y;\n0;1\n", "t;y;\n0;1;\n");
+            assert_eq!(read(text.as_str()).column_names(), ["t", "y"], "{text}");
+        }
+        assert_eq!(read("t,y,\n0,1,5\n").column_names(), ["t", "y", "3"]);
+    }
+
+    #[test]
+    fn decimal_commas_are_read_between_semicolons_and_between_tabs() {
+        for text in ["t;y\n0,5;-1,25e3\n", "t\ty\n0,5\t-1,25e3\n"] {
+            assert_eq!(read(text).column("y").unwrap().values, [-1250.0], "{text}");
+        }
+    }
+
+    #[test]
+    fn the_time_is_the_column_of_its_name_not_of_its_first_letter() {
+        for (header, time) in [
+            ("t,T", Some("t")),
+            ("T,t", Some("t")),
+            ("T[degC],Time", Some("Time")),
+            ("T[degC],y", None),
+            ("T,y", None),
+            ("T[ms],y", Some("T")),
+            ("torque,y", None),
+            ("TIME,t", Some("TIME")),
+        ] {
+            assert_eq!(read(format!("{header}\n0,1\n").as_str()).time_column().as_deref(), time, "{header}");
         }
     }
 

@@ -91,8 +91,8 @@ impl Function {
             Self::Sin => x.sin(),
             Self::Cos => x.cos(),
             Self::Tan => x.sin() / x.cos(),
-            Self::Asin => x.chain(v.asin(), 1.0 / (1.0 - v * v).sqrt()),
-            Self::Acos => x.chain(v.acos(), -1.0 / (1.0 - v * v).sqrt()),
+            Self::Asin => x.chain(v.asin(), tangent(1.0 / (1.0 - v * v).sqrt())),
+            Self::Acos => x.chain(v.acos(), tangent(-1.0 / (1.0 - v * v).sqrt())),
             Self::Atan => x.chain(v.atan(), 1.0 / (1.0 + v * v)),
             Self::Sinh => x.chain(v.sinh(), v.cosh()),
             Self::Cosh => x.chain(v.cosh(), v.sinh()),
@@ -106,7 +106,15 @@ impl Function {
     }
 }
 
-/// Square root, with derivative 0 at 0: a tank that ran empty stays empty whatever its tangents.
+/// A derivative for tangents: 0 where it is infinite, as at the ends of roots and of arcs. A simulation that rests there keeps
+/// finite tangents, such as a tank that ran empty; a linearisation there is refused, as differences grow where the slope is
+/// said to be 0.
+#[inline]
+fn tangent(derivative: f64) -> f64 {
+    if derivative.is_infinite() { 0.0 } else { derivative }
+}
+
+/// Square root; its infinite derivative at 0 counts as 0.
 #[inline]
 pub fn sqrt<S: Scalar>(x: S) -> S {
     if x.value() == 0.0 { x.chain(0.0, 0.0) } else { x.sqrt() }
@@ -119,11 +127,12 @@ pub fn atan2<S: Scalar>(y: S, x: S) -> S {
     (y * (b / square) - x * (a / square)).chain(a.atan2(b), 1.0)
 }
 
-/// `base^exponent`; a negative base needs a whole exponent that does not vary.
+/// `base^exponent`; a negative base needs a whole exponent that does not vary. An infinite derivative at base 0 counts as 0,
+/// as that of a square root.
 pub fn power<S: Scalar>(base: S, exponent: S) -> S {
     let (a, b) = (base.value(), exponent.value());
     let value = a.powf(b);
-    let by_base = if b == 0.0 { 0.0 } else { b * a.powf(b - 1.0) };
+    let by_base = if b == 0.0 { 0.0 } else { tangent(b * a.powf(b - 1.0)) };
     let by_exponent = if a > 0.0 { value * a.ln() } else { 0.0 };
     (base * by_base + exponent * by_exponent).chain(value, 1.0)
 }
@@ -199,6 +208,22 @@ mod tests {
         }
         let cube: Dual<1> = power(Dual::variable(-2.0, 0), Dual::from(3.0));
         assert_eq!((cube.value, cube.tangent), (-8.0, [12.0]));
+    }
+
+    #[test]
+    fn infinite_derivatives_at_the_ends_of_roots_and_arcs_count_as_zero() {
+        let at = |x: f64| Dual::<1>::variable(x, 0);
+        for (value, found) in [
+            (0.0, sqrt(at(0.0))),
+            (0.0, power(at(0.0), Dual::from(0.5))),
+            (0.0, power(at(0.0), Dual::from(0.9))),
+            (std::f64::consts::FRAC_PI_2, Function::Asin.smooth(at(1.0)).unwrap()),
+            (std::f64::consts::PI, Function::Acos.smooth(at(-1.0)).unwrap()),
+        ] {
+            assert_eq!((found.value, found.tangent), (value, [0.0]));
+        }
+        assert_eq!(power(at(0.0), Dual::from(1.0)).tangent, [1.0]);
+        assert_eq!(power(at(0.0), Dual::from(1.5)).tangent, [0.0]);
     }
 
     #[test]

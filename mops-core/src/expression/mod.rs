@@ -209,7 +209,9 @@ mod tests {
             // One of these opens two brackets a level.
             let levels = open.matches(['(', '^']).count();
             assert!(Expression::parse(&nested(DEEPEST / levels)).is_ok(), "{open}");
-            for depth in [DEEPEST / levels + 1, 1000, 10_000, 40_000] {
+            // Texts of more than a megabyte are refused for their length.
+            let longest = 1_000_000 / (open.len() + close.len());
+            for depth in [DEEPEST / levels + 1, 1000, 10_000, longest] {
                 let wrong = Expression::parse(&nested(depth)).unwrap_err();
                 assert_eq!(wrong.message, format!("nested more than {DEEPEST} deep"), "{open} {depth}");
                 let place = (open.len() * DEEPEST / levels).saturating_sub(open.len());

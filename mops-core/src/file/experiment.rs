@@ -79,10 +79,13 @@ struct Table<'f> {
     file: &'f DataFile,
     /// Name of the time column.
     time: String,
-    /// Times of the rows used, s, as the study counts them.
+    /// Times of all rows, s, as the study counts them.
     times: Vec<f64>,
-    /// Rows used.
+    /// Rows of which measurements are used.
     rows: Range<usize>,
+    /// Rows of which inputs are used: from the start of the simulation on, which may be before the first measurement. None where
+    /// the file begins after the start of the simulation.
+    driven: Option<Range<usize>>,
 }
 
 impl<'f> Table<'f> {
@@ -90,7 +93,7 @@ impl<'f> Table<'f> {
         let place = node.child("time").unwrap_or_else(|| node.child("file").expect("it was just read"));
         let time = match &section.time {
             Some(time) => time.clone(),
-            None => guess_time(file).ok_or_else(|| {
+            None => file.time_column().ok_or_else(|| {
                 place
                     .diagnostic("no column of the file is called `t` or `time`".to_owned())
                     .with_help(format!("say which: time = \"...\"; the file has {}", file.column_names().join(", ")))
@@ -130,8 +133,10 @@ impl<'f> Table<'f> {
                 .with_help(format!("the file has {all}")));
         }
         let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
-        let times = times[first..last].iter().map(|t| t - origin).collect();
-        Ok(Self { file, time, times, rows: first..last })
+        let times: Vec<f64> = times.iter().map(|t| t - origin).collect();
+        // The simulation begins at 0 s: what holds there is what the last row before says.
+        let driven = times[skip..last].partition_point(|&t| t <= 0.0).checked_sub(1).map(|row| skip + row..last);
+        Ok(Self { file, time, times, rows: first..last, driven })
     }
 
     fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelDraft, Diagnostic> {
@@ -139,24 +144,32 @@ impl<'f> Table<'f> {
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
         Ok(ChannelDraft {
             signal: signal.to_owned(),
-            times: self.times.clone(),
-            values,
+            times: self.times[self.rows.clone()].to_vec(),
+            values: values[self.rows.clone()].to_vec(),
+            noise: table.noise.as_ref().map(|noise| in_unit_of_column(noise, unit.as_ref())),
             unit,
-            noise: table.noise.clone(),
         })
     }
 
     fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>), Diagnostic> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+        let Some(rows) = self.driven.clone() else {
+            let first = self.times[self.rows.start];
+            let fact = format!("the simulation begins at 0 s, and `{}` is not known before {first} s", table.column);
+            return Err(place.diagnostic(fact).with_help(
+                "leave out `reset-time = false`, so that the simulation begins at the first sample; or record the input from 0 s on",
+            ));
+        };
+        let (times, values) = (self.times[rows.clone()].to_vec(), values[rows.clone()].to_vec());
         if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
-            let fact = format!("the input column `{}` has a gap at {} s", table.column, self.times[gap]);
+            let fact = format!("the input column `{}` has a gap at {} s", table.column, times[gap]);
             return Err(self
-                .at(&table.column, self.rows.start + gap, &fact)
+                .at(&table.column, rows.start + gap, &fact)
                 .unwrap_or_else(|| place.diagnostic(fact))
                 .with_help("an input must be known throughout: fill the gap, or cut it off with `from` and `to`"));
         }
-        Ok((Input::Sampled { times: self.times.clone(), values, hold: table.hold.unwrap_or_default() }, unit))
+        Ok((Input::Sampled { times, values, hold: table.hold.unwrap_or_default() }, unit))
     }
 
     fn values(
@@ -192,7 +205,7 @@ impl<'f> Table<'f> {
             })?,
             (Some(q), None) => q.number,
         };
-        Ok((column.values[self.rows.clone()].iter().map(|v| scale * v + offset).collect(), unit))
+        Ok((column.values.iter().map(|v| scale * v + offset).collect(), unit))
     }
 
     /// A mistake in a cell of a CSV file.
@@ -202,9 +215,9 @@ impl<'f> Table<'f> {
     }
 }
 
-/// A column that is called `t` or `time`, in any case.
-fn guess_time(file: &DataFile) -> Option<String> {
-    file.column_names().into_iter().find(|name| matches!(name.to_lowercase().as_str(), "t" | "time"))
+/// A bare number of a channel counts in the unit of its column, as `offset` does.
+fn in_unit_of_column(quantity: &Quantity, unit: Option<&Unit>) -> Quantity {
+    Quantity { unit: quantity.unit.clone().or(unit.cloned()), ..quantity.clone() }
 }
 
 /// A column, with the study's place where the file does not have it.

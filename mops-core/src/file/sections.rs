@@ -111,7 +111,8 @@ pub(super) struct TunerSection {
     pub active: Option<bool>,
     /// Expression of tuners that stand before this one, such as `"4*Td"`; the tuner follows it.
     pub tie: Option<String>,
-    /// One value for every case or experiment instead of one for the study.
+    /// One value for every case or experiment instead of one for the study. In selection and validation experiments it is
+    /// estimated from their own data, as start values are.
     #[serde(default)]
     pub per_case: bool,
     /// Values at the start in cases or experiments that begin elsewhere, by their names; with `per-case`.
@@ -252,7 +253,8 @@ pub(super) struct ExperimentSection {
     /// Number of samples dropped at the start of the file; sensors often begin with a wrong one.
     #[serde(default)]
     pub skip: usize,
-    /// `false` keeps the times of the file; otherwise the first sample used is at time 0.
+    /// `false` keeps the times of the file: the simulation begins at 0 s, and inputs are taken from the file from then on, also
+    /// before `from`. Otherwise the simulation begins at the first sample used.
     pub reset_time: Option<bool>,
 }
 

@@ -60,7 +60,8 @@ pub(super) struct SensitivitySection {
     /// The point: `optimum` (the default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
-    /// Share of the largest singular value below which one counts as zero; the accuracy of the slopes where absent.
+    /// Share of the largest singular value (columns of unit length) that slopes still resolve; where absent 1e-8 for tangents
+    /// and 1e-4 for differences. What they resolve is judged against the noise.
     pub zero: Option<f64>,
     /// `local` (the default): slopes along the tuners. Over the box of [uncertain] instead: `morris`, elementary effects,
     /// which tell at little cost what matters at all; `sobol`, shares of the variance.

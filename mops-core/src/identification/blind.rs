@@ -7,17 +7,33 @@ use super::words::{coefficient, listed, percent};
 
 /// Entries below this share of the largest take no part, in coordinates in which all columns of the Jacobian are of unit
 /// length.
-const NO_PART: f64 = 1e-5;
+pub(super) const NO_PART: f64 = 1e-5;
 
 /// As above, for entries that are also small as relative changes.
 const SMALL_PART: f64 = 1e-3;
 
+/// Changes below this share of the largest are not named one by one.
+const NAMED: f64 = 0.05;
+
 /// Relative changes that differ less are equal.
 const EQUAL: f64 = 2e-3;
 
-/// A direction along which nothing changes to first order.
+/// Why a direction is not determined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// Nothing changes along it.
+    Nothing,
+    /// What changes along it is below the noise.
+    Noise,
+    /// What changes along it is below the accuracy of the slopes.
+    Slopes,
+}
+
+/// A direction of the tuners that is not determined, to first order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlindDirection {
+    /// Why it is not.
+    pub limit: Limit,
     /// The change of each tuner that takes part, by index and as a share of [`Coordinate::scale`]; the largest is 1.
     pub changes: Vec<(usize, f64)>,
     /// What can be estimated, and what cannot, as a clause.
@@ -26,17 +42,17 @@ pub struct BlindDirection {
     pub straight: bool,
 }
 
-/// A basis of the blind directions that names as few tuners each as elimination gives, and which tuners take part in one.
-/// The rows of `null` span them in coordinates in which column `k` of the Jacobian has unit length instead of `lengths[k]`.
+/// A basis of directions that are not determined, which names as few tuners each as elimination gives. The rows of `null`
+/// span them in coordinates in which column `k` of the Jacobian has unit length instead of `lengths[k]`.
 pub(super) fn directions(
     mut null: DMatrix<f64>,
     lengths: &[f64],
     coordinates: &[Coordinate],
-) -> (Vec<BlindDirection>, Vec<bool>) {
+    limit: Limit,
+) -> Vec<BlindDirection> {
     let n = coordinates.len();
-    let undetermined = (0..n).map(|k| null.column(k).norm() > NO_PART).collect();
     eliminate(&mut null);
-    let blind = (0..null.nrows())
+    (0..null.nrows())
         .map(|i| {
             let row: Vec<f64> = null.row(i).iter().copied().collect();
             let shares: Vec<f64> = (0..n).map(|k| row[k] / lengths[k] / coordinates[k].scale()).collect();
@@ -54,10 +70,9 @@ pub(super) fn directions(
             // What the sentence says of the names, which stand between backticks.
             let said: String = words.split('`').step_by(2).collect();
             let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| said.contains(sign));
-            BlindDirection { straight: !multiplied, words, changes }
+            BlindDirection { limit, straight: !multiplied, words, changes }
         })
-        .collect();
-    (blind, undetermined)
+        .collect()
 }
 
 /// Gauss-Jordan elimination, each row with its largest entry as the pivot.
@@ -134,8 +149,13 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
                 };
                 format!("{} {verb} by {by}", name(k))
             };
-            let changes: Vec<String> = many.iter().map(change).collect();
-            format!("nothing changes where {}", listed(&changes))
+            let main: Vec<String> = many.iter().filter(|(_, share)| share.abs() >= NAMED).map(change).collect();
+            let less = match many.len() - main.len() {
+                0 => String::new(),
+                1 => ", with a smaller change of another tuner".to_owned(),
+                count => format!(", with smaller changes of {count} other tuners"),
+            };
+            format!("nothing changes where {}{less}", listed(&main))
         }
     }
 }
@@ -151,7 +171,13 @@ mod tests {
     fn found(tuners: &[(&str, f64)], gradients: &[Vec<f64>]) -> Sensitivity {
         let coordinates = tuners
             .iter()
-            .map(|(name, value)| Coordinate { name: (*name).into(), value: *value, range: 1.0, unit: "m".into() })
+            .map(|(name, value)| Coordinate {
+                name: (*name).into(),
+                value: *value,
+                range: 1.0,
+                span: 1.0,
+                unit: "m".into(),
+            })
             .collect();
         let signals =
             DMatrix::from_fn(200, gradients.len(), |t, i| (0.01 * (1.0 + i as f64) * t as f64 + i as f64).sin());

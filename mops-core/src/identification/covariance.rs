@@ -1,54 +1,84 @@
 //! Covariance of estimates, and what it makes of predictions.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
-use super::insight::local;
+use super::local::{Point, local};
+use super::noise::{Noise, Part, Spread};
+use super::sensitivity::Sensitivity;
 use crate::problem::Problem;
 
-/// What the data tell of the uncertainty of the active tuners, to first order.
+/// Entries of the influence below this share of the largest of their tuner are what rounding leaves of 0.
+const ROUNDING: f64 = 1e-12;
+
+/// Covariance of the estimates of the active tuners, to first order: of the minimum of `r' r` over weighted residuals `r` with
+/// the Jacobian `J`,
+/// ```text
+/// C = A^-1 B A^-1,   A = J' J,   B = J' cov(r) J
+/// ```
+/// (the sandwich). It holds for any weights: those of criteria, and those that criteria give to samples. Of the weights that
+/// are inverse variances `A = B`, up to a factor. Directions that slopes do not resolve are left out of it.
+///
+/// Source: P. J. Huber, Proceedings of the Fifth Berkeley Symposium (1967) 221-233; H. White, Econometrica 48 (1980) 817-838.
 #[derive(Debug, Clone)]
 pub struct Covariance {
-    /// `s^2 (J' J)^-1` in the tuners' own units, over the directions that the data determine.
-    pub matrix: DMatrix<f64>,
-    /// `s`: standard deviation of the weighted residuals per degree of freedom.
-    pub deviation: f64,
-    /// Residuals less directions that are determined.
-    pub freedom: usize,
-    /// Number of directions that the data do not determine; they are left out of the matrix.
-    pub undetermined: usize,
+    noise: Noise,
+    parts: Vec<Part>,
+    /// Which tuners are not determined.
+    undetermined: Vec<bool>,
+    /// Number of directions that are left out.
+    pub left_out: usize,
 }
 
 impl Covariance {
-    /// At given values of all tuners; `None` where nothing is measured, no slope can be had, or residuals are too few.
+    /// At estimates; `None` where nothing is measured, a simulation fails, or no residual shows the noise.
     pub fn at(problem: &Problem, tuners: &[f64]) -> Option<Self> {
-        let local = local(problem, tuners, problem.study().tasks.sensitivity.zero)?;
-        let (rank, n) = (local.sensitivity.rank, problem.active().len());
-        let freedom = problem.shape().residuals.checked_sub(rank).filter(|&f| f > 0)?;
-        if !local.deviation.is_finite() {
-            return None;
-        }
-        let information = &local.sensitivity.matrix;
-        // Of unit diagonal, so that no choice of units matters.
-        let scale: Vec<f64> = (0..n)
-            .map(|k| if information[(k, k)] > 0.0 { information[(k, k)].sqrt() } else { f64::INFINITY })
-            .collect();
-        let unit = DMatrix::from_fn(n, n, |a, b| information[(a, b)] / (scale[a] * scale[b]));
-        let eigen = SymmetricEigen::new(unit);
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-        let deviation = local.deviation;
-        let matrix = DMatrix::from_fn(n, n, |a, b| {
-            let part = |&i: &usize| eigen.eigenvectors[(a, i)] * eigen.eigenvectors[(b, i)] / eigen.eigenvalues[i];
-            deviation.powi(2) * order[..rank].iter().map(part).sum::<f64>() / (scale[a] * scale[b])
-        });
-        Some(Self { matrix, deviation, freedom, undetermined: n - rank })
+        local(problem, tuners, Point::Minimum, problem.study().tasks.sensitivity.zero)?.covariance
     }
 
-    /// Standard deviation of a quantity with these slopes along the active tuners.
-    pub fn of(&self, slopes: &[f64]) -> f64 {
-        let variance: f64 = (0..slopes.len())
-            .map(|a| (0..slopes.len()).map(|b| slopes[a] * self.matrix[(a, b)] * slopes[b]).sum::<f64>())
-            .sum();
-        variance.max(0.0).sqrt()
+    /// From the noise of the residuals, their Jacobian in the tuners' own units, and the directions that it resolves; `None` where
+    /// no noise is known.
+    pub(super) fn of(noise: Noise, jacobian: &DMatrix<f64>, sensitivity: &Sensitivity) -> Option<Self> {
+        let mut influence = jacobian * &sensitivity.inverse;
+        for mut column in influence.column_iter_mut() {
+            let least = ROUNDING * column.amax();
+            column.iter_mut().filter(|value| value.abs() < least).for_each(|value| *value = 0.0);
+        }
+        let parts = noise.parts(&influence);
+        let (undetermined, left_out) = (sensitivity.undetermined.clone(), sensitivity.unresolved());
+        (noise.freedom() >= 1.0).then_some(Self { noise, parts, undetermined, left_out })
+    }
+
+    /// Covariance of estimates of which these are not determined.
+    pub(super) fn without(self, undetermined: &[bool]) -> Self {
+        Self { undetermined: undetermined.to_vec(), ..self }
+    }
+
+    /// Spread of a quantity with these slopes along the active tuners.
+    pub fn spread(&self, slopes: &[f64]) -> Spread {
+        let share = |part: &Part| -> f64 {
+            let row = |a: usize| (0..slopes.len()).map(|b| part.matrix[(a, b)] * slopes[b]).sum::<f64>();
+            (0..slopes.len()).map(|a| slopes[a] * row(a)).sum::<f64>().max(0.0)
+        };
+        Spread::of_sum(self.parts.iter().map(|part| (share(part), part.pool)))
+    }
+
+    /// Spread of the estimate of an active tuner, in its unit; NaN where the data do not determine it.
+    pub fn of_tuner(&self, k: usize) -> Spread {
+        if self.undetermined[k] {
+            return Spread { deviation: f64::NAN, freedom: f64::NAN };
+        }
+        Spread::of_sum(self.parts.iter().map(|part| (part.matrix[(k, k)], part.pool)))
+    }
+
+    /// The matrix, in the tuners' own units, as far as the noise is known.
+    pub(super) fn matrix(&self) -> DMatrix<f64> {
+        let n = self.parts.first().map_or(0, |part| part.matrix.nrows());
+        let known = self.parts.iter().filter(|part| part.pool.variance.is_finite());
+        known.fold(DMatrix::zeros(n, n), |sum, part| sum + &part.matrix * part.pool.variance)
+    }
+
+    /// Noise of the residuals.
+    pub fn noise(&self) -> &Noise {
+        &self.noise
     }
 }

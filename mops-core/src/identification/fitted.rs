@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::insight::spacing;
+use super::excited::spacing;
 use super::report::RegressionReport;
 use super::words::{coefficient, counted, percent};
 use super::{Recursive, Regression, RegressionTooShort, excitation, least_squares, whiteness};

@@ -1,26 +1,37 @@
 //! The theory of identification as tools: is an input rich enough, which parameters do the data determine, and the
 //! linear regressions (FIR, ARX) that answer without a simulation. Pure computation on numbers and Jacobians.
 
+mod alike;
 mod blind;
 mod covariance;
 mod excitation;
+mod excited;
 mod fitted;
 mod insight;
 mod least_squares;
+mod local;
+mod noise;
+mod pools;
+mod records;
 mod recursive;
 mod regression;
 mod report;
 mod sensitivity;
+mod sentences;
 mod whiteness;
 mod words;
 
-pub use blind::BlindDirection;
+pub use blind::{BlindDirection, Limit};
 pub use covariance::Covariance;
 pub use excitation::{Excitation, excitation};
+pub use excited::{ExcitationQuestion, excitation_report, excitations, spacing};
 pub use fitted::regressions;
-pub use insight::{ExcitationQuestion, excitation_report, excitations, sensitivity_at, spacing};
-pub(crate) use insight::{Local, local, report as report_of};
+pub(crate) use insight::report as report_of;
+pub use insight::sensitivity_at;
 pub use least_squares::{Estimate, least_squares};
+pub use local::Point;
+pub(crate) use local::{Local, local};
+pub use noise::{Noise, Spread};
 pub use recursive::Recursive;
 pub use regression::{Regression, RegressionTooShort};
 pub use report::{

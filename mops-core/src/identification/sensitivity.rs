@@ -1,18 +1,20 @@
 //! The sensitivity matrix: what the data say of the tuners, and what they do not.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, RowDVector, SymmetricEigen};
 
-use super::blind::{self, BlindDirection};
+use super::blind::{self, BlindDirection, Limit, NO_PART};
+use super::covariance::Covariance;
 
-/// Singular values that count as zero where slopes are exact: the integration keeps eight digits, and slopes lose a few.
-pub const TANGENTS: f64 = 1e-5;
+/// Singular values that slopes do not resolve where they are tangents of the simulation: these keep the digits of the
+/// integration, 1e-8 at its default tolerance.
+pub const TANGENTS: f64 = 1e-8;
 
-/// Singular values that count as zero where slopes come from differences: noise of 1e-9 over steps of 2e-4 leaves 5e-6 of
+/// Singular values that slopes do not resolve where they come from differences: noise of 1e-9 over steps of 2e-4 leaves 5e-6 of
 /// a strong tuner's slope, and more of a weak one's.
 pub const DIFFERENCES: f64 = 1e-4;
 
-/// Columns below this share of the largest, over the tuners' ranges, are no effect at all.
-const NO_EFFECT: f64 = 1e-9;
+/// Columns below this share of the largest, over the tuners' ranges, are what rounding leaves of no effect.
+const NO_EFFECT: f64 = 1e-15;
 
 /// A tuner as the sensitivity matrix sees it.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +25,9 @@ pub struct Coordinate {
     pub value: f64,
     /// Largest minus smallest value; stands for the value where that is 0.
     pub range: f64,
+    /// Change over the whole range at the slope of the tuner's scale: the range, or of a logarithmic tuner
+    /// `value ln(max/min)`.
+    pub span: f64,
     /// Unit of both.
     pub unit: String,
 }
@@ -41,8 +46,9 @@ pub type Eigen = Vec<(f64, Vec<f64>)>;
 /// small or nearly linear, and the information of the data by the variance of white noise. An eigenvector of eigenvalue
 /// zero is a direction along which, to first order, nothing changes: the tuners are not locally identifiable.
 ///
-/// The rank is judged by the singular values of `J` with columns of unit length, so that no choice of units matters: a
-/// value below `zero` times the largest is what the accuracy of the slopes leaves of an exact zero.
+/// A direction counts as determined where the slopes resolve it and the noise leaves it (`Sensitivity::judge`). Slopes resolve
+/// singular values of `J` with columns of unit length, so that no choice of units matters, down to `zero` times the largest: below
+/// is what their accuracy leaves of an exact zero.
 ///
 /// Source: E. Walter, L. Pronzato, Identification of Parametric Models from Experimental Data (1997), sections 2.6, 5.2;
 /// A. van der Sluis, Numerische Mathematik 14 (1969) 14-23 (columns of unit length are nearly the best scaling).
@@ -62,14 +68,26 @@ pub struct Sensitivity {
     pub rank: usize,
     /// What counts as zero.
     pub zero: f64,
-    /// Directions along which nothing changes.
+    /// Directions that are not determined.
     pub blind: Vec<BlindDirection>,
+    /// Whether a tuner takes part in one of them.
+    pub undetermined: Vec<bool>,
+    /// `(J' J)^-1` in the tuners' own units, over the directions that slopes resolve.
+    pub inverse: DMatrix<f64>,
+    /// These directions: `basis basis' = (J' J)^-1`, and `J basis` has orthonormal columns.
+    pub basis: DMatrix<f64>,
     /// Standard error of each tuner for residuals of unit variance, were all others known: `1/|J_k|`.
     pub alone: Vec<f64>,
-    /// The same with all others estimated too: root of the diagonal of `(J' J)^-1`; NaN where undetermined.
+    /// Standard error of each tuner for residuals of unit variance with all others estimated too: root of the diagonal of
+    /// `(J' J)^-1`; NaN where undetermined.
     pub together: Vec<f64>,
     /// Correlation of the estimates; NaN where undetermined.
     pub correlation: DMatrix<f64>,
+    /// Directions that slopes do not resolve, as rows, in coordinates in which column `k` of `J` has unit length instead of
+    /// `lengths[k]`.
+    null: DMatrix<f64>,
+    /// Lengths of the columns of `J`; 1 of a column without effect.
+    lengths: Vec<f64>,
 }
 
 impl Sensitivity {
@@ -99,18 +117,12 @@ impl Sensitivity {
         let null = DMatrix::from_fn(n - rank, n, |i, k| v_t[(order[rank + i], k)]);
         // An effect that was too small to count has no length: any will do, since it stands alone.
         let lengths: Vec<f64> = norms.iter().map(|&norm| if norm > 0.0 { norm } else { 1.0 }).collect();
-        let (blind, undetermined) = blind::directions(null, &lengths, &coordinates);
-
-        let covariance = |a: usize, b: usize| -> f64 {
-            if undetermined[a] || undetermined[b] {
-                return f64::NAN;
-            }
-            let sum = order[..rank].iter().map(|&i| v_t[(i, a)] * v_t[(i, b)] / svd.singular_values[i].powi(2));
-            sum.sum::<f64>() / (lengths[a] * lengths[b])
-        };
-        let together: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
-        let correlation =
-            DMatrix::from_fn(n, n, |a, b| if a == b { 1.0 } else { covariance(a, b) / (together[a] * together[b]) });
+        let basis = DMatrix::from_fn(n, rank, |k, i| v_t[(order[i], k)] / (svd.singular_values[order[i]] * lengths[k]));
+        let inverse = &basis * basis.transpose();
+        let blind = blind::directions(null.clone(), &lengths, &coordinates, Limit::Nothing);
+        let undetermined: Vec<bool> = (0..n).map(|k| null.column(k).norm() > NO_PART).collect();
+        let together: Vec<f64> =
+            (0..n).map(|k| if undetermined[k] { f64::NAN } else { inverse[(k, k)].sqrt() }).collect();
         let matrix = jacobian.tr_mul(jacobian);
         let scaled = DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
         Self {
@@ -123,9 +135,61 @@ impl Sensitivity {
             blind,
             alone: norms.iter().map(|&norm| if norm > 0.0 { 1.0 / norm } else { f64::INFINITY }).collect(),
             together,
-            correlation,
+            correlation: correlation(&inverse, &undetermined),
+            undetermined,
+            inverse,
+            basis,
+            null,
+            lengths,
             coordinates,
         }
+    }
+
+    /// Number of directions that slopes do not resolve.
+    pub fn unresolved(&self) -> usize {
+        self.null.nrows()
+    }
+
+    /// Judges directions against the noise of the residuals, given the covariance of the estimates.
+    ///
+    /// A direction is not determined where, going along it, one standard error moves a tuner through its whole range: the change
+    /// that the data show of it is below the noise. Where slopes do not resolve a direction, and the change that they have of it
+    /// would be above the noise, nothing is known of it.
+    pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, covariance: &Covariance) {
+        let n = self.coordinates.len();
+        let spans: Vec<f64> = self.coordinates.iter().map(|coordinate| coordinate.span).collect();
+        let hidden = |row: &RowDVector<f64>| {
+            let step = DVector::from_fn(n, |k, _| row[k] / self.lengths[k]);
+            let farthest = (0..n).map(|k| (step[k] / spans[k]).abs()).fold(0.0, f64::max);
+            let change = jacobian * step;
+            let size = change.norm();
+            // N.B.: a noise that is not known hides everything.
+            let noise = covariance.noise().along((&change / size.max(f64::MIN_POSITIVE)).as_slice()).deviation;
+            size / farthest <= noise || noise.is_nan()
+        };
+        let (nothing, unknown): (Vec<_>, Vec<_>) =
+            self.null.row_iter().map(|row| row.into_owned()).partition(|row| hidden(row));
+        let matrix = covariance.matrix();
+        let own = SymmetricEigen::new(DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] / (spans[a] * spans[b])));
+        let mut noisy = Vec::new();
+        for (value, vector) in own.eigenvalues.iter().zip(own.eigenvectors.column_iter()) {
+            let error = value.max(0.0).sqrt();
+            let lost: Vec<usize> = (0..n).filter(|&k| error * vector[k].abs() > 1.0).collect();
+            if !lost.is_empty() {
+                for k in lost {
+                    (self.undetermined[k], self.together[k]) = (true, f64::NAN);
+                }
+                noisy.push(RowDVector::from_fn(n, |_, k| vector[k] * spans[k] * self.lengths[k]).normalize());
+            }
+        }
+        self.rank -= noisy.len();
+        let classes = [(nothing, Limit::Nothing), (noisy, Limit::Noise), (unknown, Limit::Slopes)];
+        let rows =
+            |rows: Vec<RowDVector<f64>>| if rows.is_empty() { DMatrix::zeros(0, n) } else { DMatrix::from_rows(&rows) };
+        self.blind = (classes.into_iter())
+            .flat_map(|(class, limit)| blind::directions(rows(class), &self.lengths, &self.coordinates, limit))
+            .collect();
+        self.correlation = correlation(&matrix, &self.undetermined);
     }
 
     /// From the matrix `J' J` itself, in the tuners' own units: half of its digits are lost where it is near singular.
@@ -136,6 +200,15 @@ impl Sensitivity {
         let sensitivity = Self::of(&jacobian, coordinates, zero);
         Self { own: self::eigen(matrix), matrix: matrix.clone(), ..sensitivity }
     }
+}
+
+/// Correlations of estimates with this covariance; NaN where a tuner is undetermined.
+fn correlation(covariance: &DMatrix<f64>, undetermined: &[bool]) -> DMatrix<f64> {
+    DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |a, b| match undetermined[a] || undetermined[b] {
+        _ if a == b => 1.0,
+        true => f64::NAN,
+        false => covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt(),
+    })
 }
 
 /// Eigenvalues, falling; of every eigenvector the largest entry is positive.
@@ -161,6 +234,7 @@ mod tests {
             name: (*name).into(),
             value: *value,
             range: value.abs().max(1.0),
+            span: value.abs().max(1.0),
             unit: "1".into(),
         };
         values.iter().map(of).collect()

@@ -80,8 +80,9 @@ impl Whiteness {
             format!("{place} look white ({numbers}), as the standard errors assume.")
         } else {
             format!(
-                "{place} are not white ({numbers}); the standard errors assume that they are, and may be far too small: \
-                 look for an effect that the model lacks, a delay, or an input that is held wrongly."
+                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but intervals still \
+                 hold the truth less often than they say: look for an effect that the model lacks, a delay, or an input that is \
+                 held wrongly."
             )
         }
     }

@@ -2,15 +2,29 @@
 
 /// A number to three significant digits: `0.0150`, `4.00`, `1230`, `3.20e-7`.
 pub(super) fn coefficient(value: f64) -> String {
-    let scientific = format!("{value:.2e}");
+    digits(value, 3)
+}
+
+/// A number to so many significant digits, at least one.
+fn digits(value: f64, count: usize) -> String {
+    let decimals = count - 1;
+    let scientific = format!("{value:.decimals$e}");
     let Some((_, exponent)) = scientific.split_once('e') else { return scientific };
     match exponent.parse::<i32>() {
         Ok(exponent @ -4..=5) => {
             let rounded: f64 = scientific.parse().unwrap_or(value);
-            format!("{rounded:.*}", usize::try_from(2 - exponent).unwrap_or(0))
+            format!("{rounded:.*}", usize::try_from(i32::try_from(decimals).unwrap_or(0) - exponent).unwrap_or(0))
         }
         _ => scientific,
     }
+}
+
+/// An estimate and its standard error, to two digits of the error: `0.9989 +- 0.0011`.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+pub(super) fn estimate(value: f64, error: f64) -> String {
+    let more = (value.abs() / error).log10().floor().clamp(-1.0, 13.0);
+    let count = if more.is_finite() { (more + 2.0) as usize } else { 3 };
+    format!("{} +- {}", digits(value, count.max(1)), digits(error, 2))
 }
 
 /// A share in percent, to two digits.
@@ -40,6 +54,9 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         assert_eq!([0.015_006, 4.0, 1234.5, 3.2e-7].map(coefficient), ["0.0150", "4.00", "1230", "3.20e-7"]);
+        assert_eq!(estimate(0.998_872, 0.001_11), "0.9989 +- 0.0011");
+        assert_eq!(estimate(-9.316, 5.297), "-9.3 +- 5.3");
+        assert_eq!(estimate(0.0, 0.012), "0 +- 0.012");
         assert_eq!([0.0312, 1.0, 1e-9].map(percent), ["3.1 %", "100 %", "1e-7 %"]);
         assert_eq!(listed(&["a".into(), "b".into(), "c".into()]), "a, b and c");
     }

@@ -1,53 +1,137 @@
-//! Whether inputs can move every mode.
+//! Whether inputs can move every mode, and how directly.
 
 use nalgebra::DMatrix;
 
 use super::eigen::balance;
-use super::{Complex, eigenvalues};
+use super::eigenvalues;
 
-/// Smallest singular value of `[A - s, B]`, relative to its largest, that still counts as controllable.
+/// Singular value, relative to the size of the scaled system, that still counts as an influence.
 const SMALL: f64 = 1e-12;
 
-/// Checks that inputs can move every mode: `[A - s, B]` has full rank at every eigenvalue s of `A`.
-///
-/// Source (Popov, Belevitch, Hautus): T. Kailath, Linear Systems (1980), section 2.4.3.
-///
-/// # Errors
-/// The modes that no input moves, in one sentence.
-pub fn check_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<(), String> {
-    let mut balanced = a.clone();
-    let scales = balance(&mut balanced);
-    let mut inputs = b.clone();
-    for (i, scale) in scales.into_iter().enumerate() {
-        inputs.row_mut(i).unscale_mut(scale);
-    }
-    let size = if balanced.norm() > 0.0 { balanced.norm() } else { 1.0 };
-    for mut column in inputs.column_iter_mut() {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column *= size / norm;
+/// A system `x' = A x + B u` with states and inputs in units of like size, so that numbers can be compared.
+#[derive(Debug, Clone)]
+pub(super) struct Scaled {
+    /// `D^-1 A D` for the states `z = D^-1 x`.
+    pub a: DMatrix<f64>,
+    /// `D^-1 B S` for the inputs `v = S^-1 u`.
+    pub b: DMatrix<f64>,
+    states: Vec<f64>,
+    inputs: Vec<f64>,
+}
+
+impl Scaled {
+    /// The system balanced as if every state were fed back to every input: what only a chain of small influences moves is
+    /// given units in which they are not small.
+    pub fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Self {
+        let (n, m) = (a.nrows(), b.ncols());
+        let mut all = DMatrix::zeros(n + m, n + m);
+        all.view_mut((0, 0), (n, n)).copy_from(a);
+        all.view_mut((0, n), (n, m)).copy_from(b);
+        all.view_mut((n, 0), (m, n)).fill(1.0);
+        let scales = balance(&mut all);
+        Self {
+            a: all.view((0, 0), (n, n)).into_owned(),
+            b: all.view((0, n), (n, m)).into_owned(),
+            states: scales[..n].to_vec(),
+            inputs: scales[n..].to_vec(),
         }
     }
-    let mut fixed: Vec<String> = Vec::new();
-    for mode in eigenvalues(a)?.into_iter().filter(|mode| mode.im >= 0.0) {
-        let n = a.nrows();
-        let mut m = DMatrix::<Complex>::zeros(n, n + b.ncols());
-        m.columns_mut(0, n).copy_from(&balanced.map(|x| Complex::new(x, 0.0)));
-        m.columns_mut(n, b.ncols()).copy_from(&inputs.map(|x| Complex::new(x, 0.0)));
-        (0..n).for_each(|i| m[(i, i)] -= mode);
-        let values = m.singular_values();
-        if values.min() <= SMALL * values.max() {
-            fixed.push(match mode.im {
+
+    /// `D m D`, for a matrix over the states.
+    pub fn by_states(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| self.states[i] * m[(i, j)] * self.states[j])
+    }
+
+    /// `D^-1 m D^-1`, for a matrix over the states.
+    pub fn per_states(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / self.states[i] / self.states[j])
+    }
+
+    /// The feedback `u = -K x` that is `v = -k z`.
+    pub fn feedback(&self, k: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| self.inputs[i] * k[(i, j)] / self.states[j])
+    }
+}
+
+/// How inputs move the states: those that they move directly, those that these move, and so on, each step by the rank of
+/// its influence; and what is left.
+///
+/// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability, IEEE Transactions on
+/// Automatic Control 26 (1981) 130-138; A. Varga, Numerically stable algorithm for standard controllability form
+/// determination, Electronics Letters 17 (1981) 74-75.
+#[derive(Debug, Clone)]
+pub(super) struct Staircase {
+    /// Ranks of the steps, which do not rise.
+    ranks: Vec<usize>,
+    states: usize,
+    /// The part of A that no input moves.
+    fixed: DMatrix<f64>,
+}
+
+impl Staircase {
+    /// The staircase of a scaled system.
+    pub fn of(scaled: &Scaled) -> Self {
+        let (mut a, mut b) = (scaled.a.clone(), scaled.b.clone());
+        let states = a.nrows();
+        let small = SMALL * a.norm().max(b.norm());
+        let mut ranks = Vec::new();
+        while a.nrows() > 0 {
+            let n = a.nrows();
+            // Padded to be square, so that the left vectors are complete.
+            let mut square = DMatrix::zeros(n, n.max(b.ncols()));
+            square.columns_mut(0, b.ncols()).copy_from(&b);
+            let svd = square.svd(true, false);
+            let rank = svd.singular_values.iter().filter(|&&s| s > small).count();
+            if rank == 0 {
+                break;
+            }
+            ranks.push(rank);
+            let u = svd.u.expect("it was asked for");
+            let turned = u.transpose() * a * u;
+            b = turned.view((rank, 0), (n - rank, rank)).into_owned();
+            a = turned.view((rank, rank), (n - rank, n - rank)).into_owned();
+        }
+        Self { ranks, states, fixed: a }
+    }
+
+    /// The controllability indices, which do not rise: of every independent input, how many states it takes.
+    pub fn indices(&self) -> Vec<usize> {
+        let inputs = self.ranks.first().copied().unwrap_or(0);
+        (1..=inputs).map(|i| self.ranks.iter().filter(|&&rank| rank >= i).count()).collect()
+    }
+
+    /// Checks that inputs move every state.
+    ///
+    /// # Errors
+    /// The rank, and the modes that no input moves.
+    pub fn check(&self) -> Result<(), String> {
+        let rank: usize = self.ranks.iter().sum();
+        if rank == self.states {
+            return Ok(());
+        }
+        let modes = eigenvalues(&self.fixed)?.into_iter().filter(|mode| mode.im >= 0.0);
+        let mut modes: Vec<String> = modes
+            .map(|mode| match mode.im {
                 0.0 => format!("{:.6}", mode.re),
                 im => format!("{:.6} +- {im:.6}i", mode.re),
-            });
-        }
+            })
+            .collect();
+        modes.dedup();
+        Err(format!(
+            "the system is not controllable: its controllability matrix has rank {rank} of {}, and no input moves the mode at \
+             {} 1/s",
+            self.states,
+            modes.join(" and at ")
+        ))
     }
-    fixed.dedup();
-    if fixed.is_empty() {
-        return Ok(());
-    }
-    Err(format!("the system is not controllable: no input moves the mode at {} 1/s", fixed.join(" and at ")))
+}
+
+/// Checks that inputs can move every mode.
+///
+/// # Errors
+/// The rank and the modes that no input moves, in one sentence.
+pub fn check_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<(), String> {
+    Staircase::of(&Scaled::of(a, b)).check()
 }
 
 #[cfg(test)]
@@ -60,7 +144,9 @@ mod tests {
         let a = DMatrix::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, 0.0, -3.0, 0.0, 4.0, 5.0, -6.0]);
         let b = DMatrix::from_row_slice(3, 1, &[1.0, 0.0, 0.0]);
         let fact = check_controllable(&a, &b).unwrap_err();
-        assert_eq!(fact, "the system is not controllable: no input moves the mode at -3.000000 1/s");
+        let expected = "the system is not controllable: its controllability matrix has rank 2 of 3, and no input moves the \
+                        mode at -3.000000 1/s";
+        assert_eq!(fact, expected);
     }
 
     #[test]
@@ -69,5 +155,37 @@ mod tests {
         assert_eq!(check_controllable(&a, &b), Ok(()));
         assert_eq!(check_controllable(&random(9, 9, 1), &random(9, 1, 2)), Ok(()));
         assert!(check_controllable(&DMatrix::identity(2, 2), &random(2, 1, 3)).is_err(), "one input, a double mode");
+    }
+
+    #[test]
+    fn units_of_states_and_inputs_change_no_rank() {
+        // A chain of four whose influences are 1e-9 each, and one whose states have units from 1e-12 to 1e12.
+        let chain = |unit: f64| DMatrix::from_fn(4, 4, |i, j| if j == i + 1 { unit } else { 0.0 });
+        let last = DMatrix::from_column_slice(4, 1, &[0.0, 0.0, 0.0, 1e-20]);
+        assert_eq!(check_controllable(&chain(1e-9), &last), Ok(()));
+        let (mut a, mut b) = furuta();
+        for (i, unit) in [1e-12, 1e12, 1e6, 1e-6].into_iter().enumerate() {
+            a.row_mut(i).scale_mut(unit);
+            b.row_mut(i).scale_mut(unit);
+            a.column_mut(i).unscale_mut(unit);
+        }
+        assert_eq!(check_controllable(&a, &b), Ok(()));
+    }
+
+    #[test]
+    fn the_indices_say_how_many_states_each_input_takes() {
+        // An axis of three states and one of one: (3, 1); two of two: (2, 2).
+        let indices = |lengths: &[usize]| {
+            let n: usize = lengths.iter().sum();
+            let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, lengths.len()));
+            let mut first = 0;
+            for (input, &length) in lengths.iter().enumerate() {
+                (first..first + length - 1).for_each(|i| a[(i, i + 1)] = 2.0);
+                b[(first + length - 1, input)] = 3.0;
+                first += length;
+            }
+            Staircase::of(&Scaled::of(&a, &b)).indices()
+        };
+        assert_eq!((indices(&[3, 1]), indices(&[2, 2]), indices(&[1, 4, 2])), (vec![3, 1], vec![2, 2], vec![4, 2, 1]));
     }
 }

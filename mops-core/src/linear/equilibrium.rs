@@ -3,6 +3,9 @@
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+
+use crate::random::stream;
 
 /// What must vanish, with its slopes.
 #[derive(Debug, Clone)]
@@ -38,68 +41,178 @@ impl fmt::Display for NoEquilibrium {
     }
 }
 
+/// Weighted rates that are rounding, relative to the largest coordinate.
+const SMALL: f64 = 1e-12;
+
+/// Step that moves a point by rounding only, relative to the largest coordinate.
+const SHORT: f64 = 1e-10;
+
+/// Weighted rates up to which a point counts as an equilibrium where no step brings them down any more.
+const ROUNDING: f64 = 1e-9;
+
+/// How far from the start further searches begin, as parts of a coordinate, or absolutely where it is 0.
+const AROUND: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e4];
+
+/// Points looked at until there counts as no equilibrium.
+const MOST: usize = 4_000;
+
 /// A point near `start` at which all rates vanish, where only the `free` ones of states and inputs move.
 ///
-/// Newton's method, with the shortest step where several points are possible, and shorter steps where a whole one does not
-/// bring the rates down. Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition (2006), sections 10.3, 11.2.
+/// Newton's method from the start; where it fails, as where a slope is 0 or infinite there, from points around it, farther
+/// and farther away. Of the points at one distance the equilibrium nearest to the start counts.
 ///
 /// # Errors
 /// What the rates refuse at the start; no point found.
 pub fn equilibrium(
-    mut rates: impl FnMut(&[f64]) -> Result<Balance, String>,
+    rates: impl FnMut(&[f64]) -> Result<Balance, String>,
     start: &[f64],
     free: &[bool],
 ) -> Result<Vec<f64>, NoEquilibrium> {
-    /// Sum of weighted rates that is rounding.
-    const SMALL: f64 = 1e-12;
     let moving: Vec<usize> = (0..start.len()).filter(|&i| free[i]).collect();
-    let mut x = start.to_vec();
-    let mut here = rates(&x).map_err(NoEquilibrium::Undefined)?;
-    // Rates of different units are weighed by what moves them.
-    let weigh = |at: &Balance| -> DVector<f64> {
-        let row = |i: usize| moving.iter().map(|&j| at.slopes[(i, j)].abs()).fold(0.0, f64::max);
-        DVector::from_fn(at.rates.len(), |i, _| if row(i) > 0.0 { 1.0 / row(i) } else { 1.0 })
+    let mut search = Search { rates, moving, origin: start, looked: 0 };
+    let first = match search.newton(start, false) {
+        Ok(x) => return Ok(x),
+        Err(why) => why,
     };
-    let weights = weigh(&here);
-    let distance = |at: &Balance| {
-        let weighed = at.rates.iter().zip(weights.iter()).map(|(rate, weight)| (rate * weight).powi(2));
-        weighed.sum::<f64>().sqrt()
-    };
-    for _ in 0..200 {
-        let far = distance(&here);
-        let size = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
-        if far <= SMALL * size {
+    for distance in AROUND {
+        let mut found: Vec<Vec<f64>> = Vec::new();
+        for x in search.around(distance) {
+            found.extend(search.newton(&x, false));
+        }
+        let nearest = found.into_iter().min_by(|a, b| search.distance(a).total_cmp(&search.distance(b)));
+        if let Some(x) = nearest {
             return Ok(x);
         }
-        let slopes = DMatrix::from_fn(here.rates.len(), moving.len(), |i, j| weights[i] * here.slopes[(i, moving[j])]);
-        let wanted = DVector::from_fn(here.rates.len(), |i, _| -weights[i] * here.rates[i]);
-        let svd = slopes.svd(true, true);
-        let threshold = 1e-10 * svd.singular_values.iter().copied().fold(0.0, f64::max);
-        let Ok(step) = svd.solve(&wanted, threshold.max(f64::MIN_POSITIVE)) else { break };
-        let mut share = 1.0;
-        loop {
-            let mut next = x.clone();
-            for (&j, dx) in moving.iter().zip(step.iter()) {
-                next[j] += share * dx;
+    }
+    // Where nothing moves a rate, it may vanish but for rounding.
+    search.looked = 0;
+    search.newton(start, true).map_err(|_| first)
+}
+
+/// The size of a coordinate.
+fn size(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { x.abs() }
+}
+
+struct Search<'a, R> {
+    rates: R,
+    /// Coordinates that are free.
+    moving: Vec<usize>,
+    /// Where it all began.
+    origin: &'a [f64],
+    /// Points looked at so far.
+    looked: usize,
+}
+
+impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
+    fn look(&mut self, x: &[f64]) -> Result<Balance, String> {
+        self.looked += 1;
+        let here = (self.rates)(x)?;
+        let finite = here.rates.iter().chain(here.slopes.iter()).all(|x| x.is_finite());
+        if finite { Ok(here) } else { Err("the rates and their slopes are not finite".to_owned()) }
+    }
+
+    /// The distance of a point from the origin, in sizes of coordinates.
+    fn distance(&self, x: &[f64]) -> f64 {
+        x.iter().zip(self.origin).map(|(a, b)| ((a - b) / size(*b)).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Points at a distance from the origin: every free coordinate up and down, and all of them at once in a few ways.
+    fn around(&self, distance: f64) -> Vec<Vec<f64>> {
+        let mut stream = stream(0, "equilibrium");
+        let n = self.moving.len();
+        let mut directions: Vec<Vec<f64>> =
+            (0..n).map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+        directions.push(vec![1.0; n]);
+        directions.extend((0..3).map(|_| (0..n).map(|_| if stream.random() { 1.0 } else { -1.0 }).collect()));
+        let point = |direction: &[f64], sign: f64| {
+            let mut x = self.origin.to_vec();
+            self.moving.iter().zip(direction).for_each(|(&j, part)| x[j] += sign * distance * part * size(x[j]));
+            x
+        };
+        directions.iter().flat_map(|direction| [point(direction, 1.0), point(direction, -1.0)]).collect()
+    }
+
+    /// Newton's method, with the shortest step where several points are possible, and shorter steps where a whole one does
+    /// not bring the rates down. With `lenient` a rate that nothing moves may be small, else it must be 0.
+    ///
+    /// Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition (2006), sections 10.3, 11.2.
+    fn newton(&mut self, start: &[f64], lenient: bool) -> Result<Vec<f64>, NoEquilibrium> {
+        let mut x = start.to_vec();
+        let from_beside = start != self.origin;
+        let mut here = self.look(&x).map_err(NoEquilibrium::Undefined)?;
+        let moving = self.moving.clone();
+        // Rates of different units are weighed by what moves them.
+        let reach = |at: &Balance, i: usize| moving.iter().map(|&j| at.slopes[(i, j)].abs()).fold(0.0, f64::max);
+        let weights: Vec<f64> = (0..here.rates.len())
+            .map(|i| match reach(&here, i) {
+                0.0 => 1.0,
+                reach => 1.0 / reach,
+            })
+            .collect();
+        let distance = |at: &Balance| {
+            at.rates.iter().zip(&weights).map(|(rate, weight)| (rate * weight).powi(2)).sum::<f64>().sqrt()
+        };
+        for _ in 0..200 {
+            let far = distance(&here);
+            let largest = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
+            let held = |i: usize| here.rates[i] != 0.0 && reach(&here, i) == 0.0;
+            let stuck = !lenient && (0..here.rates.len()).any(held);
+            let slopes =
+                DMatrix::from_fn(here.rates.len(), moving.len(), |i, j| weights[i] * here.slopes[(i, moving[j])]);
+            let wanted = DVector::from_fn(here.rates.len(), |i, _| -weights[i] * here.rates[i]);
+            let svd = slopes.svd(true, true);
+            let threshold = 1e-10 * svd.singular_values.iter().copied().fold(0.0, f64::max);
+            let Ok(step) = svd.solve(&wanted, threshold.max(f64::MIN_POSITIVE)) else { break };
+            if far <= SMALL * largest && !stuck && (far == 0.0 || step.amax() <= SHORT * largest) {
+                return Ok(self.without_rounding(x, far, distance));
             }
-            // A point at which the rates are not defined is too far.
-            if let Ok(there) = rates(&next)
-                && distance(&there) < far * (1.0 - 1e-4 * share)
-            {
-                (x, here) = (next, there);
-                break;
-            }
-            share *= 0.5;
-            if share < 1e-10 {
-                // Rounding leaves what cannot be brought down further.
-                if far <= 1e-9 * size {
-                    return Ok(x);
+            // Beside a place where a slope is 0 whole steps lead far away; they may grow tenfold from one to the next.
+            let gone = self.distance(&x);
+            let reached: Vec<f64> = moving.iter().zip(step.iter()).map(|(&j, dx)| dx / size(self.origin[j])).collect();
+            let length = reached.iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+            let mut share = if gone > 0.0 && from_beside { (10.0 * gone / length).min(1.0) } else { 1.0 };
+            let least = 1e-10 * share;
+            loop {
+                let mut next = x.clone();
+                moving.iter().zip(step.iter()).for_each(|(&j, dx)| next[j] += share * dx);
+                // A point at which the rates are not defined is too far.
+                if let Ok(there) = self.look(&next)
+                    && distance(&there) < far * (1.0 - 1e-4 * share)
+                {
+                    (x, here) = (next, there);
+                    break;
                 }
-                return Err(no_equilibrium(&here));
+                share *= 0.5;
+                if share < least || self.looked > MOST {
+                    // Rounding leaves what cannot be brought down further.
+                    if far <= ROUNDING * largest && !stuck {
+                        return Ok(self.without_rounding(x, far, distance));
+                    }
+                    return Err(no_equilibrium(&here));
+                }
             }
         }
+        Err(no_equilibrium(&here))
     }
-    Err(no_equilibrium(&here))
+
+    /// The point with coordinates at 0 that are 0 but for rounding, where the rates are no larger there.
+    fn without_rounding(&mut self, mut x: Vec<f64>, mut far: f64, distance: impl Fn(&Balance) -> f64) -> Vec<f64> {
+        let largest = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
+        for j in self.moving.clone() {
+            if x[j] == 0.0 || x[j].abs() > ROUNDING * largest {
+                continue;
+            }
+            let mut next = x.clone();
+            next[j] = 0.0;
+            if let Ok(there) = self.look(&next)
+                && distance(&there) <= far
+            {
+                (x, far) = (next, distance(&there));
+            }
+        }
+        x
+    }
 }
 
 fn no_equilibrium(here: &Balance) -> NoEquilibrium {
@@ -135,6 +248,55 @@ mod tests {
         let x = equilibrium(pendulum, &[0.5, 0.0, 0.0], &[false, true, true]).unwrap();
         assert_near(x[2], -9.81 * 0.5f64.sin(), 1e-12);
         assert_eq!(x[0], 0.5);
+    }
+
+    /// One state x and one input u: `x' = f(x, u)` with its slopes.
+    fn scalar(f: impl Fn(f64, f64) -> [f64; 3]) -> impl Fn(&[f64]) -> Result<Balance, String> {
+        move |z| {
+            let [rate, by_state, by_input] = f(z[0], z[1]);
+            if rate.is_nan() {
+                return Err("not defined".to_owned());
+            }
+            Ok(Balance { rates: vec![rate], slopes: DMatrix::from_row_slice(1, 2, &[by_state, by_input]) })
+        }
+    }
+
+    #[test]
+    fn a_start_at_which_a_slope_is_zero_or_infinite_or_nothing_is_defined_does_not_end_the_search() {
+        let near = |f: &dyn Fn(&[f64]) -> Result<Balance, String>, u: f64, start: f64, expected: f64| {
+            let x = equilibrium(f, &[start, u], &[true, false]).unwrap();
+            assert_near(x[0], expected, 1e-8 * (1.0 + expected.abs()));
+        };
+        // u - 2 x^3, from the flat place; of tiny and of large inputs.
+        let cubic = scalar(|x, u| [u - 2.0 * x.powi(3), -6.0 * x * x, 1.0]);
+        for u in [54.0, -54.0, 1e-6, 2e-15, 2e9] {
+            near(&cubic, u, 0.0, (0.5 * u).cbrt());
+        }
+        // A tank, u - 3 sqrt(x): the slope at 0 counts as 0, or is infinite.
+        for slope in [0.0, f64::NEG_INFINITY] {
+            let tank = scalar(move |x, u| [u - 3.0 * x.sqrt(), if x == 0.0 { slope } else { -1.5 / x.sqrt() }, 1.0]);
+            for u in [0.9, 3.0, 60.0, 1e-4] {
+                near(&tank, u, 0.0, (u / 3.0f64).powi(2));
+            }
+            near(&tank, 0.9, -1e-3, 0.09);
+        }
+        // Flat on both sides of a dead zone, a saturation whose slope is 0 at the start, a cosine at its top.
+        let dead = scalar(|x, u| [u - (x - 1.0).max(0.0), if x > 1.0 { -1.0 } else { 0.0 }, 1.0]);
+        near(&dead, 0.25, 0.0, 1.25);
+        let saturated = scalar(|x, u| [u - x.clamp(-1.0, 1.0), if x.abs() < 1.0 { -1.0 } else { 0.0 }, 1.0]);
+        near(&saturated, 0.5, 3.0, 0.5);
+        let top = scalar(|x, u| [u + x.cos(), -x.sin(), 1.0]);
+        near(&top, 0.5, 0.0, 2.0 * PI / 3.0);
+        // ln x, not defined at the start.
+        near(&scalar(|x, u| [u + x.ln(), 1.0 / x, 1.0]), 2.0, 0.0, (-2f64).exp());
+    }
+
+    #[test]
+    fn a_multiple_root_is_followed_to_its_end_and_what_is_zero_but_for_rounding_is_zero() {
+        let flat = equilibrium(scalar(|x, _| [-x.powi(3), -3.0 * x * x, 0.0]), &[1.0, 0.0], &[true, false]).unwrap();
+        assert!(flat[0].abs() < 1e-8, "{flat:?}");
+        let empty = scalar(|x, u| [u - x.sqrt(), if x == 0.0 { 0.0 } else { -0.5 / x.sqrt() }, 1.0]);
+        assert_eq!(equilibrium(empty, &[0.37, 0.0], &[true, false]).unwrap()[0], 0.0);
     }
 
     #[test]

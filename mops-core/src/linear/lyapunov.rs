@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::norms::check_stable;
 use super::{Complex, Schur, StateSpace};
 
 /// The symmetric solution `X` of `A X + X A^T + Q = 0` for a symmetric `Q`.
@@ -35,22 +36,32 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Stri
     Ok((&x + x.transpose()) * 0.5)
 }
 
+/// Relative difference of the two ways to the H2 norm from which on neither can be trusted.
+const DIFFERENT: f64 = 1e-6;
+
 /// The H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`: the root mean square of the outputs for white noise of unit
 /// intensity at the inputs. The delay does not matter.
 ///
-/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
+/// From the controllability Gramian, and once more from the observability Gramian. Source: K. Zhou, J. C. Doyle, Essentials
+/// of Robust Control (1998), section 4.3.
 ///
 /// # Errors
-/// A system that is not stable, or passes its input on directly: the norm is infinite.
+/// A system that is not stable, or passes its input on directly: the norm is infinite. Gramians that do not agree.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
-    if !system.is_stable()? {
-        return Err("the system is not stable: its H2 norm is infinite".to_owned());
-    }
+    check_stable(system, "H2 norm")?;
     if system.d.iter().any(|&d| d != 0.0) {
         return Err("the system passes its input on directly (D is not 0): its H2 norm is infinite".to_owned());
     }
-    let x = lyapunov(&system.a, &(&system.b * system.b.transpose()))?;
-    Ok((&system.c * x * system.c.transpose()).trace().max(0.0).sqrt())
+    let StateSpace { a, b, c, .. } = system.balanced();
+    let controllability = lyapunov(&a, &(&b * b.transpose()))?;
+    let observability = lyapunov(&a.transpose(), &(c.transpose() * &c))?;
+    let norm = |square: f64| square.max(0.0).sqrt();
+    let first = norm((&c * controllability * c.transpose()).trace());
+    let second = norm((b.transpose() * observability * &b).trace());
+    if (first - second).abs() > DIFFERENT * first.max(second) {
+        return Err(format!("the H2 norm is too inaccurate: the two Gramians give {first:.6e} and {second:.6e}"));
+    }
+    Ok(first)
 }
 
 #[cfg(test)]
@@ -80,6 +91,21 @@ mod tests {
         assert_near(norm(&[25.0], &[1.0, 2.0 * 0.1 * 5.0, 25.0]).unwrap(), (5.0f64 / 0.4).sqrt(), 1e-13);
         assert!(norm(&[1.0], &[1.0, -2.0]).unwrap_err().contains("not stable"));
         assert!(norm(&[1.0, 1.0], &[1.0, 2.0]).unwrap_err().contains("directly"));
+    }
+
+    #[test]
+    fn units_of_the_states_change_no_norm_and_a_pole_that_rounding_decides_on_has_none() {
+        // w^2/(s^2 + 2 z w s + w^2) with the states in units a billion apart.
+        let (z, w) = (0.1, 5.0f64);
+        let a = DMatrix::from_row_slice(2, 2, &[0.0, 1e9, -w * w * 1e-9, -2.0 * z * w]);
+        let (b, c) =
+            (DMatrix::from_column_slice(2, 1, &[0.0, w * w * 1e-9]), DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
+        let system = StateSpace::new(a, b, c, DMatrix::zeros(1, 1));
+        assert_near(h2_norm(&system).unwrap(), (w / (4.0 * z)).sqrt(), 1e-12);
+        // Two masses that drift, in coordinates that hide it: the double pole at 0 is computed as a small one.
+        let hidden = DMatrix::from_row_slice(2, 2, &[0.3, -0.1, 0.9, -0.3 - 1e-16]);
+        let drifting = StateSpace { a: hidden, ..system };
+        assert!(h2_norm(&drifting).is_err());
     }
 
     #[test]

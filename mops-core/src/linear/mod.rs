@@ -2,16 +2,25 @@
 //!
 //! Pure computation on small dense matrices. What a user can ask for and has no answer is an error of one sentence.
 
+mod components;
 mod controllability;
 mod eigen;
+mod enclosure;
 mod equilibrium;
 mod lyapunov;
 mod margins;
 mod norms;
+mod peaks;
 mod place;
+mod qr_steps;
+#[cfg(test)]
+mod reference;
 mod response;
 mod riccati;
+mod roughness;
 mod schur;
+mod search;
+mod stabilising;
 mod system;
 #[cfg(test)]
 mod testing;
@@ -21,14 +30,16 @@ mod zeros;
 use nalgebra::DMatrix;
 
 pub use controllability::check_controllable;
-pub use eigen::eigenvalues;
+pub use eigen::{eigenvalues, undecided};
 pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
 pub use lyapunov::{h2_norm, lyapunov};
-pub use margins::{Crossing, Loop, bandwidth};
+pub use margins::{Crossing, Loop};
 pub use norms::{Peak, hinf_norm, peak_gain};
-pub use place::place;
+pub use peaks::bandwidth;
+pub use place::{Placement, place};
 pub use response::FrequencyResponse;
 pub use riccati::{lqr, riccati};
+pub(crate) use roughness::Point;
 pub use schur::Schur;
 pub use transfer::TransferFunction;
 pub use zeros::zeros;

@@ -2,20 +2,27 @@
 
 use nalgebra::DMatrix;
 
-use super::{Complex, Schur, eigenvalues, lyapunov};
+use super::controllability::Scaled;
+use super::{Complex, Schur, eigenvalues, lyapunov, undecided};
+
+/// Residual of a Riccati equation, relative to the sizes of its terms, up to which it counts as solved.
+const SOLVED: f64 = 1e-8;
+
+/// Steps of Newton's method after which a solution does not get better any more; each doubles the digits.
+const STEPS: usize = 20;
 
 /// The stabilising solution `X` of `A^T X + X A - X B R^-1 B^T X + Q = 0`.
 ///
-/// From the stable invariant subspace of the Hamiltonian matrix, then refined by steps of Newton's method. Source: A. J.
-/// Laub, A Schur method for solving algebraic Riccati equations, IEEE Transactions on Automatic Control 24 (1979) 913-921;
-/// D. L. Kleinman, On an iterative technique for Riccati equation computations, ibid. 13 (1968) 114-115.
+/// From the stable invariant subspace of the Hamiltonian matrix, in units of like size, then refined by steps of Newton's
+/// method. The residual, and the stability of `A - B R^-1 B^T X`, are checked. Source: A. J. Laub, A Schur method for
+/// solving algebraic Riccati equations, IEEE Transactions on Automatic Control 24 (1979) 913-921; D. L. Kleinman, On an
+/// iterative technique for Riccati equation computations, ibid. 13 (1968) 114-115.
 ///
 /// # Errors
 /// Weights that are not what they must be; a mode that cannot be stabilised, or that lies on the imaginary axis and is not
-/// weighted.
+/// weighted; a residual that does not become small.
 pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
-    let n = a.nrows();
-    if n == 0 {
+    if a.nrows() == 0 {
         return Ok(DMatrix::zeros(0, 0));
     }
     let symmetric = |m: &DMatrix<f64>| (m - m.transpose()).norm() <= 1e-12 * m.norm();
@@ -27,38 +34,86 @@ pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix
     if least < -1e-12 * q.norm() {
         return Err("the weights of the states must not be negative".to_owned());
     }
-    let g = b * &inverse * b.transpose();
-    // X = s X': both off-diagonal blocks get the same size.
-    let scale = if g.norm() > 0.0 && q.norm() > 0.0 { (q.norm() / g.norm()).sqrt() } else { 1.0 };
-    let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
-    hamiltonian.view_mut((0, 0), (n, n)).copy_from(a);
-    hamiltonian.view_mut((0, n), (n, n)).copy_from(&(-&g * scale));
-    hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-q / scale));
-    hamiltonian.view_mut((n, n), (n, n)).copy_from(&-a.transpose());
-    let mut schur = Schur::of(&hamiltonian)?;
-    let no_solution = || {
-        "the Riccati equation has no stabilising solution: a mode cannot be stabilised, or rests on the imaginary axis \
-         without weight"
-            .to_owned()
-    };
-    if schur.reorder(|z| z.re < 0.0) != n {
-        return Err(no_solution());
+    let scaled = Scaled::of(a, b);
+    // Of the scaled system B R^-1 B^T is D^-1 (B R^-1 B^T) D^-1, and Q is D Q D.
+    let equation =
+        Equation { g: scaled.per_states(&(b * inverse * b.transpose())), q: scaled.by_states(q), a: scaled.a.clone() };
+    let x = equation.solution()?;
+    Ok(scaled.per_states(&x))
+}
+
+/// `A^T X + X A - X G X + Q = 0`.
+struct Equation {
+    a: DMatrix<f64>,
+    g: DMatrix<f64>,
+    q: DMatrix<f64>,
+}
+
+impl Equation {
+    fn solution(&self) -> Result<DMatrix<f64>, String> {
+        let mut x = self.by_subspace()?;
+        let mut residual = f64::INFINITY;
+        for _ in 0..STEPS {
+            let closed = &self.a - &self.g * &x;
+            if !eigenvalues(&closed)?.iter().all(|z| z.re < 0.0) {
+                return Err(no_solution());
+            }
+            // Newton's step: the next X satisfies a Lyapunov equation.
+            let next = lyapunov(&closed.transpose(), &(&self.q + &x * &self.g * &x))?;
+            let left = self.residual(&next);
+            if left.is_nan() || left >= 0.5 * residual {
+                break;
+            }
+            (x, residual) = (next, left);
+        }
+        if residual.is_nan() || residual > SOLVED {
+            return Err(format!(
+                "the Riccati equation was not solved: a relative residual of {residual:.1e} is left; weights whose sizes \
+                 differ less may help"
+            ));
+        }
+        let closed = &self.a - &self.g * &x;
+        if eigenvalues(&closed)?.iter().all(|z| z.re < 0.0) && undecided(&closed)?.is_empty() {
+            Ok(x)
+        } else {
+            Err(no_solution())
+        }
     }
-    let upper = schur.q.view((0, 0), (n, n)).into_owned();
-    let lower = schur.q.view((n, 0), (n, n)).into_owned();
-    let solved = upper.adjoint().lu().solve(&lower.adjoint()).ok_or_else(no_solution)?;
-    let x: DMatrix<Complex> = solved.adjoint();
-    let mut x = x.map(|z| z.re * scale);
-    x = (&x + x.transpose()) * 0.5;
-    for _ in 0..3 {
-        let closed = a - &g * &x;
-        if !eigenvalues(&closed)?.iter().all(|z| z.re < 0.0) {
+
+    /// The solution by the stable invariant subspace of the Hamiltonian matrix.
+    fn by_subspace(&self) -> Result<DMatrix<f64>, String> {
+        let Self { a, g, q } = self;
+        let n = a.nrows();
+        // X = s X': both off-diagonal blocks get the same size.
+        let scale = if g.norm() > 0.0 && q.norm() > 0.0 { (q.norm() / g.norm()).sqrt() } else { 1.0 };
+        let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
+        hamiltonian.view_mut((0, 0), (n, n)).copy_from(a);
+        hamiltonian.view_mut((0, n), (n, n)).copy_from(&(-g * scale));
+        hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-q / scale));
+        hamiltonian.view_mut((n, n), (n, n)).copy_from(&-a.transpose());
+        let mut schur = Schur::of(&hamiltonian)?;
+        if schur.reorder(|z| z.re < 0.0) != n {
             return Err(no_solution());
         }
-        // Newton's step: the next X satisfies a Lyapunov equation.
-        x = lyapunov(&closed.transpose(), &(q + &x * &g * &x))?;
+        let upper = schur.q.view((0, 0), (n, n)).into_owned();
+        let lower = schur.q.view((n, 0), (n, n)).into_owned();
+        let x: DMatrix<Complex> = upper.adjoint().lu().solve(&lower.adjoint()).ok_or_else(no_solution)?.adjoint();
+        let x = x.map(|z| z.re * scale);
+        Ok((&x + x.transpose()) * 0.5)
     }
-    Ok(x)
+
+    /// The residual at `x`, relative to the sizes of the terms.
+    fn residual(&self, x: &DMatrix<f64>) -> f64 {
+        let (linear, square) = (self.a.transpose() * x, x * &self.g * x);
+        let left = &linear + linear.transpose() - &square + &self.q;
+        left.norm() / (2.0 * linear.norm() + square.norm() + self.q.norm()).max(f64::MIN_POSITIVE)
+    }
+}
+
+fn no_solution() -> String {
+    "the Riccati equation has no stabilising solution: a mode cannot be stabilised, or rests on the imaginary axis without \
+     weight"
+        .to_owned()
 }
 
 /// The feedback `u = -K x` that minimises `integral (x^T Q x + u^T R u) dt`.
@@ -75,7 +130,10 @@ pub fn lqr(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::linear::reference;
     use crate::linear::testing::{assert_near, furuta, random};
 
     #[test]
@@ -123,6 +181,62 @@ mod tests {
 
     /// SciPy 1.17.1, `solve_continuous_are`.
     const LQR: [f64; 4] = [-0.031_698_284_615, -0.025_227_862_966_5, -0.385_122_190_968, -0.067_332_515_286_4];
+
+    /// The relative residual, term by term, in the units given.
+    fn residual(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>, x: &DMatrix<f64>) -> f64 {
+        let g = b * r.clone().try_inverse().unwrap() * b.transpose();
+        let (linear, square) = (a.transpose() * x, x * g * x);
+        let left = &linear + linear.transpose() - &square + q;
+        let size = linear.abs() + linear.abs().transpose() + square.abs() + q.abs();
+        let scale = |i: usize| size[(i, i)].max(f64::MIN_POSITIVE).sqrt();
+        let n = a.nrows();
+        (0..n * n).map(|k| left[(k % n, k / n)].abs() / scale(k % n) / scale(k / n)).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn units_of_the_states_change_no_feedback() {
+        // A motor in SI units and in others that differ by up to 1e15; weights follow them.
+        let a = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, 0.0, -0.5, 20.0, 0.0, -3.0, -400.0]);
+        let b = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 250.0]);
+        let (q, r) = (
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[5.0, 0.1, 1e-3])),
+            DMatrix::from_element(1, 1, 0.2),
+        );
+        let expected = lqr(&a, &b, &q, &r).unwrap();
+        for units in [[1e6, 1.0, 1e-3], [1e-9, 1e6, 1.0], [1.0, 1e-8, 1e7], [1e3, 1e3, 1e-12]] {
+            let d = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&units));
+            let inverse = d.clone().try_inverse().unwrap();
+            let (a, b, q) = (&d * &a * &inverse, &d * &b, &inverse * &q * &inverse);
+            let x = riccati(&a, &b, &q, &r).unwrap();
+            assert!(residual(&a, &b, &q, &r, &x) < 1e-9, "{units:?}");
+            let k = lqr(&a, &b, &q, &r).unwrap() * &d;
+            assert!((&k - &expected).norm() < 1e-9 * expected.norm(), "{units:?}: {k} {expected}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(mops_tiers::property(1_000))]
+
+        #[test]
+        fn what_is_returned_solves_the_equation_and_stabilises(
+            n in 1usize..8, inputs in 1usize..3, seed in 0u64..1_000_000_000, decades in -6.0f64..6.0, zeros in 0usize..3,
+        ) {
+            let (a, b) = (random(n, n, seed) * 3.0, random(n, inputs, seed + 1));
+            let mut q = DMatrix::identity(n, n);
+            (0..zeros.min(n - 1)).for_each(|i| q[(i, i)] = 0.0);
+            let r = DMatrix::identity(inputs, inputs) * 10f64.powf(decades);
+            if let Ok(x) = riccati(&a, &b, &q, &r) {
+                prop_assert!(residual(&a, &b, &q, &r, &x) < 1e-6, "{}", residual(&a, &b, &q, &r, &x));
+                let closed = &a - &b * lqr(&a, &b, &q, &r).unwrap();
+                let exact = reference::eigenvalues(&closed);
+                prop_assert!(exact.iter().all(|z| z.re < 0.0), "{:?}", exact);
+                prop_assert!(x.symmetric_eigenvalues().min() > -1e-9);
+            } else {
+                // Random systems are controllable, and observable by all states.
+                prop_assert!(zeros > 0 || decades.abs() > 4.0, "{} {}", a, b);
+            }
+        }
+    }
 
     #[test]
     fn a_mode_that_no_input_reaches_must_be_stable() {

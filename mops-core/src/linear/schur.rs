@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::Complex;
+use super::qr_steps::{EXCEPTIONAL, LENIENT, MOST, decoupled};
 
 /// `A = Q T Q^H` with `Q` unitary and `T` upper triangular; the eigenvalues of `A` stand on the diagonal of `T`.
 ///
@@ -61,20 +62,21 @@ impl Schur {
         }
         let n = a.nrows();
         let (mut q, mut t) = if n > 2 { a.hessenberg().unpack() } else { (DMatrix::identity(n, n), a) };
+        let norm = t.norm();
         let mut hi = n.saturating_sub(1);
         let mut iteration = 0;
         while hi > 0 {
-            let lo = decoupled(&mut t, hi);
+            let lo = decoupled(&mut t, hi, if iteration >= LENIENT { norm } else { 0.0 });
             if lo == hi {
                 hi -= 1;
                 iteration = 0;
                 continue;
             }
             iteration += 1;
-            if iteration > 100 {
+            if iteration > MOST {
                 return Err("the Schur form was not found: the QR steps do not converge".to_owned());
             }
-            let shift = if iteration % 10 == 0 { t[(hi, hi)] + t[(hi, hi - 1)].norm() } else { shift(&t, hi) };
+            let shift = if iteration % EXCEPTIONAL == 0 { t[(hi, hi)] + t[(hi, hi - 1)].norm() } else { shift(&t, hi) };
             let (mut x, mut y) = (t[(lo, lo)] - shift, t[(lo + 1, lo)]);
             for k in lo..hi {
                 let rotation = Rotation::annihilating(x, y);
@@ -127,20 +129,6 @@ impl Schur {
         self.t[(k + 1, k)] = Complex::new(0.0, 0.0);
         (self.t[(k, k)], self.t[(k + 1, k + 1)]) = (second, first);
     }
-}
-
-fn decoupled(t: &mut DMatrix<Complex>, hi: usize) -> usize {
-    for lo in (1..=hi).rev() {
-        let mut around = t[(lo - 1, lo - 1)].norm() + t[(lo, lo)].norm();
-        if around == 0.0 {
-            around = t.norm();
-        }
-        if t[(lo, lo - 1)].norm() <= f64::EPSILON * around {
-            t[(lo, lo - 1)] = Complex::new(0.0, 0.0);
-            return lo;
-        }
-    }
-    0
 }
 
 /// The eigenvalue of the last 2 x 2 block that is nearer to its last entry.

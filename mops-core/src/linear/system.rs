@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::eigen::balance;
 use super::{Complex, StateSpace, eigenvalues};
 
 impl StateSpace {
@@ -36,6 +37,17 @@ impl StateSpace {
     /// An entry that is not finite.
     pub fn is_stable(&self) -> Result<bool, String> {
         Ok(self.poles()?.iter().all(|pole| pole.re < 0.0))
+    }
+
+    /// The system with its states scaled by powers of two, so that the entries of `A` are of one size.
+    #[must_use]
+    pub(super) fn balanced(&self) -> Self {
+        let mut system = self.clone();
+        for (i, scale) in balance(&mut system.a).into_iter().enumerate() {
+            system.b.row_mut(i).unscale_mut(scale);
+            system.c.column_mut(i).scale_mut(scale);
+        }
+        system
     }
 
     /// The system from one input to one output, by their indices.

@@ -27,8 +27,10 @@ pub use uncertain::{DistributionDraft, UncertainDraft};
 
 use crate::cancellation::Cancellation;
 use crate::case::Case;
-use crate::criterion::{Criterion, Demand, Usage};
+use crate::criterion::{Criterion, Usage, Value};
+use crate::demand::{Demand, Scaled};
 use crate::model::Model;
+use crate::problem::{FEASIBLE, Reading};
 use crate::scalar::Scalar;
 use crate::tuner::Tuner;
 use crate::unit::Unit;
@@ -114,10 +116,31 @@ pub struct Row {
     pub usage: Usage,
     /// How it is scaled.
     pub demand: Demand,
+    /// Whether its scaled value counts with the other sign: where the worst of it is sought.
+    pub reversed: bool,
     /// Weight of its scaled value in the objective.
     pub weight: f64,
     /// Unit of the value.
     pub unit: Unit,
+}
+
+impl Row {
+    /// The value of its criterion, under its demand.
+    pub fn reading(&self, value: &Value) -> Reading {
+        let Scaled { value: scaled, slope } = self.demand.scaled(value);
+        let sign = if self.reversed { -1.0 } else { 1.0 };
+        let number = if value.missed.is_some() { f64::NAN } else { value.number };
+        Reading { value: number, scaled: sign * scaled, slope: sign * slope, note: value.note }
+    }
+
+    /// Whether a scaled value meets what is asked for.
+    pub fn is_met(&self, scaled: f64) -> bool {
+        match self.usage {
+            _ if self.demand == Demand::None => true,
+            Usage::Equality => (scaled - 1.0).abs() <= FEASIBLE,
+            _ => scaled <= 1.0 + FEASIBLE,
+        }
+    }
 }
 
 /// A model in a case: what to analyse, and where its parameters come from.

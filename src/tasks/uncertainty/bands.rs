@@ -1,6 +1,7 @@
 //! Bands around the predictions of a calibrated model, to first order.
 
 use mops_core::BandReport;
+use mops_core::identification::Spread;
 
 use super::Calibrated;
 
@@ -29,19 +30,20 @@ pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandRepo
             let Ok(analysis) = problem.analyse_all(job, tuners, None) else { continue };
             let fitted = analysis.trace(&channel.signal).sample(&channel.times);
             let noise = channel.noise.unwrap_or_else(|| rms(&channel.values, &fitted));
-            let deviation = |i: usize| {
+            let spread = |i: usize| {
                 let slopes: Vec<f64> = slopes.iter().map(|along| along[i]).collect();
-                calibrated.covariance.of(&slopes)
+                calibrated.covariance.spread(&slopes)
             };
-            let deviations: Vec<f64> = (0..times.len()).map(deviation).collect();
+            let spreads: Vec<Spread> = (0..times.len()).map(spread).collect();
+            let measured = |spread: &Spread| Spread { deviation: spread.deviation.hypot(noise), ..*spread };
             bands.push(BandReport {
                 experiment: case.name.clone(),
                 channel: channel.signal.clone(),
                 unit: signal.unit.to_string(),
                 times,
                 value,
-                response: deviations.iter().map(|d| calibrated.limit * d).collect(),
-                measurement: deviations.iter().map(|d| calibrated.limit * d.hypot(noise)).collect(),
+                response: spreads.iter().map(|spread| spread.half_width(calibrated.level)).collect(),
+                measurement: spreads.iter().map(|spread| measured(spread).half_width(calibrated.level)).collect(),
             });
         }
     }

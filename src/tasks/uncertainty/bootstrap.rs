@@ -3,6 +3,8 @@
 use mops_core::statistics::{Summary, moving_blocks, quantile};
 use mops_core::{BootstrapParameter, BootstrapReport, Role, Stream, Study, UncertaintyTask, Watch, stream};
 
+use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
+
 use super::{Calibrated, held_at, refit};
 use crate::tasks::batches::{Stage, each};
 
@@ -12,18 +14,20 @@ struct Measured {
     channel: usize,
     /// What the calibrated model says.
     fitted: Vec<f64>,
-    /// Measured less fitted, from their mean.
+    /// Measured less fitted, from their mean, scaled to the noise that standard errors rest on.
     residuals: Vec<f64>,
     /// Length of a block.
     block: usize,
 }
 
 /// Estimates over replicates, and the simulations that they took: `y* = fitted + e*`, with `e*` made of blocks of the
-/// residuals that begin anywhere. The channels of an experiment that have as many samples as its first draw the same blocks,
+/// residuals that begin anywhere. Residuals are smaller than the noise, because the model was fitted to them; they are scaled
+/// to the variance that the standard errors rest on. The channels of an experiment that have as many samples as its first draw the same blocks,
 /// so that what they have in common stays.
 ///
 /// Source: H. R. Kuensch, Annals of Statistics 17 (1989) 1217-1241 (moving blocks); B. Efron, R. J. Tibshirani, An
-/// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals).
+/// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals); A. C. Davison, D. V. Hinkley,
+/// Bootstrap Methods and their Application (1997), section 6.2 (scaled residuals).
 ///
 /// # Errors
 /// What cannot be drawn anew, in a sentence.
@@ -41,7 +45,7 @@ pub(super) fn bootstrap(
         let mut random = stream(study.seed, &format!("bootstrap {number}"));
         let mut replicate = held_at(problem, &calibrated.best.tuners, None);
         draw_anew(&mut replicate, &measured, &mut random);
-        refit(replicate, watch)
+        refit(replicate, LevenbergMarquardtOptions::default().local(), watch)
     });
     let simulations = found.iter().map(|(_, cost)| cost).sum();
     let estimates: Vec<&Vec<f64>> = found.iter().filter_map(|(found, _)| found.as_ref()).map(|e| &e.tuners).collect();
@@ -98,13 +102,21 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
             let fitted = trace.sample(&channel.times);
             let raw: Vec<f64> = channel.values.iter().zip(&fitted).map(|(y, f)| y - f).collect();
             let mean = raw.iter().sum::<f64>() / raw.len() as f64;
+            let scale = scale(&raw, mean, calibrated.covariance.noise().of_channel(plan.case, &channel.signal));
             let usual = (raw.len() as f64).cbrt().ceil() as usize;
             let block = task.block.unwrap_or(usual).clamp(1, raw.len());
-            let residuals = raw.into_iter().map(|e| e - mean).collect();
+            let residuals = raw.into_iter().map(|e| scale * (e - mean)).collect();
             all.push(Measured { case: plan.case, channel: index, fitted, residuals, block });
         }
     }
     Ok(all)
+}
+
+/// Factor that gives residuals about their mean the standard deviation of the noise, where that is known.
+#[allow(clippy::cast_precision_loss)]
+fn scale(residuals: &[f64], mean: f64, noise: Option<f64>) -> f64 {
+    let size = (residuals.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / residuals.len() as f64).sqrt();
+    noise.filter(|noise| noise.is_finite() && size > 0.0).map_or(1.0, |noise| noise / size)
 }
 
 /// Puts fitted values with residuals from elsewhere into the experiments.

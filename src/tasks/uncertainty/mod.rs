@@ -5,8 +5,7 @@ mod bootstrap;
 mod profile;
 
 use mops_core::identification::Covariance;
-use mops_core::statistics::t_quantile;
-use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Study, UncertaintyReport, Watch};
+use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Solver, Study, UncertaintyReport, Watch};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use profile::Profiles;
@@ -19,9 +18,8 @@ struct Calibrated<'a> {
     problem: &'a Problem,
     best: &'a Evaluation,
     covariance: Covariance,
-    /// Confidence of the intervals, and the t quantile that belongs to it.
+    /// Confidence of the intervals.
     level: f64,
-    limit: f64,
 }
 
 /// Adds what the study asks for.
@@ -46,8 +44,7 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
         solved.outcome.warnings.push(why.to_owned());
         return;
     };
-    let limit = t_quantile(0.5 + 0.5 * task.level, covariance.freedom);
-    let calibrated = Calibrated { problem, best: &best, covariance, level: task.level, limit };
+    let calibrated = Calibrated { problem, best: &best, covariance, level: task.level };
     let mut report = UncertaintyReport {
         words: Vec::new(),
         level: task.level,
@@ -84,8 +81,8 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     solved.outcome.found.uncertainty = Some(report);
 }
 
-/// Estimates the active tuners of a study again, from where they stand; with the number of simulations it took.
-fn refit(study: Study, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
+/// Estimates the active tuners of a study again, from their start values; with the number of simulations it took.
+fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
     let problem = Problem::new(std::sync::Arc::new(study));
     let start = problem.start();
     if problem.active().is_empty() {
@@ -94,7 +91,7 @@ fn refit(study: Study, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
     }
     let quiet = Quiet(watch);
     let mut run = Run::new(&problem, Budget { evaluations: 100 * (problem.active().len() + 1) }, &quiet);
-    run.solve(LevenbergMarquardtOptions::default().local().as_mut(), &start);
+    run.solve(solver.as_mut(), &start);
     let simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
     (run.best().filter(|best| best.scaled.is_some()).cloned(), simulations)
 }
@@ -116,14 +113,18 @@ fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String>
     let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
     for found in &report.profiles {
         let [low, high] =
-            found.interval.map(|end| if end.is_finite() { significant(end, 5) } else { "nowhere".into() });
+            found.interval.map(|end| if end.is_finite() { significant(end, 5) } else { "an open end".into() });
         let [below, above] = [0, 1].map(|i| (found.interval[i] - found.value).abs());
         let skewed = below.is_finite() && above.is_finite() && (below > 1.2 * above || above > 1.2 * below);
         let remark = match found.ends {
-            ["data", "data"] if skewed => ", which is lopsided: the standard error tells less than half of it",
+            ["data", "data"] if skewed => ", which is asymmetric: prefer it to the standard error",
             ["data", "data"] => "",
-            ends if ends.contains(&"bound") => ": a bound of the tuner ends it, not the data",
-            _ => ": the data set no limit on one side",
+            ends if ends.contains(&"open") => {
+                ": an end was not found, because simulations failed on the way to it or the run was interrupted"
+            }
+            ["bound", "bound"] => ": bounds of the tuner end it, not the data",
+            ["bound", _] => ": a bound of the tuner ends it below, not the data",
+            _ => ": a bound of the tuner ends it above, not the data",
         };
         words.push(format!(
             "`{}`: the {percent} interval of the likelihood goes from {low} to {high}{}{remark}.",
@@ -136,11 +137,10 @@ fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String>
             if found.failed > 0 { format!("; {} could not be estimated", found.failed) } else { String::new() };
         words.push(format!("{} bootstrap replicates{failed}.", found.replicates));
     }
-    if calibrated.covariance.undetermined > 0 && !report.bands.is_empty() {
+    if calibrated.covariance.left_out > 0 && !report.bands.is_empty() {
         words.push(format!(
-            "The bands leave out {} directions of the tuners that the data do not determine: predictions far from these data \
-             may be worse.",
-            calibrated.covariance.undetermined
+            "The bands leave out {} directions of the tuners that nothing is known of: predictions far from these data may be worse.",
+            calibrated.covariance.left_out
         ));
     }
     words

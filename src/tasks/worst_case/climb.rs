@@ -24,8 +24,9 @@ impl Goal {
     pub(super) fn new(study: &Study, row: usize, upwards: bool, store: Option<&Copies>) -> Self {
         let mut only = study.rows[row].clone();
         (only.usage, only.weight) = (Usage::Minimise, 1.0);
-        if upwards {
-            only.demand = reversed(only.demand);
+        only.reversed = upwards;
+        if only.demand == Demand::None {
+            only.demand = Demand::AtMost(1.0);
         }
         let study = Study { rows: vec![only], ..study.clone() };
         let store = store.map(|store| store.of_row(row));
@@ -48,16 +49,6 @@ pub(super) struct End {
     pub evaluation: Option<Evaluation>,
     pub simulations: usize,
     pub failed: Vec<(String, Vec<f64>)>,
-}
-
-/// The demand by which the scaled value is that of another with its sign reversed.
-fn reversed(demand: Demand) -> Demand {
-    let (good, bad) = match demand {
-        Demand::Value(demand) => (0.0, demand),
-        Demand::Pair { good, bad } => (good, bad),
-        Demand::None => (0.0, 1.0),
-    };
-    Demand::Pair { good, bad: 2.0 * good - bad }
 }
 
 /// From one start: along slopes, then without them, since the worst case may lie on a jump.

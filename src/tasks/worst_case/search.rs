@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use mops_core::statistics::{Sampling, draw};
 use mops_core::{
-    CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Role, Row, Study, Subject, Usage, Watch,
-    WorstReport, stream,
+    CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Reading, Role, Row, Study, Subject, Usage,
+    Watch, WorstReport, stream,
 };
 
 use super::climb::{End, Goal, local, whole};
@@ -156,7 +156,7 @@ impl Region {
         for row in &mut study.rows {
             row.usage = Usage::Minimise;
             if row.demand == Demand::None {
-                row.demand = Demand::Value(1.0);
+                row.demand = Demand::AtMost(1.0);
             }
         }
         Problem::new(Arc::new(study))
@@ -186,10 +186,10 @@ impl Region {
         let mut reached: Vec<(f64, f64, &Evaluation)> = Vec::new();
         for evaluation in ends.iter().filter_map(|end| end.evaluation.as_ref()) {
             if let Some(reading) = evaluation.readings[0] {
-                reached.push((reading.value, scale(row, reading.value), evaluation));
+                reached.push((reading.value, scale(row, reading), evaluation));
             }
         }
-        let looked = seen.iter().filter_map(|e| e.readings[index].map(|r| (r.value, scale(row, r.value), e)));
+        let looked = seen.iter().filter_map(|e| e.readings[index].map(|r| (r.value, scale(row, r), e)));
         let worst = looked.chain(reached.iter().copied()).reduce(|worst, next| {
             if severity(row.usage, next.1) > severity(row.usage, worst.1) { next } else { worst }
         });
@@ -244,9 +244,14 @@ impl Region {
     }
 }
 
-/// The scaled value; the value itself where nothing is demanded.
-fn scale(row: &Row, value: f64) -> f64 {
-    if row.demand == Demand::None { value } else { row.demand.scale(value) }
+/// The scaled value, whichever way round the problem counted; the value itself where nothing is demanded.
+fn scale(row: &Row, reading: Reading) -> f64 {
+    match reading.value {
+        // What was never reached counts above 1.
+        value if value.is_nan() => reading.scaled.abs(),
+        value if row.demand == Demand::None => value,
+        value => row.demand.scale(value),
+    }
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {

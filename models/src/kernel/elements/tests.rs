@@ -3,10 +3,9 @@
 use mops_core::{Dual, Scalar, Trace};
 
 use super::*;
-use crate::kernel::{Dynamics, IntegrationMethod, Sink, Step, Tolerance, integrate};
+use crate::kernel::{Dynamics, Sink, Step, Tolerance, integrate};
 
-const TIGHT: Tolerance =
-    Tolerance { relative: 1e-10, absolute: 1e-12, max_steps: 100_000, method: IntegrationMethod::Explicit };
+const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
 /// Keeps a signal and the times of the events.
 struct Record<F> {

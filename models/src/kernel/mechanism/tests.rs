@@ -3,10 +3,9 @@
 use mops_core::{Dual, Scalar};
 
 use super::*;
-use crate::kernel::{IntegrationMethod, Sink, Step, Tolerance, integrate};
+use crate::kernel::{Sink, Step, Tolerance, integrate};
 
-const TIGHT: Tolerance =
-    Tolerance { relative: 1e-11, absolute: 1e-12, max_steps: 100_000, method: IntegrationMethod::Explicit };
+const TIGHT: Tolerance = Tolerance { relative: 1e-11, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
 const fn joint(events: [&'static str; 4]) -> Joint {
     Joint { angle: "q", about: "joint", start: 0.0, events }

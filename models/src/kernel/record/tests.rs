@@ -1,7 +1,7 @@
 //! Recorded signals against what they are functions of.
 
 use super::*;
-use mops_core::{Halt, IntegrationMethod};
+use mops_core::Halt;
 
 /// A state that rests, or runs with the clock: either way steps are as long as they may be.
 struct Idle(f64);
@@ -12,8 +12,7 @@ impl<S: Scalar> Dynamics<S> for Idle {
     }
 }
 
-const TOLERANCE: Tolerance =
-    Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 1000, method: IntegrationMethod::Explicit };
+const TOLERANCE: Tolerance = Tolerance { max_steps: 1000, ..Tolerance::DEFAULT };
 
 /// The largest difference between the recorded signal and the function of time and state it is, over a thousand times.
 fn difference<S: Scalar>(start: S, rate: f64, horizon: f64, f: impl Fn(f64, S) -> S) -> [f64; 2] {

@@ -6,7 +6,8 @@ use super::Models;
 use super::jobs::job;
 use super::values::converted;
 use crate::case::Case;
-use crate::criterion::{Criterion, Demand, Usage};
+use crate::criterion::{Criterion, Sense, Usage};
+use crate::demand::Demand;
 use crate::diagnostic::suggestion;
 use crate::model::AnalysisKind;
 use crate::study::draft::{CriterionDraft, Mistake};
@@ -31,7 +32,10 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
     let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(interface)?);
     let signals = interface.signals.clone();
     let unit = criterion.unit();
-    let demand = demand(&draft, &unit, criterion.natural_demand())?;
+    let demand = demand(&draft, &unit, criterion.as_ref())?;
+    if let Some(assumption) = criterion.assumption() {
+        study.notes.push(format!("`{name}`: {assumption}"));
+    }
     if !(draft.weight.is_finite() && draft.weight > 0.0) {
         return Err(Mistake::new("weight", format!("a weight must be positive, not {}", draft.weight))
             .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
@@ -45,6 +49,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
             criterion: Arc::clone(&criterion),
             usage: draft.usage,
             demand,
+            reversed: false,
             weight: draft.weight,
             unit: unit.clone(),
         });
@@ -128,25 +133,87 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
     Ok(chosen)
 }
 
-fn demand(draft: &CriterionDraft, unit: &Unit, natural: Option<f64>) -> Result<Demand, Mistake> {
-    let value =
-        |key: &str, q: &Option<Quantity>| q.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose();
+/// The demand of a criterion in its unit, in the sense and the range of its kind.
+fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, Mistake> {
+    let value = |key: &str, given: &Option<Quantity>| {
+        let value = given.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose()?;
+        value.map(|value| in_range(key, value, unit, criterion.range())).transpose()
+    };
     let (demand, good, bad) = (value("demand", &draft.demand)?, value("good", &draft.good)?, value("bad", &draft.bad)?);
+    let equal = draft.usage == Usage::Equality;
     match (demand, good, bad) {
-        (Some(d), None, None) if d.is_finite() && d > 0.0 => Ok(Demand::Value(d)),
-        (Some(d), None, None) => Err(Mistake::new("demand", format!("a demand must be positive, not {d}"))
-            .with_help("the value is divided by it; where that does not fit, give `good` and `bad` instead, the values that scale to 0 and to 1")),
-        (None, Some(good), Some(bad)) if good.is_finite() && bad.is_finite() && good != bad => Ok(Demand::Pair { good, bad }),
-        (None, Some(_), Some(_)) => Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")
-            .with_help("`good` scales to 0, `bad` to 1")),
+        (Some(d), None, None) => {
+            Demand::of(d, criterion.sense(), equal).ok_or_else(|| impossible(d, criterion.sense()))
+        }
+        (None, Some(good), Some(bad)) if !(good.is_finite() && bad.is_finite() && good != bad) => {
+            Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")
+                .with_help("`good` scales to 0, `bad` to 1"))
+        }
+        (None, Some(good), Some(bad)) => {
+            let against = match criterion.sense() {
+                Sense::Less => good > bad,
+                Sense::More => good < bad,
+                Sense::Target | Sense::Open => false,
+            };
+            if against && !equal {
+                let better = if criterion.sense() == Sense::More { "more" } else { "less" };
+                let (good, bad) = (unit.amount(bad), unit.amount(good));
+                return Err(Mistake::new(
+                    "good",
+                    format!("{better} is better here, so that `good` and `bad` are swapped"),
+                )
+                .with_help(format!("write good = \"{good}\", bad = \"{bad}\"")));
+            }
+            Ok(Demand::Pair { good, bad })
+        }
         (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")
             .with_help("remove one or the other")),
         (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
-        (None, None, None) if natural.is_some() => Ok(natural.map_or(Demand::None, Demand::Value)),
-        (None, None, None) => Err(Mistake::here("the criterion has no demand").with_help("add `demand = ...`, or the pair `good` and `bad`")),
+        (None, None, None) => match criterion.natural_demand() {
+            Some(natural) => Ok(Demand::AtMost(natural)),
+            None => Err(Mistake::here("the criterion has no demand")
+                .with_help("add `demand = ...`, or the pair `good` and `bad`")),
+        },
         (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")
             .with_help("add `bad = ...`, the value that scales to 1")),
         (None, None, Some(_)) => Err(Mistake::new("bad", "`bad` needs `good` beside it")
             .with_help("add `good = ...`, the value that scales to 0")),
     }
+}
+
+/// A demand that the sense of a kind has no use for.
+fn impossible(demand: f64, sense: Sense) -> Mistake {
+    let pair = "`good` and `bad`, the values that scale to 0 and to 1";
+    let (fact, way_out) = match sense {
+        Sense::Target if demand.is_finite() && demand != 0.0 => (
+            "neither less nor more is better here, so that a demand alone is ambiguous".to_owned(),
+            format!("add usage = \"equality\" for this value itself, or give {pair}"),
+        ),
+        Sense::More => (
+            format!("expected a demand other than 0, found {demand}"),
+            format!("the value is compared with it in relation to its size; give {pair} instead"),
+        ),
+        _ => (
+            format!("a demand must be positive, not {demand}"),
+            format!("the value is divided by it; where that does not fit, give {pair} instead"),
+        ),
+    };
+    Mistake::new("demand", fact).with_help(way_out)
+}
+
+/// Refuses a value that the kind can never have.
+fn in_range(key: &str, value: f64, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
+    if value.is_nan() || (low..=high).contains(&value) {
+        return Ok(value);
+    }
+    let amount = |x: f64| unit.amount((1e6 * x).round() / 1e6);
+    let range = format!("{} to {}", amount(low), amount(high));
+    let fact = format!("{} is outside of the range of this kind, {range}", unit.amount(value));
+    let degrees = Unit::known("deg");
+    let as_degrees = degrees.factor_to(unit).map(|factor| value * factor);
+    let way_out = match as_degrees.filter(|angle| (low..=high).contains(angle)) {
+        Some(_) => format!("if these are degrees, write {key} = \"{value} deg\""),
+        None => "give a value within the range".to_owned(),
+    };
+    Err(Mistake::new(key, fact).with_help(way_out))
 }

@@ -1,0 +1,102 @@
+//! Errors relative to the size of each state: the same accuracy whatever the units are.
+
+use super::*;
+
+/// Decades of the size of the states beside 1.
+const DECADES: [i32; 7] = [-12, -9, -6, -3, 0, 3, 6];
+
+/// The largest difference of a signal from its closed form, over the size of the signal.
+fn off(response: &Response, signal: &str, size: f64, end: f64, exact: impl Fn(f64) -> f64) -> f64 {
+    let time = |k: i32| end * f64::from(k) / 200.0;
+    (0..=200).map(|k| (at(response, signal, time(k)) - exact(time(k))).abs() / size).fold(0.0, f64::max)
+}
+
+/// What default tolerances of 1e-8 per step come to.
+const ACCURACY: f64 = 1e-6;
+
+#[test]
+fn a_capacitor_is_charged_as_the_closed_form_says_from_picofarads_on() {
+    let text = "states = { q = 'C' }\ninputs = { u = 'V' }\nparameters = { R = 'ohm', C = 'F' }\nder = { q = '(u - q/C)/R' }\n\
+                outputs = { v = { value = 'q/C', unit = 'V' } }";
+    let model = read(text).unwrap();
+    for decade in DECADES {
+        let c = 10_f64.powi(decade);
+        let constant = 1e6 * c;
+        for end in [2.0, 20.0, 200.0] {
+            let response = respond(&model, &[("u", Input::Constant(5.0))], &[("R", 1e6), ("C", c)], end * constant);
+            let worst = off(&response, "v", 5.0, end * constant, |t| 5.0 * (1.0 - (-t / constant).exp()));
+            assert!(worst < ACCURACY, "{c} F, {end} time constants: {worst}");
+        }
+    }
+}
+
+#[test]
+fn a_spring_swings_as_the_closed_form_says_at_all_sizes() {
+    let text = "states = { x = 'm', v = 'm/s' }\nparameters = { k = '1/s2' }\nder = { x = 'v', v = '-k*x' }";
+    let model = read(text).unwrap();
+    for size in DECADES.map(|decade| 10_f64.powi(decade)) {
+        for time in [1e-6_f64, 1.0, 1e6] {
+            let given = [("k", time.powi(-2)), ("x0", size)];
+            let response = respond(&model, &[], &given, 30.0 * time);
+            let worst = off(&response, "x", size, 30.0 * time, |t| size * (t / time).cos());
+            assert!(worst < 10.0 * ACCURACY, "{size} m, {time} s: {worst}");
+        }
+    }
+}
+
+#[test]
+fn a_pendulum_of_any_length_swings_alike() {
+    let text =
+        "states = { th = 'rad', w = 'rad/s' }\nparameters = { l = 'm' }\nder = { th = 'w', w = '-9.81/l*sin(th)' }";
+    let model = read(text).unwrap();
+    for start in [1e-12, 1e-6, 1.0, 3.0] {
+        let ends: Vec<f64> = DECADES
+            .iter()
+            .map(|&decade| {
+                let l = 10_f64.powi(decade);
+                at(&respond(&model, &[], &[("l", l), ("th0", start)], 10.0 * l.sqrt()), "th", 10.0 * l.sqrt())
+            })
+            .collect();
+        for end in &ends {
+            assert!((end - ends[0]).abs() < ACCURACY * start, "{start}: {ends:?}");
+        }
+    }
+}
+
+#[test]
+fn a_chain_of_integrators_starts_from_rest() {
+    // x6 = t^6/720: of higher order than the method, so that no first step is exact to the relative tolerance.
+    let states: Vec<String> = (1..=6).map(|k| format!("x{k} = '1'")).collect();
+    let der: Vec<String> = (1..=5).map(|k| format!("x{} = 'x{k}'", k + 1)).collect();
+    let text = format!("states = {{ {} }}\nder = {{ x1 = '1', {} }}", states.join(", "), der.join(", "));
+    let model = read(&text).unwrap();
+    let response = respond(&model, &[], &[], 2.0);
+    assert!((at(&response, "x6", 2.0) - 64.0 / 720.0).abs() < 1e-7);
+    assert!(response.work.steps < 2_000, "{:?}", response.work);
+}
+
+#[test]
+fn a_difference_that_is_rounding_is_no_motion_to_follow() {
+    // Two equal masses under equal forces: e is their distance, 0 but for rounding.
+    let text = "states = { e = 'm', a = 'm/s', b = 'm/s' }\nparameters = { k = '1/s2' }\n\
+                der = { e = 'a - b', a = '3.3*cos(7*time) - 0.1*a - k*e', b = '3.3*cos(7*time) - 0.1*b + k*e' }";
+    let model = read(text).unwrap();
+    let response = respond(&model, &[], &[("k", 30.0), ("a0", 1.1), ("b0", 1.1 * (1.0 + 1e-15))], 20.0);
+    assert!(at(&response, "e", 20.0).abs() < 1e-12);
+    assert!(response.work.steps < 5_000, "{:?}", response.work);
+}
+
+#[test]
+fn the_longest_step_finds_what_is_at_rest_elsewhere() {
+    let text = "states = { x = '1' }\nder = { x = 'exp(-(time - 500)^2)' }\ntolerance = { max-step = '1 s' }";
+    let response = respond(&read(text).unwrap(), &[], &[], 1000.0);
+    assert!((at(&response, "x", 1000.0) - std::f64::consts::PI.sqrt()).abs() < 1e-6);
+}
+
+#[test]
+fn a_declared_size_stands_for_one_that_is_not_known_yet() {
+    let text = "states = { q = { unit = 'C', scale = '1 nC' } }\nder = { q = '0' }";
+    assert!(read(text).is_ok());
+    let mistake = read("states = { q = { unit = 'C', scale = '-1 nC' } }\nder = { q = '0' }").err().expect("a mistake");
+    assert_eq!(mistake.to_string(), "states.q.scale: expected a positive size, found -0.000000001");
+}

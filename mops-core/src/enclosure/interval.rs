@@ -1,0 +1,185 @@
+//! Intervals: sets of numbers between two bounds, with the operations of expressions.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// All numbers from `low` to `high`, both included; the bounds may be infinite.
+///
+/// Every operation encloses the set of its results up to rounding: bounds are not rounded outwards, as the zeros that are
+/// sought with them are located by values, not by bounds.
+///
+/// Source: R. Moore, R. Kearfott, M. Cloud, Introduction to Interval Analysis (SIAM 2009), chapters 2 and 5.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower bound.
+    pub low: f64,
+    /// Upper bound.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Every number.
+    pub const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    /// The interval between two bounds in any order; every number if one of them is NaN.
+    #[must_use]
+    pub fn between(a: f64, b: f64) -> Self {
+        if a.is_nan() || b.is_nan() { Self::ALL } else { Self { low: a.min(b), high: a.max(b) } }
+    }
+
+    /// One number; every number for NaN.
+    #[must_use]
+    pub fn point(x: f64) -> Self {
+        Self::between(x, x)
+    }
+
+    /// The numbers at most `radius` away from `centre`.
+    #[must_use]
+    pub fn around(centre: f64, radius: f64) -> Self {
+        Self::between(centre - radius, centre + radius)
+    }
+
+    /// The smallest interval that contains both.
+    #[must_use]
+    pub fn hull(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Whether a number lies in it.
+    #[must_use]
+    pub fn contains(self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+
+    /// The largest absolute value in it.
+    #[must_use]
+    pub fn magnitude(self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    /// The one number in it, if it has only one.
+    #[must_use]
+    pub fn single(self) -> Option<f64> {
+        (self.low == self.high).then_some(self.low)
+    }
+
+    /// The results of a function that rises over the interval, or falls over it.
+    #[must_use]
+    pub fn monotone(self, f: impl Fn(f64) -> f64) -> Self {
+        Self::between(f(self.low), f(self.high))
+    }
+
+    /// The part within two bounds; the nearer bound where there is none.
+    #[must_use]
+    pub fn clamp(self, low: f64, high: f64) -> Self {
+        Self { low: self.low.clamp(low, high), high: self.high.clamp(low, high) }
+    }
+
+    /// `1/x`; every number where 0 lies in it.
+    #[must_use]
+    pub fn reciprocal(self) -> Self {
+        if self.contains(0.0) { Self::ALL } else { self.monotone(f64::recip) }
+    }
+
+    /// `x^2`.
+    #[must_use]
+    pub fn square(self) -> Self {
+        let largest = self.magnitude();
+        let least = if self.contains(0.0) { 0.0 } else { self.low.abs().min(self.high.abs()) };
+        Self { low: least * least, high: largest * largest }
+    }
+
+    /// `cos x`, `x` in rad.
+    #[must_use]
+    pub fn cos(self) -> Self {
+        if !self.low.is_finite() || !self.high.is_finite() || self.high - self.low >= TAU {
+            return Self { low: -1.0, high: 1.0 };
+        }
+        // Multiples of 2 pi are maxima, odd multiples of pi minima.
+        let reaches = |phase: f64| ((self.high - phase) / TAU).floor() >= ((self.low - phase) / TAU).ceil();
+        let ends = self.monotone(f64::cos);
+        Self { low: if reaches(PI) { -1.0 } else { ends.low }, high: if reaches(0.0) { 1.0 } else { ends.high } }
+    }
+
+    /// `sin x`, `x` in rad.
+    #[must_use]
+    pub fn sin(self) -> Self {
+        let reaches = |phase: f64| ((self.high - phase) / TAU).floor() >= ((self.low - phase) / TAU).ceil();
+        if !self.low.is_finite() || !self.high.is_finite() || self.high - self.low >= TAU {
+            return Self { low: -1.0, high: 1.0 };
+        }
+        let ends = self.monotone(f64::sin);
+        Self {
+            low: if reaches(-FRAC_PI_2) { -1.0 } else { ends.low },
+            high: if reaches(FRAC_PI_2) { 1.0 } else { ends.high },
+        }
+    }
+
+    /// `x^exponent`; where `x` may be negative the exponent is whole, or every number may result.
+    #[must_use]
+    pub fn power(self, exponent: f64) -> Self {
+        if exponent == 0.0 {
+            return Self::point(1.0);
+        }
+        let power = |x: f64| x.powf(exponent);
+        if exponent < 0.0 {
+            return self.power(-exponent).reciprocal();
+        }
+        if self.low >= 0.0 {
+            return self.monotone(power);
+        }
+        if exponent.fract() != 0.0 {
+            return Self::ALL;
+        }
+        if exponent % 2.0 != 0.0 {
+            return self.monotone(power);
+        }
+        let largest = self.magnitude();
+        let least = if self.contains(0.0) { 0.0 } else { self.low.abs().min(self.high.abs()) };
+        Self::between(power(least), power(largest))
+    }
+}
+
+impl Add for Interval {
+    type Output = Self;
+    #[inline]
+    fn add(self, o: Self) -> Self {
+        Self::between(self.low + o.low, self.high + o.high)
+    }
+}
+impl Sub for Interval {
+    type Output = Self;
+    #[inline]
+    fn sub(self, o: Self) -> Self {
+        Self::between(self.low - o.high, self.high - o.low)
+    }
+}
+impl Mul for Interval {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: Self) -> Self {
+        // 0 times a bound that is infinite is 0: the numbers themselves are finite.
+        let times = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
+        let [a, b, c, d] =
+            [times(self.low, o.low), times(self.low, o.high), times(self.high, o.low), times(self.high, o.high)];
+        Self::between(a.min(b).min(c).min(d), a.max(b).max(c).max(d))
+    }
+}
+impl Div for Interval {
+    type Output = Self;
+    #[inline]
+    fn div(self, o: Self) -> Self {
+        if o.contains(0.0) {
+            return Self::ALL;
+        }
+        let [a, b, c, d] = [self.low / o.low, self.low / o.high, self.high / o.low, self.high / o.high];
+        Self::between(a.min(b).min(c).min(d), a.max(b).max(c).max(d))
+    }
+}
+impl Neg for Interval {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { low: -self.high, high: -self.low }
+    }
+}

@@ -1,0 +1,227 @@
+//! Enclosures: bounds of a quantity and of its rate over an interval of time, to prove that it has no zero there.
+
+mod interval;
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::expression::{Comparison, Function};
+pub use interval::Interval;
+
+/// Bounds of a quantity `x(t)` over an interval of time, and of its derivative `dx/dt`.
+///
+/// Where a quantity has a kink, the rate encloses the slopes on both sides (Clarke's derivative); where it jumps, there is no
+/// enclosure.
+///
+/// Source: R. Moore, R. Kearfott, M. Cloud, Introduction to Interval Analysis (SIAM 2009), chapters 5 and 6; for hybrid
+/// systems: J. Esposito, V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Enclosure {
+    /// Bounds of `x`.
+    pub value: Interval,
+    /// Bounds of `dx/dt`, per s.
+    pub rate: Interval,
+}
+
+impl From<f64> for Enclosure {
+    fn from(x: f64) -> Self {
+        Self { value: Interval::point(x), rate: Interval::point(0.0) }
+    }
+}
+
+impl Enclosure {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { value: Interval::ALL, rate: Interval::ALL };
+
+    /// Time from `from` to `to`, s.
+    #[must_use]
+    pub fn of_time(from: f64, to: f64) -> Self {
+        Self { value: Interval::between(from, to), rate: Interval::point(1.0) }
+    }
+
+    /// The polynomial `sum_k c_k d^k` of the distance `d` from the middle of the interval, `|d| <= radius` in s.
+    #[must_use]
+    pub fn of_polynomial(coefficients: &[f64], radius: f64) -> Self {
+        let Some((&centre, rest)) = coefficients.split_first() else { return Self::from(0.0) };
+        let mut value = Interval::point(centre);
+        let mut rate = Interval::point(0.0);
+        let (mut power, mut order) = (1.0, 1.0);
+        for (k, &c) in (1..).zip(rest) {
+            let slope = order * c * power;
+            rate = rate + if k % 2 == 1 && k > 1 { Interval::between(0.0, slope) } else { symmetric(k == 1, slope) };
+            power *= radius;
+            value = value + if k % 2 == 0 { Interval::between(0.0, c * power) } else { symmetric(false, c * power) };
+            order += 1.0;
+        }
+        Self { value, rate }
+    }
+
+    /// A function of it, from the bounds of the function and of its derivative.
+    #[must_use]
+    pub fn chain(self, value: Interval, derivative: Interval) -> Self {
+        Self { value, rate: derivative * self.rate }
+    }
+
+    /// The smallest enclosure of both.
+    #[must_use]
+    pub fn hull(self, other: Self) -> Self {
+        Self { value: self.value.hull(other.value), rate: self.rate.hull(other.rate) }
+    }
+
+    /// Sine of an angle in rad.
+    #[must_use]
+    pub fn sin(self) -> Self {
+        self.chain(self.value.sin(), self.value.cos())
+    }
+
+    /// Cosine of an angle in rad.
+    #[must_use]
+    pub fn cos(self) -> Self {
+        self.chain(self.value.cos(), -self.value.sin())
+    }
+
+    /// A smooth function of one argument, on the part of its domain that the bounds meet.
+    ///
+    /// # Panics
+    /// For functions of several arguments and those with kinks, which are compiled to other instructions.
+    #[must_use]
+    pub fn function(self, function: Function) -> Self {
+        let x = self.value;
+        let one = Interval::point(1.0);
+        match function {
+            Function::Sin => self.sin(),
+            Function::Cos => self.cos(),
+            Function::Tan => self.sin() / self.cos(),
+            Function::Asin | Function::Acos => {
+                let x = x.clamp(-1.0, 1.0);
+                let slope = ((one - x.square()).clamp(0.0, 1.0)).monotone(|d| d.sqrt().recip());
+                match function {
+                    Function::Asin => self.chain(x.monotone(f64::asin), slope),
+                    _ => self.chain(x.monotone(f64::acos), -slope),
+                }
+            }
+            Function::Atan => self.chain(x.monotone(f64::atan), (one + x.square()).reciprocal()),
+            Function::Sinh => self.chain(x.monotone(f64::sinh), even(x, f64::cosh)),
+            Function::Cosh => self.chain(even(x, f64::cosh), x.monotone(f64::sinh)),
+            Function::Tanh => {
+                let t = x.monotone(f64::tanh);
+                self.chain(t, one - t.square())
+            }
+            Function::Exp => {
+                let e = x.monotone(f64::exp);
+                self.chain(e, e)
+            }
+            Function::Ln | Function::Log10 => {
+                let x = x.clamp(0.0, f64::INFINITY);
+                let slope = x.monotone(f64::recip);
+                match function {
+                    Function::Ln => self.chain(x.monotone(f64::ln), slope),
+                    _ => self.chain(x.monotone(f64::log10), slope * Interval::point(std::f64::consts::LOG10_E)),
+                }
+            }
+            Function::Sqrt => {
+                let root = x.clamp(0.0, f64::INFINITY).monotone(f64::sqrt);
+                self.chain(root, root.monotone(|r| 0.5 / r))
+            }
+            _ => unreachable!("`{}` is compiled to other instructions", function.name()),
+        }
+    }
+
+    /// `self^exponent`.
+    #[must_use]
+    pub fn power(self, exponent: Self) -> Self {
+        if let Some(b) = exponent.value.single() {
+            let slope = Interval::point(b) * self.value.power(b - 1.0);
+            return self.chain(self.value.power(b), if b == 0.0 { Interval::point(0.0) } else { slope });
+        }
+        if self.value.low <= 0.0 {
+            return Self::UNKNOWN;
+        }
+        (self.function(Function::Ln) * exponent).function(Function::Exp)
+    }
+
+    /// Angle of the point (`x`, `self`), rad.
+    #[must_use]
+    pub fn atan2(self, x: Self) -> Self {
+        let square = self.value.square() + x.value.square();
+        let rate = (x.value * self.rate - self.value * x.rate) / square;
+        // The angle jumps across the negative x axis.
+        if self.value.contains(0.0) && x.value.low <= 0.0 {
+            return Self::UNKNOWN;
+        }
+        let corner = |y: f64, x: f64| Interval::point(y.atan2(x));
+        let value = corner(self.value.low, x.value.low)
+            .hull(corner(self.value.low, x.value.high))
+            .hull(corner(self.value.high, x.value.low))
+            .hull(corner(self.value.high, x.value.high));
+        Self { value, rate }
+    }
+
+    /// 1 where the comparison holds, 0 where it does not, both where it may.
+    #[must_use]
+    pub fn holds(self, comparison: Comparison, other: Self) -> Self {
+        let difference = self.value - other.value;
+        let [low, high] = [difference.low, difference.high].map(|d| f64::from(u8::from(comparison.holds(d, 0.0))));
+        Self { value: Interval::between(low, high), rate: Interval::point(0.0) }
+    }
+
+    /// `a` where this is positive, else `b`.
+    #[must_use]
+    pub fn choose(self, a: Self, b: Self) -> Self {
+        match self.value {
+            c if c.low > 0.0 => a,
+            c if c.high <= 0.0 => b,
+            _ => a.hull(b),
+        }
+    }
+}
+
+/// `[-|c|, |c|]`; the point `c` itself where it is `constant`.
+fn symmetric(constant: bool, c: f64) -> Interval {
+    if constant { Interval::point(c) } else { Interval::between(-c, c) }
+}
+
+/// The results of an even function that rises with the absolute value.
+fn even(x: Interval, f: impl Fn(f64) -> f64) -> Interval {
+    let least = if x.contains(0.0) { 0.0 } else { x.low.abs().min(x.high.abs()) };
+    Interval::between(f(least), f(x.magnitude()))
+}
+
+impl Add for Enclosure {
+    type Output = Self;
+    #[inline]
+    fn add(self, o: Self) -> Self {
+        Self { value: self.value + o.value, rate: self.rate + o.rate }
+    }
+}
+impl Sub for Enclosure {
+    type Output = Self;
+    #[inline]
+    fn sub(self, o: Self) -> Self {
+        Self { value: self.value - o.value, rate: self.rate - o.rate }
+    }
+}
+impl Mul for Enclosure {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: Self) -> Self {
+        Self { value: self.value * o.value, rate: self.rate * o.value + self.value * o.rate }
+    }
+}
+impl Div for Enclosure {
+    type Output = Self;
+    #[inline]
+    fn div(self, o: Self) -> Self {
+        let inverse = o.value.reciprocal();
+        Self { value: self.value * inverse, rate: (self.rate - self.value * inverse * o.rate) * inverse }
+    }
+}
+impl Neg for Enclosure {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { value: -self.value, rate: -self.rate }
+    }
+}
+
+#[cfg(test)]
+mod tests;

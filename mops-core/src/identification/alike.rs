@@ -1,0 +1,24 @@
+//! What estimates would be if every sample counted alike.
+
+use super::noise::Noise;
+
+/// Ratio of sample counts from which on the weights of records are worth a word.
+const UNLIKE: usize = 2;
+
+/// Estimates if every sample counted alike, by its noise, to first order.
+#[derive(Debug, Clone)]
+pub struct Alike {
+    /// Samples of the shortest and of the longest record.
+    pub samples: [usize; 2],
+    /// Change and standard error of the estimate of every active tuner, in its unit.
+    pub tuners: Vec<(f64, f64)>,
+}
+
+/// `None` where records are about as long as each other.
+pub(super) fn alike(noise: &Noise) -> Option<Alike> {
+    let counts = || noise.records().filter(|record| record.signal.is_some()).map(|record| record.len());
+    let samples = [counts().min()?, counts().max()?];
+    let tuners = noise.weighted().to_vec();
+    let known = tuners.iter().all(|(step, error)| step.is_finite() && error.is_finite());
+    (samples[1] > UNLIKE * samples[0] && known).then_some(Alike { samples, tuners })
+}

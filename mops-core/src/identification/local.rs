@@ -1,0 +1,119 @@
+//! Sensitivities at a point, and the covariance of estimates there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alike::{Alike, alike};
+use super::covariance::Covariance;
+use super::noise::{Noise, Spread};
+use super::records::records;
+use super::sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
+use crate::criterion::Usage;
+use crate::problem::Problem;
+use crate::run::{Budget, Run};
+use crate::solver::Oracle;
+use crate::study::Study;
+use crate::tuner::{Grid, Tuner};
+
+/// Where sensitivities are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Point {
+    /// At a minimum of the sum of squares: residuals show the noise.
+    Minimum,
+    /// Elsewhere: residuals are mostly misfit, and only declared noise counts.
+    Elsewhere,
+}
+
+/// Sensitivities at a point, and what the noise of the residuals makes of estimates there.
+pub struct Local {
+    /// The sensitivity matrix and all that follows from it.
+    pub sensitivity: Sensitivity,
+    /// Covariance of the estimates; `None` without residuals, or where they do not show the noise.
+    pub covariance: Option<Covariance>,
+    /// Estimates if every sample counted alike, where records differ much in length.
+    pub(super) alike: Option<Alike>,
+    /// Standard error of every tuner for the noise of the residuals, were all others known; NaN without a covariance.
+    pub(super) alone: Vec<f64>,
+    /// Whether slopes are exact.
+    pub(super) exact: bool,
+    /// Whether they are slopes of residuals; else of the scaled criteria that count.
+    pub(super) residuals: bool,
+    /// Which tuners are start values of an experiment.
+    pub(super) starts: Vec<bool>,
+}
+
+impl Local {
+    /// Spread of the estimate of an active tuner; NaN where the data do not determine it.
+    pub fn spread(&self, k: usize) -> Spread {
+        let unknown = Spread { deviation: f64::NAN, freedom: f64::NAN };
+        self.covariance.as_ref().map_or(unknown, |covariance| covariance.of_tuner(k))
+    }
+}
+
+/// Sensitivities of the active tuners; `None` where there is no tuner, no criterion that counts, or no slope.
+pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>) -> Option<Local> {
+    let study = problem.study();
+    let n = problem.active().len();
+    // A run of its own: slopes are computed even when the budget is spent.
+    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
+    let found = probe.linearise(&problem.point_of(tuners), 1.0).ok().flatten()?;
+    let exact = probe.linearisations() > 0;
+    let residuals = !found.at.residuals.is_empty();
+    let counting = counting(problem);
+    let rows = if residuals { found.at.residuals.len() } else { counting.len() };
+    if n == 0 || rows == 0 || (residuals && found.residuals.iter().any(|column| column.len() != rows)) {
+        return None;
+    }
+    let active: Vec<&Tuner> = problem.active().iter().map(|&i| &study.tuners[i]).collect();
+    let values: Vec<f64> = problem.active().iter().map(|&i| tuners[i]).collect();
+    let jacobian = DMatrix::from_fn(rows, n, |i, k| {
+        let slope = if residuals { found.residuals[k][i] } else { found.rows[counting[i]][k] };
+        slope / unit_slope(active[k], values[k])
+    });
+    let coordinates = active.iter().zip(&values).map(|(tuner, &value)| Coordinate {
+        name: tuner.name.clone(),
+        value,
+        range: tuner.bounds[1] - tuner.bounds[0],
+        span: unit_slope(tuner, value).abs(),
+        unit: tuner.unit.to_string(),
+    });
+    let zero = zero.unwrap_or(if exact { TANGENTS } else { DIFFERENCES });
+    let mut sensitivity = Sensitivity::of(&jacobian, coordinates.collect(), zero);
+    let of_residuals = records(problem, tuners).filter(|_| residuals).map(|records| match point {
+        Point::Minimum => Noise::of(records, &found.at.residuals, &jacobian, &sensitivity.basis),
+        Point::Elsewhere => Noise::declared(records, n),
+    });
+    let mut covariance = of_residuals.and_then(|noise| Covariance::of(noise, &jacobian, &sensitivity));
+    let mut alone = vec![f64::NAN; n];
+    let mut alike = None;
+    if let Some(covariance) = &covariance {
+        sensitivity.judge(&jacobian, covariance);
+        alike = self::alike(covariance.noise());
+        let error =
+            |column: &DVector<f64>| covariance.noise().along((column / column.norm_squared()).as_slice()).deviation;
+        alone = jacobian.column_iter().map(|column| error(&column.into_owned())).collect();
+    }
+    covariance = covariance.map(|covariance| covariance.without(&sensitivity.undetermined));
+    let starts = start_parameters(study);
+    let starts =
+        active.iter().map(|tuner| tuner.case.is_some() && starts.contains(&tuner.parameter.as_str())).collect();
+    Some(Local { sensitivity, covariance, alike, alone, exact, residuals, starts })
+}
+
+/// Derivative of a tuner along its coordinate of the unit box.
+fn unit_slope(tuner: &Tuner, value: f64) -> f64 {
+    match tuner.grid {
+        Grid::List(_) => tuner.bounds[1] - tuner.bounds[0],
+        _ => tuner.slope_at(value),
+    }
+}
+
+/// Rows that enter the objective or a constraint.
+pub(super) fn counting(problem: &Problem) -> Vec<usize> {
+    let rows = problem.shape().rows.iter().enumerate();
+    rows.filter(|(_, (usage, _))| *usage != Usage::Monitor).map(|(i, _)| i).collect()
+}
+
+/// Parameters that set where a simulation begins.
+pub(super) fn start_parameters(study: &Study) -> Vec<&str> {
+    study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect()
+}

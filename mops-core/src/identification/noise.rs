@@ -1,0 +1,389 @@
+//! Noise of the residuals of a calibration, record by record: what the standard errors of estimates rest on.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
+use super::records::Record;
+use super::whiteness::whiteness;
+use super::words::coefficient;
+use crate::study::Study;
+
+/// Largest leverage of a sample whose residual still shows its noise. A sample beyond is fitted by a parameter of its own, and
+/// its residual is 0 up to rounding.
+const FITTED_ALONE: f64 = 0.999;
+
+/// Noise of all residuals.
+///
+/// A record whose residuals are white and of constant size has one variance (`Sharing::variances`):
+/// - records without a declared noise have a variance each;
+/// - records with a declared noise share one factor on their declared variances, except those that contradict the others
+///   (F test): these have a variance each too.
+///
+/// Every other record enters by its own residuals, corrected for leverage, `e_s / sqrt(1 - h_s)`: by their squares, and where
+/// they are not white also by products of neighbours, weighted by Bartlett's window. That estimate is uncertain and on average
+/// too small; it counts for no less than white noise of the same size.
+///
+/// Sources: H. White, Econometrica 48 (1980) 817-838 (sandwich); J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985)
+/// 305-325 (HC2, leverage); W. K. Newey, K. D. West, Econometrica 55 (1987) 703-708 (correlated residuals).
+#[derive(Debug, Clone)]
+pub struct Noise {
+    sources: Vec<Source>,
+    pools: Vec<Pool>,
+    /// Change and standard error of the estimate of every tuner where samples count by their noise alone, to first order.
+    weighted: Vec<(f64, f64)>,
+}
+
+/// A record and how its noise is described.
+#[derive(Debug, Clone)]
+struct Source {
+    record: Record,
+    shape: Shape,
+    /// Index of the pool whose variance it has.
+    pool: usize,
+    /// Whether its residuals contradict the noise declared for it.
+    disputed: bool,
+    /// Whether its residuals are white, but change in size.
+    changing: bool,
+}
+
+/// Noise of a record, up to the variance of its pool.
+#[derive(Debug, Clone)]
+enum Shape {
+    /// White, with this standard deviation.
+    White(f64),
+    /// By these deviations, corrected for leverage; products of samples less than `bandwidth` apart count.
+    Sampled { deviations: Vec<f64>, bandwidth: usize },
+}
+
+/// A contribution to the covariance of estimates: `variance * matrix`, of which the variance is known to within so many degrees
+/// of freedom.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    pub matrix: DMatrix<f64>,
+    pub pool: Pool,
+}
+
+/// Standard deviation of a quantity, and the degrees of freedom that it is known with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Standard deviation; NaN where the data do not show the noise.
+    pub deviation: f64,
+    /// Degrees of freedom of Student's t; infinite where the noise is known.
+    pub freedom: f64,
+}
+
+impl Spread {
+    /// Half the width of the interval that holds the truth with the probability `level`: t quantile times deviation. NaN
+    /// below one degree of freedom.
+    pub fn half_width(&self, level: f64) -> f64 {
+        if self.freedom < 1.0 || self.freedom.is_nan() {
+            return f64::NAN;
+        }
+        self.deviation * crate::statistics::t_quantile(0.5 + 0.5 * level, self.freedom)
+    }
+
+    /// Root of a sum of variances, each a share of that of a pool. Source: F. E. Satterthwaite, Biometrics
+    /// Bulletin 2 (1946) 110-114.
+    pub(super) fn of_sum(shares: impl Iterator<Item = (f64, Pool)>) -> Self {
+        let (mut total, mut uncertain) = (0.0, 0.0);
+        // N.B.: an unknown variance does not count where it has no share.
+        for (share, pool) in shares.filter(|(share, _)| *share != 0.0) {
+            let variance = share * pool.variance;
+            total += variance;
+            uncertain += variance * variance / pool.freedom;
+        }
+        let freedom = if uncertain == 0.0 { f64::INFINITY } else { total * total / uncertain };
+        Self { deviation: total.max(0.0).sqrt(), freedom }
+    }
+}
+
+impl Noise {
+    /// From residuals and their Jacobian; `basis` spans the directions of the tuners that it resolves, such that `J basis` has
+    /// orthonormal columns.
+    pub(super) fn of(records: Vec<Record>, residuals: &[f64], jacobian: &DMatrix<f64>, basis: &DMatrix<f64>) -> Self {
+        let fitted = |record: Record| {
+            let deviations = DVector::from_vec(record.deviations(residuals));
+            let slopes = record.per_deviation(jacobian) * basis;
+            Fitted::new(record, deviations, slopes)
+        };
+        let fitted: Vec<Fitted> = records.into_iter().map(fitted).collect();
+        // Every record by itself shows what it is like.
+        let alone = Sharing::none(fitted.len());
+        let own = alone.variances(&fitted);
+        let found: Vec<Character> =
+            fitted.iter().enumerate().map(|(i, of)| Character::of(of, &own, alone.variance(&own.pools, i))).collect();
+        let white: Vec<bool> = found.iter().map(|found| matches!(found.shape, Shape::White(_))).collect();
+        let (sharing, disputed) = pools::sharing(&fitted, &own.pools, &white);
+        let weighted = sharing.variances(&fitted);
+        let [step, errors] = [basis * &weighted.step, (basis * &weighted.covariance * basis.transpose()).diagonal()];
+        let mut pools = weighted.pools;
+        let mut sources = Vec::with_capacity(fitted.len());
+        for (i, (of, mut found)) in fitted.into_iter().zip(found).enumerate() {
+            let pool = &mut pools[sharing.of_record[i]];
+            match &mut found.shape {
+                Shape::White(deviation) => *deviation = sharing.relative[i],
+                // The window leaves about as many independent products: the reciprocal of the integral of its square, 2/3.
+                #[allow(clippy::cast_precision_loss)]
+                Shape::Sampled { bandwidth, .. } => {
+                    let window = (2.0 * *bandwidth as f64 / 3.0).max(1.0);
+                    *pool = Pool { variance: 1.0, freedom: pool.freedom / window };
+                }
+            }
+            if pool.freedom < SHOWN {
+                let is_declared = white[i] && of.record.noise.is_some();
+                let known = Pool { variance: 1.0, freedom: f64::INFINITY };
+                *pool = if is_declared { known } else { Pool { variance: f64::NAN, ..*pool } };
+            }
+            sources.push(Source {
+                record: of.record,
+                shape: found.shape,
+                changing: found.changing,
+                pool: sharing.of_record[i],
+                disputed: disputed.contains(&i),
+            });
+        }
+        let weighted = step.iter().zip(&errors).map(|(step, error)| (*step, error.max(0.0).sqrt())).collect();
+        Self { sources, pools, weighted }
+    }
+
+    /// The noise that a study declares, of records whose residuals show none; of `tuners` tuners.
+    pub(super) fn declared(records: Vec<Record>, tuners: usize) -> Self {
+        let known = Pool { variance: 1.0, freedom: f64::INFINITY };
+        let unknown = Pool { variance: f64::NAN, freedom: 0.0 };
+        let source = |record: Record| Source {
+            shape: Shape::White(record.noise.unwrap_or(1.0)),
+            pool: usize::from(record.noise.is_none()),
+            record,
+            disputed: false,
+            changing: false,
+        };
+        let sources = records.into_iter().map(source).collect();
+        Self { sources, pools: vec![known, unknown], weighted: vec![(f64::NAN, f64::NAN); tuners] }
+    }
+
+    /// Covariance of `columns' * residuals`, in parts of independent noise.
+    pub(super) fn parts(&self, columns: &DMatrix<f64>) -> Vec<Part> {
+        let n = columns.ncols();
+        let mut matrices = vec![DMatrix::zeros(n, n); self.pools.len()];
+        for source in &self.sources {
+            matrices[source.pool] += source.shape.covariance(source.record.collected(columns));
+        }
+        matrices.into_iter().zip(&self.pools).map(|(matrix, pool)| Part { matrix, pool: *pool }).collect()
+    }
+
+    /// Spread of a weighted sum of the residuals, with one weight for each.
+    pub fn along(&self, weights: &[f64]) -> Spread {
+        let column = DMatrix::from_column_slice(weights.len(), 1, weights);
+        let parts = self.parts(&column);
+        Spread::of_sum(parts.iter().map(|part| (part.matrix[(0, 0)], part.pool)))
+    }
+
+    /// Degrees of freedom of all noise together; infinite where some is known.
+    pub fn freedom(&self) -> f64 {
+        let is_known = |pool: &usize| self.pools[*pool].variance.is_finite();
+        let mut pools: Vec<usize> = self.sources.iter().map(|source| source.pool).filter(is_known).collect();
+        pools.sort_unstable();
+        pools.dedup();
+        pools.into_iter().map(|pool| self.pools[pool].freedom).sum()
+    }
+
+    /// Standard deviation of the noise of one sample of a channel in a case; NaN where the data do not show it, `None` where
+    /// the channel is not fitted.
+    pub fn of_channel(&self, case: usize, signal: &str) -> Option<f64> {
+        let is_wanted =
+            |source: &&Source| (source.record.case, source.record.signal.as_deref()) == (case, Some(signal));
+        self.sources.iter().find(is_wanted).map(|source| self.deviation(source))
+    }
+
+    /// What a reader should know of the noise of records, a sentence each.
+    pub(super) fn remarks(&self, study: &Study) -> Vec<String> {
+        let remark = |source: &Source| {
+            let place = format!("`{}` in `{}`", source.record.signal.as_ref()?, study.cases[source.record.case].name);
+            if source.disputed {
+                let [shown, declared] = [self.deviation(source), source.record.noise?].map(coefficient);
+                return Some(format!(
+                    "The residuals of {place} show a noise of {shown}, not {declared} as declared: the standard errors rest on \
+                     the residuals."
+                ));
+            }
+            source.changing.then(|| {
+                format!("The residuals of {place} are white, but change in size: the standard errors allow for it.")
+            })
+        };
+        self.sources.iter().filter_map(remark).collect()
+    }
+
+    /// Change and standard error of the estimate of every tuner, in its unit, were every sample to count by its noise alone: one
+    /// Gauss-Newton step. Source: E. L. Lehmann, G. Casella, Theory of Point Estimation, 2nd edition (1998), section 6.4.
+    pub(super) fn weighted(&self) -> &[(f64, f64)] {
+        &self.weighted
+    }
+
+    /// Every record.
+    pub(super) fn records(&self) -> impl Iterator<Item = &Record> {
+        self.sources.iter().map(|source| &source.record)
+    }
+
+    fn deviation(&self, source: &Source) -> f64 {
+        let variance = match &source.shape {
+            Shape::White(deviation) => deviation * deviation,
+            Shape::Sampled { deviations, .. } => mean_square(deviations),
+        };
+        (self.pools[source.pool].variance * variance).sqrt()
+    }
+}
+
+/// What residuals are like.
+struct Character {
+    shape: Shape,
+    /// Whether they are white, but change in size.
+    changing: bool,
+}
+
+impl Character {
+    /// From a record in the fit that weighs samples by their noise, where residuals show nothing but their own: `variance` is that
+    /// of the record.
+    fn of(of: &Fitted, fit: &Weighted, variance: f64) -> Self {
+        let deviations = &of.deviations + &of.slopes * &fit.step;
+        let squares: Vec<f64> = deviations.iter().map(|e| e * e).collect();
+        let is_white = |values: &[f64]| whiteness(values).is_none_or(|found| found.is_white());
+        let white = is_white(deviations.as_slice());
+        // Squares that are not white show a changing size. Source: A. I. McLeod, W. K. Li, Journal of Time Series Analysis 4
+        // (1983) 269-273.
+        let changing = white && !is_white(&squares);
+        if white && !changing {
+            return Self { shape: Shape::White(1.0), changing };
+        }
+        let spread = &of.slopes * &fit.covariance;
+        let leverages: Vec<f64> =
+            (0..of.record.len()).map(|s| spread.row(s).dot(&of.slopes.row(s)) / variance).collect();
+        let bandwidth = if changing { 1 } else { bandwidth(deviations.as_slice()) };
+        Self { shape: Shape::Sampled { deviations: corrected(deviations.as_slice(), &leverages), bandwidth }, changing }
+    }
+}
+
+impl Shape {
+    /// Covariance of sums over samples that noise of this shape brings; `pull` has a row for every sample, and a column for every
+    /// sum.
+    fn covariance(&self, pull: DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::White(deviation) => pull.tr_mul(&pull) * (deviation * deviation),
+            Self::Sampled { deviations, bandwidth } => {
+                let mut scores = pull.clone();
+                for (mut row, deviation) in scores.row_iter_mut().zip(deviations) {
+                    row *= *deviation;
+                }
+                if *bandwidth == 1 {
+                    return scores.tr_mul(&scores);
+                }
+                let sums = window_sums(&scores, *bandwidth);
+                let found = sums.tr_mul(&sums);
+                let white = pull.tr_mul(&pull) * mean_square(deviations);
+                let least = |k: usize| {
+                    let ratio = white[(k, k)] / found[(k, k)];
+                    if ratio > 1.0 { ratio.sqrt() } else { 1.0 }
+                };
+                let factors: Vec<f64> = (0..found.ncols()).map(least).collect();
+                DMatrix::from_fn(found.nrows(), found.ncols(), |a, b| factors[a] * found[(a, b)] * factors[b])
+            }
+        }
+    }
+}
+
+/// Sums over all windows of so many neighbours, over the root of their number; windows that reach beyond the samples count. Their
+/// sum of squares is that of products of samples with the weights `1 - lag/bandwidth`: the estimate of Newey and West.
+fn window_sums(scores: &DMatrix<f64>, bandwidth: usize) -> DMatrix<f64> {
+    let count = scores.nrows();
+    let mut sums = DMatrix::zeros(count + bandwidth - 1, scores.ncols());
+    #[allow(clippy::cast_precision_loss)]
+    let root = (bandwidth as f64).sqrt();
+    for (mut sums, scores) in sums.column_iter_mut().zip(scores.column_iter()) {
+        let mut sum = 0.0;
+        for s in 0..sums.len() {
+            if s < count {
+                sum += scores[s];
+            }
+            if s >= bandwidth {
+                sum -= scores[s - bandwidth];
+            }
+            sums[s] = sum / root;
+        }
+    }
+    sums
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Deviations over the roots of `1 - leverage`, so that their squares have the variance of the noise where it is constant.
+#[allow(clippy::cast_precision_loss)]
+fn corrected(deviations: &[f64], leverages: &[f64]) -> Vec<f64> {
+    let free = || deviations.iter().zip(leverages).filter(|(_, h)| **h < FITTED_ALONE);
+    let correct = |(e, h): (&f64, &f64)| e / (1.0 - h).sqrt();
+    let usual = (free().map(correct).map(|e| e * e).sum::<f64>() / free().count().max(1) as f64).sqrt();
+    deviations.iter().zip(leverages).map(|(e, h)| if *h < FITTED_ALONE { correct((e, h)) } else { usual }).collect()
+}
+
+/// Number of neighbours whose products count, for correlated deviations: that of Andrews for noise of first order with their
+/// autocorrelation, at least the rule of thumb of Newey and West, and at most a third of the record.
+///
+/// Sources: D. W. K. Andrews, Econometrica 59 (1991) 817-858, equations 6.2 and 6.4; W. K. Newey, K. D. West, Review of Economic
+/// Studies 61 (1994) 631-653.
+#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn bandwidth(deviations: &[f64]) -> usize {
+    /// Beyond, the rule grows without bounds. Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966.
+    const MOST: f64 = 0.97;
+    let n = deviations.len() as f64;
+    let rho = whiteness(deviations).map_or(0.0, |found| found.lag1.clamp(-MOST, MOST));
+    let alpha = 4.0 * rho * rho / ((1.0 - rho).powi(2) * (1.0 + rho).powi(2));
+    let andrews = 1.1447 * (alpha * n).cbrt();
+    let usual = 1.0 + 4.0 * (n / 100.0).powf(2.0 / 9.0);
+    (andrews.max(usual).round() as usize).clamp(1, (deviations.len() / 3).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_over_windows_have_the_squares_of_newey_and_west() {
+        let scores = DMatrix::from_fn(50, 2, |s, k| ((s * s) as f64 * 0.7 + k as f64).sin());
+        for bandwidth in [1, 2, 7, 49] {
+            let sums = window_sums(&scores, bandwidth);
+            let found = sums.tr_mul(&sums);
+            for (a, b) in [(0, 0), (0, 1), (1, 1)] {
+                let products = |lag: usize| (lag..50).map(|s| scores[(s, a)] * scores[(s - lag, b)]).sum::<f64>();
+                let turned = |lag: usize| (lag..50).map(|s| scores[(s, b)] * scores[(s - lag, a)]).sum::<f64>();
+                let weight = |lag: usize| 1.0 - lag as f64 / bandwidth as f64;
+                let exact = products(0) + (1..bandwidth).map(|l| weight(l) * (products(l) + turned(l))).sum::<f64>();
+                assert!((found[(a, b)] - exact).abs() < 1e-12 * 50.0, "{bandwidth}");
+            }
+        }
+    }
+
+    /// Welch's two-sample test: (1 + 2)^2 / (1^2/9 + 2^2/4) degrees of freedom.
+    #[test]
+    fn a_sum_of_variances_has_the_freedom_of_satterthwaite() {
+        let pool = |variance: f64, freedom: f64| Pool { variance, freedom };
+        let sum = Spread::of_sum([(1.0, pool(1.0, 9.0)), (0.5, pool(4.0, 4.0))].into_iter());
+        assert!((sum.deviation - 3f64.sqrt()).abs() < 1e-15 && (sum.freedom - 9.0 / (1.0 / 9.0 + 1.0)).abs() < 1e-12);
+        let known = Spread::of_sum([(1.0, pool(1.0, f64::INFINITY)), (0.0, pool(f64::NAN, 0.0))].into_iter());
+        assert_eq!(known, Spread { deviation: 1.0, freedom: f64::INFINITY });
+        assert!((known.half_width(0.95) - 1.959_964).abs() < 1e-6);
+        assert!(Spread::of_sum([(1.0, pool(f64::NAN, 0.5))].into_iter()).half_width(0.95).is_nan());
+    }
+
+    #[test]
+    fn correlated_noise_counts_for_no_less_than_white_noise_of_its_size() {
+        let pull = DMatrix::from_element(40, 1, 1.0);
+        let of = |value: fn(i32) -> f64| {
+            let deviations: Vec<f64> = (0..40).map(value).collect();
+            Shape::Sampled { deviations, bandwidth: 8 }.covariance(pull.clone())[(0, 0)]
+        };
+        // Neighbours of opposite signs cancel in a mean; runs of ten add up.
+        assert!((of(|i| if i % 2 == 0 { 1.0 } else { -1.0 }) - 40.0).abs() < 1e-12);
+        assert!(of(|i| if i % 20 < 10 { 1.0 } else { -1.0 }) > 120.0);
+    }
+}

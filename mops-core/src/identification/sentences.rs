@@ -1,0 +1,204 @@
+//! Findings about tuners in sentences.
+
+use super::blind::{BlindDirection, Limit};
+use super::local::Local;
+use super::report::{DirectionReport, TunerSensitivity};
+use super::words::{coefficient, counted, estimate, listed, percent};
+use crate::problem::Problem;
+
+/// Correlations above this are mentioned.
+const CORRELATED: f64 = 0.95;
+
+/// Correlated pairs that are mentioned, and estimates beside others, at most.
+const MOST: usize = 5;
+
+/// The findings: what is determined, what is not and why, how well, and what else the estimates rest on.
+pub(super) fn sentences(
+    problem: &Problem,
+    local: &Local,
+    tuners: &[TunerSensitivity],
+    directions: &[DirectionReport],
+) -> Vec<String> {
+    // Start values belong to a recording: nobody asks how far they can be trusted.
+    let asked: Vec<usize> = (0..tuners.len()).filter(|&k| !local.starts[k]).collect();
+    let (vague, rest): (Vec<usize>, Vec<usize>) = asked.into_iter().partition(|&k| is_vague(local, tuners, k));
+    let named = |of: &[usize]| listed(&of.iter().map(|&k| format!("`{}`", tuners[k].name)).collect::<Vec<_>>());
+    let mut sentences = vec![determined(local, vague.is_empty())];
+    sentences.extend(directions.iter().map(|direction| undetermined(local, direction)));
+    if !vague.is_empty() {
+        sentences.push(format!(
+            "Practically not identifiable: {} (the standard error exceeds the value, or the range).",
+            named(&vague)
+        ));
+    }
+    sentences.extend(extremes(local, tuners, &rest));
+    let weak: Vec<usize> = rest.into_iter().filter(|&k| tuners[k].trust == "weak").collect();
+    if !weak.is_empty() {
+        sentences.push(format!("Do not trust the numbers of {}: uncertain by more than 10 %.", named(&weak)));
+    }
+    sentences.extend(pairs(local, tuners));
+    if let Some(covariance) = &local.covariance {
+        sentences.extend(covariance.noise().remarks(problem.study()));
+    }
+    sentences.extend(alike(local, tuners));
+    sentences
+}
+
+/// Whether the noise leaves nothing of a tuner: its standard error exceeds its value, or what the noise hides moves it through
+/// its whole range.
+fn is_vague(local: &Local, tuners: &[TunerSensitivity], k: usize) -> bool {
+    let hidden = |direction: &BlindDirection| {
+        direction.limit == Limit::Noise && direction.changes.iter().any(|&(member, _)| member == k)
+    };
+    let of_value = tuners[k].relative_to == "value" && tuners[k].relative_error > 1.0;
+    of_value || (local.sensitivity.undetermined[k] && local.sensitivity.blind.iter().any(hidden))
+}
+
+/// How many directions are determined, and what is known of the others.
+fn determined(local: &Local, all_practically: bool) -> String {
+    let found = &local.sensitivity;
+    let n = found.coordinates.len();
+    let condition = coefficient(found.singular_values[0] / found.singular_values[n - 1]);
+    if found.rank < n {
+        let along = |(limit, what): (Limit, &str)| {
+            let count = found.blind.iter().filter(|blind| blind.limit == limit).count();
+            (count > 0).then(|| format!("along {} {what}", counted(count, "direction")))
+        };
+        let open = [
+            (Limit::Nothing, "nothing changes"),
+            (Limit::Noise, "the change is below the noise"),
+            (Limit::Slopes, "the slopes are not accurate enough to tell"),
+        ];
+        let what = if local.residuals { "The data determine" } else { "The criteria react to" };
+        let open: Vec<String> = open.into_iter().filter_map(along).collect();
+        return format!("{what} {} of the {}; {}.", found.rank, counted(n, "direction"), listed(&open));
+    }
+    match (local.residuals, n) {
+        (false, _) => format!("The criteria react to all {} (condition number {condition}).", counted(n, "direction")),
+        (true, 1) => "The tuner is locally identifiable.".to_owned(),
+        (true, _) if all_practically => {
+            format!("All {n} tuners are locally identifiable (condition number {condition}).")
+        }
+        (true, _) => format!("All {n} tuners are locally identifiable in theory (condition number {condition})."),
+    }
+}
+
+/// A direction that is not determined, and the way out.
+fn undetermined(local: &Local, direction: &DirectionReport) -> String {
+    let mut sentence = format!("{}.", capital(&direction.words));
+    if direction.changes.len() > 1 {
+        sentence += match local.residuals {
+            true => " Hold one of them, or measure something that tells them apart.",
+            false => " There the criteria leave the design free.",
+        };
+        if direction.remaining.is_finite() {
+            let remaining = percent(direction.remaining);
+            sentence += &format!(
+                " (Checked by going a tenth along it: the change is {remaining} of that of its tuners one by one.)"
+            );
+        }
+    }
+    sentence
+}
+
+/// The best and the least known of some tuners.
+fn extremes(local: &Local, tuners: &[TunerSensitivity], of: &[usize]) -> Option<String> {
+    let known = || of.iter().map(|&k| &tuners[k]).filter(|t| t.relative_error.is_finite());
+    let by_error = |a: &&TunerSensitivity, b: &&TunerSensitivity| a.relative_error.total_cmp(&b.relative_error);
+    let (best, worst) = (known().min_by(by_error)?, known().max_by(by_error)?);
+    let aside = if local.starts.contains(&true) { "; start values aside" } else { "" };
+    (best.name != worst.name).then(|| {
+        format!(
+            "Best known is `{}`, to {}; least `{}`, to {} (one standard error{aside}).",
+            best.name,
+            relative(best),
+            worst.name,
+            relative(worst)
+        )
+    })
+}
+
+/// What counting every sample alike would change, where records differ much in length.
+fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
+    /// Changes of an estimate below this share of its standard error, and of the error, are none.
+    const SAME: f64 = 0.2;
+    let found = local.alike.as_ref()?;
+    let [least, most] = found.samples;
+    let changes = |&k: &usize| {
+        let ((step, error), now) = (found.tuners[k], tuners[k].std_error);
+        !local.starts[k] && now.is_finite() && (step.abs() > SAME * now || (error / now - 1.0).abs() > SAME)
+    };
+    let changed: Vec<usize> = (0..tuners.len()).filter(changes).collect();
+    let begin = format!("The records have {least} to {most} samples. With every sample counted alike");
+    if changed.is_empty() {
+        return Some(format!("{begin}, the estimates and their errors would be about the same."));
+    }
+    let would_be = |&k: &usize| {
+        let ((step, error), tuner) = (found.tuners[k], &tuners[k]);
+        let now = estimate(tuner.value, tuner.std_error);
+        format!("`{}` = {} instead of {now}", tuner.name, estimate(tuner.value + step, error))
+    };
+    let more = changed.len().saturating_sub(MOST);
+    let mut parts: Vec<String> = changed.iter().take(MOST).map(would_be).collect();
+    parts.extend((more > 0).then(|| format!("so on for {more} more")));
+    Some(format!("{begin}, to first order: {}.", listed(&parts)))
+}
+
+/// Sentences about tuners that are hard to tell apart, the closest pairs first.
+fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
+    let found = &local.sensitivity;
+    let n = tuners.len();
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).collect();
+    pairs.retain(|&pair| found.correlation[pair].abs() > CORRELATED);
+    pairs.sort_by(|&a, &b| found.correlation[b].abs().total_cmp(&found.correlation[a].abs()));
+    let sentence = |&(i, j): &(usize, usize)| {
+        let rho = found.correlation[(i, j)];
+        let [a, b] = [&tuners[i], &tuners[j]];
+        let error = |k: usize| local.covariance.as_ref().map_or(found.together[k], |c| c.of_tuner(k).deviation);
+        let share = |k: usize| error(k) / found.coordinates[k].scale();
+        // The axis of the ellipse of confidence: both move by their errors.
+        let (most, least) = if share(i) >= share(j) { (i, j) } else { (j, i) };
+        let change = |k: usize, sign: f64| {
+            // The sign of a relative change is that of the value's.
+            if sign * found.coordinates[k].value.signum() < 0.0 { "decrease" } else { "increase" }
+        };
+        let by = percent(0.01 * share(least) / share(most));
+        let mut text = format!(
+            "`{}` and `{}` are correlated ({rho:.3}): a 1 % {} of `{}` is almost compensated by a {by} {} of `{}`.",
+            a.name,
+            b.name,
+            change(most, 1.0),
+            tuners[most].name,
+            change(least, rho.signum()),
+            tuners[least].name
+        );
+        let is_known = tuners[most].relative_error.is_finite() && !local.starts[most];
+        if let Some(covariance) = local.covariance.as_ref().filter(|_| is_known) {
+            // With one of them held, the estimate of the other loses what the first brings into it.
+            let mut slopes = vec![0.0; n];
+            slopes[most] = 1.0;
+            slopes[least] = -found.inverse[(most, least)] / found.inverse[(least, least)];
+            let held = tuners[most].relative_error * covariance.spread(&slopes).deviation / error(most);
+            text += &format!(
+                " With `{}` held, `{}` would be known to {} instead of {}.",
+                tuners[least].name,
+                tuners[most].name,
+                percent(held),
+                percent(tuners[most].relative_error)
+            );
+        }
+        text
+    };
+    pairs.iter().take(MOST).map(sentence).collect()
+}
+
+/// A relative error in words.
+fn relative(tuner: &TunerSensitivity) -> String {
+    let of = if tuner.relative_to == "range" { " of its range" } else { "" };
+    format!("{}{of}", percent(tuner.relative_error))
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}

@@ -1,0 +1,279 @@
+//! Bounds of a response over ranges of frequencies: what no grid can miss.
+
+use super::{Complex, FrequencyResponse, StateSpace, zeros};
+
+/// Gain below which a response counts as nothing: -200 dB.
+const FAINT: f64 = 1e-10;
+
+/// Decades above the highest corner to which a response is always looked at, and below the lowest one.
+const BEYOND: i32 = 4;
+
+/// Relative error of the gain by the poles and zeros from which on they bound nothing. Rounding makes one far smaller; zeros
+/// that are wrongly found make one of the size of the gain.
+const INACCURATE: f64 = 1e-3;
+
+/// Share of the terms it is the sum of below which a response is inaccurate itself.
+const LOST: f64 = 1e-10;
+
+/// A response `L(j w)` of one input and output with its poles and zeros, which bound how much it changes from one frequency
+/// to another.
+#[derive(Debug, Clone)]
+pub(super) struct Enclosure {
+    response: FrequencyResponse,
+    /// Zeros with 1, poles with -1.
+    roots: Vec<(Complex, f64)>,
+    delay: f64,
+    /// Lowest and highest frequency at which the response has a corner, rad/s.
+    corners: [f64; 2],
+}
+
+impl Enclosure {
+    /// The response of a system with one input and one output.
+    ///
+    /// # Errors
+    /// An entry that is not finite; poles and zeros that do not explain the response, so that they bound nothing.
+    pub fn new(system: &StateSpace) -> Result<Self, String> {
+        let zeros = zeros(system)?.into_iter().map(|z| (z, 1.0));
+        let roots: Vec<(Complex, f64)> = zeros.chain(system.poles()?.into_iter().map(|p| (p, -1.0))).collect();
+        let delay = system.delay;
+        let sizes = roots.iter().map(|(root, _)| root.norm()).chain((delay > 0.0).then(|| 1.0 / delay));
+        let sizes: Vec<f64> = sizes.filter(|size| *size > 0.0 && size.is_finite()).collect();
+        let (low, high) =
+            (sizes.iter().copied().fold(f64::INFINITY, f64::min), sizes.iter().copied().fold(0.0, f64::max));
+        let corners = if sizes.is_empty() { [1.0, 1.0] } else { [low, high] };
+        let found = Self { response: system.response()?, roots, delay, corners };
+        found.check()?;
+        Ok(found)
+    }
+
+    /// The response at an angular frequency, rad/s.
+    pub fn at(&self, omega: f64) -> Complex {
+        self.response.scalar(omega)
+    }
+
+    /// Number of poles and zeros.
+    pub fn order(&self) -> usize {
+        self.roots.len()
+    }
+
+    /// Lowest and highest frequency at which the response has a corner, rad/s.
+    pub fn corners(&self) -> [f64; 2] {
+        self.corners
+    }
+
+    /// Ranges that together are all frequencies at which the response matters: from 0 to where it only falls any more, and
+    /// is faint, or is as good as that of infinite frequency.
+    pub fn spans(&self) -> Vec<Span> {
+        let decade = |power: i32| 10f64.powi(power);
+        let start = self.corners[0] * decade(-BEYOND);
+        let mut spans = vec![self.over(0.0, start)];
+        let end = self.corners[1] * decade(BEYOND);
+        let mut low = start;
+        let mut last = f64::INFINITY;
+        loop {
+            let gain = self.at(low).norm();
+            let settled = low >= end && (gain <= FAINT || gain >= 0.99 * last);
+            if settled || !gain.is_finite() && low >= end || low > f64::MAX.sqrt() {
+                return spans;
+            }
+            last = if low >= end { gain } else { last };
+            spans.push(self.over(low, 10.0 * low));
+            low *= 10.0;
+        }
+    }
+
+    /// The response over the frequencies from `low` to `high`.
+    pub fn over(&self, low: f64, high: f64) -> Span {
+        let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let mut slope = Complex::new(0.0, -self.delay * half);
+        let (mut rest, mut gain, mut turn, mut far) = (0.0, [0.0, 0.0], 0.0, 0.0);
+        let mut turned = 0.0;
+        for &(root, sign) in &self.roots {
+            let distance = Complex::new(-root.re, center - root.im);
+            let x = half / distance.norm();
+            if x <= 0.5 {
+                // ln(1 + u) = u + r with |r| <= |u|^2/(2 (1 - |u|)), of which the imaginary part is small where u is nearly
+                // real: |Im u^k| <= k |sin arg u| |u|^k.
+                slope += Complex::new(0.0, sign * half) / distance;
+                let curved = x * x / (1.0 - x);
+                rest += 0.5 * curved;
+                turned += curved * (root.re.abs() / distance.norm()).min(0.5);
+            } else {
+                let (change, angle) = whole_change(root, [low, center, high]);
+                let change = if sign > 0.0 { change } else { [-change[1], -change[0]] };
+                gain = [gain[0] + change[0], gain[1] + change[1]];
+                turn += angle;
+                far += change[0].abs().max(change[1].abs()).hypot(angle);
+            }
+        }
+        let near = slope.re.abs() + rest;
+        Span {
+            low,
+            high,
+            response: self.at(center),
+            slope,
+            rest: rest + far,
+            gain: [gain[0] - near, gain[1] + near],
+            turn: turn + slope.im.abs() + turned,
+        }
+    }
+
+    /// Compares the change of the gain from frequency to frequency with that of the poles and zeros.
+    fn check(&self) -> Result<(), String> {
+        let [low, high] = self.corners;
+        let mut before: Option<f64> = None;
+        let steps = (high / low).log10().ceil().max(1.0);
+        for i in 0..=(2.0 * steps) as i32 {
+            // Between the corners, off those that are round numbers.
+            let omega = 1.07 * low * 10f64.powf(0.5 * f64::from(i));
+            let s = Complex::new(0.0, omega);
+            let rational: f64 = self.roots.iter().map(|(root, sign)| sign * (s - root).norm().ln()).sum();
+            let gain = self.at(omega).norm();
+            // Where the response is what rounding leaves of a sum it says nothing.
+            let lost = gain <= LOST * self.response.terms(s);
+            if lost || !(gain > FAINT && gain.is_finite() && rational.is_finite()) {
+                continue;
+            }
+            let expected = rational - gain.ln();
+            if let Some(last) = before
+                && (expected - last).abs() > INACCURATE
+            {
+                return Err("the poles and zeros of the system are too inaccurate to bound its response".to_owned());
+            }
+            before = Some(expected);
+        }
+        Ok(())
+    }
+}
+
+/// Bounds of the change of `ln |j w - root|` from the middle frequency to any other, and of its angle: the distance is
+/// convex in w, and the angle monotone.
+fn whole_change(root: Complex, [low, center, high]: [f64; 3]) -> ([f64; 2], f64) {
+    let from = |omega: f64| Complex::new(-root.re, omega - root.im);
+    let middle = from(center);
+    let (first, last) = (from(low).norm(), from(high).norm());
+    let least = if (low..=high).contains(&root.im) { root.re.abs() } else { first.min(last) };
+    let angle = |omega: f64| {
+        let other = from(omega);
+        if other.norm() == 0.0 { 0.0 } else { (other * middle.conj()).arg().abs() }
+    };
+    let change = [least, first.max(last)].map(|distance| (distance / middle.norm()).ln());
+    (change, angle(low).max(angle(high)))
+}
+
+/// What a response is bounded by over a range of frequencies: `ln L` is its value at the centre, plus a part that is linear
+/// in the frequency, plus a rest.
+#[derive(Debug, Clone)]
+pub(super) struct Span {
+    /// Lowest and highest angular frequency, rad/s.
+    pub low: f64,
+    pub high: f64,
+    /// L at the centre.
+    pub response: Complex,
+    /// The linear part at the upper end.
+    slope: Complex,
+    /// Bound of what is left of `ln L`, as a complex number.
+    rest: f64,
+    /// Bounds of the change of `ln |L|`.
+    gain: [f64; 2],
+    /// Bound of the turn of L, rad.
+    turn: f64,
+}
+
+/// A transfer function of the closed loop with unity negative feedback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Closed {
+    /// `S = 1/(1 + L)`.
+    Sensitivity,
+    /// `T = L/(1 + L)`.
+    Complementary,
+}
+
+impl Closed {
+    /// The gain at a value of L.
+    pub fn gain(self, l: Complex) -> f64 {
+        match self {
+            // Where L is infinite.
+            Self::Sensitivity if !l.is_finite() => 0.0,
+            Self::Complementary if !l.is_finite() => 1.0,
+            Self::Sensitivity => (l + 1.0).inv().norm(),
+            Self::Complementary => (l / (l + 1.0)).norm(),
+        }
+    }
+}
+
+impl Span {
+    /// The frequency in the middle, rad/s.
+    pub fn center(&self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Two halves: of the logarithm where the ends are far apart.
+    pub fn split(&self, of: &Enclosure) -> [Self; 2] {
+        let middle = match () {
+            () if self.low == 0.0 => 0.1 * self.high,
+            () if self.high > 4.0 * self.low => (self.low * self.high).sqrt(),
+            () => self.center(),
+        };
+        [of.over(self.low, middle), of.over(middle, self.high)]
+    }
+
+    /// Bounds of `ln |L|`.
+    pub fn gain(&self) -> [f64; 2] {
+        let here = self.response.norm().ln();
+        [here + self.gain[0], here + self.gain[1]]
+    }
+
+    /// Bounds of the angle from -1 to L, rad, 0 where L is real and negative; from -pi to pi where it may be any.
+    pub fn angle(&self) -> [f64; 2] {
+        use std::f64::consts::PI;
+        let here = (-self.response).arg();
+        if self.turn < PI { [here - self.turn, here + self.turn] } else { [-PI, PI] }
+    }
+
+    /// Bounds of the logarithm of the gain of the closed loop.
+    pub fn closed(&self, of: Closed) -> [f64; 2] {
+        let (around, along) = (self.by_sector(of), self.by_slope(of));
+        [around[0].max(along[0]), around[1].min(along[1])]
+    }
+
+    /// Bounds of the closed loop by those of the gain and the angle of L.
+    fn by_sector(&self, of: Closed) -> [f64; 2] {
+        use std::f64::consts::PI;
+        let [low, high] = self.gain().map(f64::exp);
+        // |T| = 1/|1 + 1/L|, and 1/L has the opposite angle.
+        let [low, high] = if of == Closed::Sensitivity { [low, high] } else { [1.0 / high, 1.0 / low] };
+        if !(low >= 0.0 && high >= low) {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        let angle = (-self.response).arg().abs();
+        let (least, most) = ((angle - self.turn).max(0.0), (angle + self.turn).min(PI));
+        let distance = |size: f64, angle: f64| {
+            let sine = (0.5 * angle).sin();
+            if size.is_finite() { ((size - 1.0).powi(2) + 4.0 * size * sine * sine).sqrt() } else { f64::INFINITY }
+        };
+        let nearest = distance(least.cos().clamp(low, high), least);
+        let farthest = distance(low, most).max(distance(high, most));
+        [-farthest.ln(), -nearest.ln()]
+    }
+
+    /// Bounds of the closed loop by its own linear part, with those of the rest.
+    fn by_slope(&self, of: Closed) -> [f64; 2] {
+        let l = self.response;
+        let t = l / (l + 1.0);
+        let size = self.slope.norm() + self.rest;
+        let growth = size.exp_m1();
+        let u = t.norm() * growth;
+        if u.is_nan() || u > 0.9 {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) where ln L changes by e.
+        let curved = t.norm() * (growth - size) + 0.5 * u * u / (1.0 - u);
+        let (linear, rest) = match of {
+            Closed::Sensitivity => ((t * self.slope).re, self.rest * t.norm()),
+            Closed::Complementary => (((Complex::new(1.0, 0.0) - t) * self.slope).re, self.rest * (1.0 + t.norm())),
+        };
+        let (here, change) = (of.gain(l).ln(), linear.abs() + rest + curved);
+        [here - change, here + change]
+    }
+}

@@ -1,0 +1,171 @@
+//! Whether a function has the slopes that are stated of it.
+
+/// Distances at which slopes are compared with differences, each a hundredth of the one before: shares of a variable, or
+/// absolute ones where it is 0.
+const DISTANCES: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
+
+/// Part of the terms of a row within which a difference is the slope.
+const CLOSE: f64 = 1e-5;
+
+/// Part of a deviation that is left at a hundredth of the distance. Of a smooth function it is a hundredth, of `x^1.5` a
+/// tenth; at a kink it stays, and where a slope is infinite it grows.
+const FALLING: f64 = 0.5;
+
+/// A function of several variables at a point, with its slopes.
+pub(crate) struct Point<'a> {
+    /// The variables.
+    pub x: &'a [f64],
+    /// The values.
+    pub values: &'a [f64],
+    /// The derivatives of the values (rows) by the variables (columns).
+    pub slopes: &'a nalgebra::DMatrix<f64>,
+}
+
+impl Point<'_> {
+    /// The pairs of a row and a column of which the slope is not that of the function: it jumps, or is infinite. `f` gives
+    /// the values at other points, where it has some; only these `rows` and `columns` are looked at.
+    ///
+    /// A direction in which all variables move tells whether there is any; only then each is moved alone.
+    pub fn rough(
+        &self,
+        mut f: impl FnMut(&[f64]) -> Option<Vec<f64>>,
+        rows: &[usize],
+        columns: &[usize],
+    ) -> Vec<(usize, usize)> {
+        // Parts of the golden ratio, by turns up and down, so that no two variables move alike.
+        let mixed = |i: usize| {
+            (0.3 + 0.7 * (0.618_033_988_749_894_9 * (i + 1) as f64).fract())
+                * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
+        };
+        let all: Vec<(usize, f64)> = columns.iter().enumerate().map(|(i, &j)| (j, mixed(i))).collect();
+        if self.rough_rows(&mut f, rows, &all).iter().all(|rough| !rough) {
+            return Vec::new();
+        }
+        let mut found = Vec::new();
+        for &column in columns {
+            let rough = self.rough_rows(&mut f, rows, &[(column, 1.0)]);
+            found.extend(rows.iter().zip(rough).filter(|(_, rough)| *rough).map(|(&row, _)| (row, column)));
+        }
+        found
+    }
+
+    /// Which rows have no slope along a direction, given by parts of the columns. A side on which the function is not
+    /// defined says nothing, unless it is neither.
+    fn rough_rows(
+        &self,
+        f: &mut impl FnMut(&[f64]) -> Option<Vec<f64>>,
+        rows: &[usize],
+        direction: &[(usize, f64)],
+    ) -> Vec<bool> {
+        let size = |j: usize| if self.x[j] == 0.0 { 1.0 } else { self.x[j].abs() };
+        let mut sides = [vec![Verdict::default(); rows.len()], vec![Verdict::default(); rows.len()]];
+        let mut seen = [false; 2];
+        for distance in DISTANCES {
+            for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                let mut x = self.x.to_vec();
+                let mut moved = Vec::with_capacity(direction.len());
+                for &(j, part) in direction {
+                    x[j] += sign * distance * part * size(j);
+                    // What the variable has moved by after rounding.
+                    moved.push((j, x[j] - self.x[j]));
+                }
+                let Some(values) = f(&x) else { continue };
+                seen[side] = true;
+                for (verdict, &row) in sides[side].iter_mut().zip(rows) {
+                    let terms = |(j, by): &(usize, f64)| self.slopes[(row, *j)] * by;
+                    let expected: f64 = moved.iter().map(terms).sum();
+                    let size: f64 = moved.iter().map(|term| terms(term).abs()).sum();
+                    let off = (values[row] - self.values[row] - expected).abs();
+                    let noise = 8.0 * f64::EPSILON * (values[row].abs() + self.values[row].abs() + self.inner(row));
+                    verdict.take(off, noise, size, distance);
+                }
+            }
+            if (0..2).all(|side| seen[side] && sides[side].iter().all(|verdict| verdict.smooth)) {
+                break;
+            }
+        }
+        let rough = |k: usize| sides.iter().any(|side| side[k].is_rough()) || !(seen[0] || seen[1]);
+        (0..rows.len()).map(rough).collect()
+    }
+
+    /// The size of the terms that a value is the sum of, by its slopes.
+    fn inner(&self, row: usize) -> f64 {
+        self.x.iter().enumerate().map(|(j, x)| (self.slopes[(row, j)] * x).abs()).sum()
+    }
+}
+
+/// What the differences on one side say of a row.
+#[derive(Debug, Clone, Default)]
+struct Verdict {
+    /// The slope is that of the function.
+    smooth: bool,
+    /// The last deviation, per distance, that was no noise.
+    deviation: Option<f64>,
+}
+
+impl Verdict {
+    /// Takes a difference that is `off` by so much, with this `noise`, between terms of this `size`.
+    fn take(&mut self, off: f64, noise: f64, size: f64, distance: f64) {
+        let falls = self.deviation.is_some_and(|before| (off + noise) / distance <= FALLING * before);
+        self.smooth |= falls || off.max(noise) <= CLOSE * size;
+        if off > noise {
+            self.deviation = Some(off / distance);
+        }
+    }
+
+    fn is_rough(&self) -> bool {
+        !self.smooth && self.deviation.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Whether a function of one variable with this slope at x is found rough there.
+    fn is_rough(f: impl Fn(f64) -> f64, slope: f64, x: f64) -> bool {
+        let (x, values, slopes) = ([x], [f(x)], DMatrix::from_element(1, 1, slope));
+        let point = Point { x: &x, values: &values, slopes: &slopes };
+        let value = |x: &[f64]| Some(vec![f(x[0])]).filter(|values| values[0].is_finite());
+        !point.rough(value, &[0], &[0]).is_empty()
+    }
+
+    #[test]
+    fn kinks_jumps_and_infinite_slopes_are_rough() {
+        assert!(is_rough(f64::sqrt, 0.0, 0.0) && is_rough(|x| 3.0 - 2.0 * x.sqrt(), 0.0, 0.0));
+        assert!(is_rough(|x| x.abs().cbrt(), 0.0, 0.0) && is_rough(f64::acos, 0.0, 1.0));
+        assert!(is_rough(f64::abs, 0.0, 0.0) && is_rough(f64::abs, 1.0, 0.0));
+        assert!(is_rough(|x| x.clamp(-2.0, 2.0), 1.0, 2.0) && is_rough(|x| x.max(0.5) * 1e-9, 0.0, 0.5));
+        assert!(is_rough(|x| if x > 0.0 { 1.0 } else { -1.0 }, 0.0, 0.0));
+        assert!(is_rough(|x| 1e3 + x + 0.01 * x.abs(), 1.0, 0.0));
+        // A slope that is wrong is found out too.
+        assert!(is_rough(f64::sin, 0.5, 0.3));
+    }
+
+    #[test]
+    fn smooth_functions_are_not_rough_however_steep_or_large_they_are() {
+        assert!(!is_rough(|x| 4.0 * x + 1e6, 4.0, 0.0) && !is_rough(|x| 4.0 * x - 8e5, 4.0, 2e5));
+        assert!(!is_rough(|x| 4.0 * x + 1e12, 4.0, 0.0) && !is_rough(|x| 1e3 + x.cos(), 0.0, 0.0));
+        assert!(!is_rough(f64::cos, 0.0, 0.0) && !is_rough(|x| x * x.abs(), 0.0, 0.0));
+        assert!(!is_rough(|x| (1e6 * x).tanh(), 1e6, 0.0) && !is_rough(|x| (1e-6 * x).sin(), 1e-6, 0.0));
+        assert!(!is_rough(f64::sqrt, 0.5 / 1e-12f64.sqrt(), 1e-12) && !is_rough(f64::sqrt, 0.5e15, 1e-30));
+        assert!(!is_rough(f64::exp, 20f64.exp(), 20.0) && !is_rough(|_| 7.0, 0.0, 0.0));
+        // Defined on one side only, with a slope there.
+        assert!(!is_rough(|x| x.powf(1.5), 0.0, 0.0));
+        // Away from a kink, also close to it.
+        assert!(!is_rough(f64::abs, 1.0, 1e-9) && !is_rough(|x| (x - 1.0).abs(), 1.0, 1.001));
+    }
+
+    #[test]
+    fn the_rows_and_columns_without_slope_are_named() {
+        let f = |x: &[f64]| vec![x[0] * x[1], x[0] + x[2].abs(), (x[1] - 1.0).abs()];
+        let x = [2.0, 1.0, 0.0];
+        let slopes = DMatrix::from_row_slice(3, 3, &[1.0, 2.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        let point = Point { x: &x, values: &f(&x), slopes: &slopes };
+        let found = |rows: &[usize], columns: &[usize]| point.rough(|x| Some(f(x)), rows, columns);
+        assert_eq!(found(&[0, 1, 2], &[0, 1, 2]), [(2, 1), (1, 2)]);
+        assert_eq!(found(&[0, 1], &[0, 1]), []);
+    }
+}

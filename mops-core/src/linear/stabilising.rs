@@ -1,0 +1,108 @@
+//! What would make an unstable loop stable: the nearest gain, turn of the phase, or delay.
+
+use std::cell::RefCell;
+use std::f64::consts::TAU;
+
+use super::enclosure::Span;
+use super::margins::{Crossing, STRONG};
+use super::{Complex, Loop};
+
+/// Crossings of the negative real axis up to which a stabilising gain is looked for.
+const MOST: usize = 20_000;
+
+impl Loop {
+    /// The factor nearest to 1, in the logarithm, beside which the closed loop is stable where L is multiplied by it: on
+    /// its far side, or, where the closed loop is stable already, 1.
+    ///
+    /// The number of unstable poles changes only at gains with which L meets -1, by two at most for each crossing. It is
+    /// counted anew between them, so that a crossing that does not lead to stability is passed over.
+    ///
+    /// # Errors
+    /// No such factor within 200 dB.
+    pub(super) fn stabilising_gain(&self) -> Result<f64, String> {
+        let end = self.last_useful_crossing()?;
+        let gains = RefCell::new(Vec::new());
+        let window = |span: &Span| {
+            let [low, high] = span.gain().map(f64::exp);
+            low < STRONG && high > 1.0 / STRONG && span.low < end && gains.borrow().len() <= MOST
+        };
+        self.phase_crossovers_in(window, |crossing| gains.borrow_mut().push(1.0 / crossing.response.norm()))?;
+        let gains = gains.into_inner();
+        if gains.len() > MOST {
+            return Err(
+                "the closed loop is unstable, and its delay too long for a stabilising gain to be found".to_owned()
+            );
+        }
+        let mut down: Vec<f64> = gains.iter().copied().filter(|gain| *gain <= 1.0).collect();
+        let mut up: Vec<f64> = gains.into_iter().filter(|gain| *gain >= 1.0).collect();
+        down.sort_by(|a, b| b.total_cmp(a));
+        up.sort_by(f64::total_cmp);
+        let found = [self.first_stable(&down, 0.5)?, self.first_stable(&up, 2.0)?].into_iter().flatten();
+        let nearest = found.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
+        nearest.ok_or_else(|| {
+            "the closed loop is unstable, and no change of the gain by up to 200 dB makes it stable".to_owned()
+        })
+    }
+
+    /// The first of these gains, which lead away from 1, beyond which the closed loop is stable; `beyond` is a factor to a
+    /// gain beyond the last one.
+    fn first_stable(&self, gains: &[f64], beyond: f64) -> Result<Option<f64>, String> {
+        let mut i = 0;
+        while i < gains.len() {
+            let next = gains.get(i + 1).copied().unwrap_or(gains[i] * beyond);
+            let between = (gains[i] * next).sqrt();
+            // Equal gains have nothing between them.
+            if (next / gains[i]).ln().abs() <= 1e-9 {
+                i += 1;
+                continue;
+            }
+            match self.unstable_with(between, &self.level(1.0 / between)?)? {
+                Some(0) => return Ok(Some(gains[i])),
+                // As many crossings are needed, each of which takes two poles away, less one for poles on the axis.
+                Some(unstable) => i += (unstable / 2).saturating_sub(1).max(1),
+                None => i += 1,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Highest frequency of phase crossovers that may help. With a delay there are crossovers without end, but beyond the
+    /// corners of L every one brings two more unstable poles, and no more of them than there are crossovers below can be
+    /// undone.
+    fn last_useful_crossing(&self) -> Result<f64, String> {
+        let delay = self.system.delay;
+        if delay == 0.0 {
+            return Ok(f64::INFINITY);
+        }
+        // The phase falls where the delay turns it faster than all poles and zeros, each by at most |root|/w^2.
+        let high = self.response.corners()[1];
+        let falling = (100.0 * high).max(2.0 * (self.response.order() as f64 * high / delay).sqrt());
+        // Below, the delay turns L so often, and the poles and zeros by half a turn each.
+        let crossovers = falling * delay / TAU + 0.5 * self.response.order() as f64;
+        Ok(falling + (crossovers.ceil() + 3.0) * TAU / delay)
+    }
+
+    /// The smallest turn of the response, towards lead or lag, that makes the closed loop stable; at every gain crossover
+    /// it turns L by `rate` rad. A turn by which a point of L passes -1 changes the number of unstable poles by two: less
+    /// with a lead where `|L|` falls, or with a lag where it rises.
+    pub(super) fn stabilising_turn(&self, rate: impl Fn(&Crossing) -> f64) -> Option<f64> {
+        let unstable = i64::try_from(self.unstable?).ok()?;
+        let turns = unstable / 2 + self.gain_crossovers.len() as i64 + 1;
+        let way = |direction: f64| {
+            let mut events: Vec<(f64, i64)> = Vec::new();
+            for crossing in &self.gain_crossovers {
+                // The lag to -1, or the lead.
+                let to = (-direction * Complex::arg(-crossing.response)).rem_euclid(TAU);
+                let change = if (direction > 0.0) == crossing.rises { 2 } else { -2 };
+                events.extend((0..=turns).map(|k| ((to + k as f64 * TAU) / rate(crossing), change)));
+            }
+            events.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut left = unstable;
+            events.into_iter().find_map(|(turn, change)| {
+                left += change;
+                (left == 0).then_some(turn)
+            })
+        };
+        [way(1.0), way(-1.0)].into_iter().flatten().min_by(f64::total_cmp)
+    }
+}

@@ -1,0 +1,48 @@
+//! What `mops linearise --out` writes: linearised.json, and the plots that could be drawn.
+
+use std::path::Path;
+
+use mops_core::StateSpace;
+use serde_json::Value;
+
+use crate::cli::{Trouble, cannot_write, linear_plots};
+use crate::report::file_name;
+
+/// Writes the files; returns a sentence on what is there, and notes on what is not.
+///
+/// # Errors
+/// A file that cannot be written.
+pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<String, Trouble> {
+    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+    let path = folder.join("linearised.json");
+    let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
+    crate::files::write(&path, text).map_err(cannot_write(&path))?;
+    let (mut written, mut notes) = (0, String::new());
+    for i in 0..system.inputs.len() {
+        for o in 0..system.outputs.len() {
+            let channel = system.channel(i, o);
+            let name = format!("{}/{}", channel.outputs[0], channel.inputs[0]);
+            for (kind, plot) in linear_plots::plots(&channel, &name) {
+                let plot = match plot {
+                    Ok(plot) => plot,
+                    Err(why) => {
+                        notes += &format!("note: {kind} of {name} is not drawn: {why}\n");
+                        continue;
+                    }
+                };
+                let path = folder.join(file_name(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0])));
+                crate::files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
+                plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
+                written += 1;
+            }
+        }
+    }
+    let there = match written {
+        0 if system.inputs.is_empty() => "linearised.json is, without plots, as the system has no input,".to_owned(),
+        0 if system.outputs.is_empty() => "linearised.json is, without plots, as the system has no output,".to_owned(),
+        0 => "linearised.json is, without plots,".to_owned(),
+        1 => "linearised.json and one plot are".to_owned(),
+        _ => format!("linearised.json and {written} plots are"),
+    };
+    Ok(format!("\n{notes}{there} in {}\n", folder.display()))
+}

@@ -1,0 +1,85 @@
+//! Bare numbers of channels, and settings of the command line that are no TOML.
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+const STUDY: &str = r#"
+    [study]
+    name = "swing"
+    task = "calibration"
+    [models.m.equations]
+    states     = { th = "rad" }
+    parameters = { a = "1/s" }
+    der        = { th = "-a*th" }
+    start      = { th = "0.5 rad" }
+    [tuners]
+    a = { start = 1.0, min = 0.1, max = 5.0 }
+    [experiments.e]
+    file     = "e.csv"
+    channels = { th = { column = "th", NOISE } }
+    [criteria]
+    th = { normalised-error = { signal = "th" } }
+"#;
+
+/// The result of a run with these settings, of a recording in degrees.
+fn run(noise: &str, settings: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let row = |i: i32| {
+        let t = 0.05 * f64::from(i);
+        format!("{t},{}\n", (0.5 * (-0.8 * t).exp()).to_degrees() + if i % 2 == 0 { 0.2 } else { -0.2 })
+    };
+    let table = format!("t,th[deg]\n{}", (0..=60).map(row).collect::<String>());
+    std::fs::write(folder.path().join("e.csv"), table).unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, STUDY.replace("NOISE", noise)).unwrap();
+    let out = folder.path().join("out");
+    let mut arguments = vec!["run", study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()];
+    arguments.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    let output = cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+#[test]
+fn a_bare_noise_counts_in_the_unit_of_its_column() {
+    let error = |noise: &str| run(noise, &[])["criteria"][0]["value"].as_f64().unwrap();
+    let bare = error("noise = 0.2");
+    assert!((bare - 1.0).abs() < 0.1, "{bare}");
+    assert_eq!(bare, error("noise = \"0.2 deg\""));
+    // As `offset` does.
+    assert_eq!(error("noise = 0.2, offset = 1"), error("noise = 0.2, offset = \"1 deg\""));
+}
+
+#[test]
+fn a_setting_that_is_no_toml_is_a_text() {
+    let sensitivity = run("noise = 0.2", &["study.task=sensitivity"]);
+    assert_eq!(sensitivity["task"], "sensitivity");
+    for (setting, start) in [
+        ("tuners.a.start=2", 2.0),
+        ("tuners.a.start=2 1/s", 2.0),
+        ("tuners.a.start=\"2 1/s\"", 2.0),
+        ("tuners.a={ start = 120, min = 6, max = 300, unit = \"1/min\" }", 120.0),
+        ("tuners.a.start = 3 1/s", 3.0),
+    ] {
+        let result = run("noise = 0.2", &["study.task=sensitivity", setting]);
+        assert_eq!(result["tuners"][0]["start"].as_f64(), Some(start), "{setting}");
+    }
+}
+
+#[test]
+fn a_setting_that_is_wrong_in_any_reading_is_refused_with_its_place() {
+    let refused = |setting: &str| {
+        let output = cargo_bin_cmd!("mops").args(["check", "pid-design", "--set", setting]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{setting}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for (setting, part) in [
+        ("tuners.k.start=", "value"),
+        ("tuners.k.start=0,5", "decimal comma"),
+        ("tuners.k.start={ a = ", "}"),
+        ("tuners.k.start=five", "five"),
+        ("criteria.settling.demand=12 m", "m"),
+    ] {
+        assert!(refused(setting).contains(part), "{setting}: {}", refused(setting));
+    }
+}

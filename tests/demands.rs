@@ -1,0 +1,160 @@
+//! Demands in the sense of their kinds: what is asked for is met, refused, or reported as missed.
+
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+/// An integrating loop with a lag, `k/(s (s + 1))`: phase margin 51.8 deg at k = 1, bandwidth and crossover near 1 rad/s.
+const LOOP: &str = r#"
+    [study]
+    name = "loop"
+    [models.loop.transfer-function]
+    numerator = ["k"]
+    denominator = [1, 1, 0]
+    [tuners]
+    k = { start = 1.0, min = 0.05, max = 20.0, scale = "log" }
+    [criteria]
+"#;
+
+/// `y = k exp(a t)/2`: nothing that settles at 1 where `a` is positive.
+const GROWTH: &str = r#"
+    [study]
+    name = "growth"
+    [models.m.equations]
+    states     = { y = "1" }
+    parameters = { a = "1/s" }
+    der        = { y = "a*y" }
+    start      = { y = 0.5 }
+    horizon    = "HORIZON"
+    [tuners]
+    a = { start = 0.4, min = 0.1, max = 2.0 }
+    [criteria]
+"#;
+
+fn write(folder: &Path, text: &str) -> String {
+    let path = folder.join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn run(text: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let study = write(folder.path(), text);
+    let out = folder.path().join("out");
+    let arguments = ["run", &study, "--json", "--max-evaluations", "300", "--out", out.to_str().unwrap()];
+    let output = cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// What `check` says of a study that it refuses.
+fn refusal(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let output = cargo_bin_cmd!("mops").args(["check", &write(folder.path(), text)]).output().unwrap();
+    assert!(!output.status.success(), "{text}");
+    // Lines are broken where the terminal ends.
+    String::from_utf8(output.stderr).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn a_demand_on_a_kind_of_which_more_is_better_means_at_least() {
+    // Kind, demand, the same in the unit of the value.
+    for (kind, demand, least) in [
+        ("phase-margin", "45 deg", std::f64::consts::FRAC_PI_4),
+        ("phase-margin", "70 deg", 70_f64.to_radians()),
+        ("delay-margin", "0.5 s", 0.5),
+        ("bandwidth = { of = 'closed-loop' }", "0.5 Hz", std::f64::consts::PI),
+        ("damping-ratio = { of = 'closed-loop' }", "0.6", 0.6),
+    ] {
+        let kind = if kind.contains('=') { kind.to_owned() } else { format!("{kind} = {{}}") };
+        for usage in ["minimise", "inequality"] {
+            // Beside a constraint something else is minimised.
+            let other = if usage == "inequality" { "s = { maximum-sensitivity = {}, demand = 2 }" } else { "" };
+            let result = run(&format!("{LOOP} c = {{ {kind}, demand = '{demand}', usage = '{usage}' }}\n{other}"));
+            let c = &result["criteria"][0];
+            assert!(number(&c["value"]) >= least * (1.0 - 1e-6) && c["met"] == true, "{kind} {demand} {usage}: {c}");
+            let scaled = 1.0 + (least - number(&c["value"])) / least;
+            assert!((number(&c["scaled"]) - scaled).abs() < 1e-9, "{c}");
+        }
+    }
+}
+
+#[test]
+fn a_margin_below_its_demand_is_missed() {
+    // k is held at 5: phase margin 25.2 deg.
+    let text = LOOP.replace("start = 1.0, min = 0.05", "start = 5.0, min = 4.999");
+    let result = run(&format!("{text} pm = {{ phase-margin = {{}}, demand = '60 deg' }}"));
+    let pm = &result["criteria"][0];
+    assert!(number(&pm["scaled"]) > 1.0 && pm["met"] == false, "{pm}");
+}
+
+#[test]
+fn demands_against_the_sense_or_out_of_range_are_refused_with_the_right_lines() {
+    let swapped = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, good = '45 deg', bad = '90 deg' }}"));
+    assert!(swapped.contains("more is better here"), "{swapped}");
+    for kind in ["gain-margin", "delay-margin", "bandwidth", "damping-ratio"] {
+        let swapped = refusal(&format!("{LOOP} c = {{ {kind} = {{}}, good = 0.2, bad = 0.4 }}"));
+        assert!(swapped.contains("good = \"0.4") && swapped.contains("bad = \"0.2"), "{kind}: {swapped}");
+    }
+    let less = refusal(&format!("{LOOP} s = {{ maximum-sensitivity = {{}}, good = 2, bad = 1.2 }}"));
+    assert!(less.contains("less is better here"), "{less}");
+    for (key, text) in [("bad", "good = 1.5, bad = -4"), ("good", "good = 90, bad = 0.7"), ("demand", "demand = 45")] {
+        let beyond = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, {text} }}"));
+        assert!(beyond.contains("is outside of the range") && beyond.contains(key), "{beyond}");
+    }
+    let degrees = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, demand = 45 }}"));
+    assert!(degrees.contains("demand = \"45 deg\""), "{degrees}");
+    let target = refusal(&format!("{LOOP} wc = {{ crossover-frequency = {{}}, demand = 2 }}"));
+    assert!(target.contains("usage = \"equality\""), "{target}");
+    let nothing = refusal(&format!("{LOOP} gm = {{ gain-margin = {{}}, demand = 0 }}"));
+    assert!(nothing.contains("other than 0"), "{nothing}");
+}
+
+#[test]
+fn a_target_is_met_as_an_equality() {
+    let result = run(&format!(
+        "{LOOP} wc = {{ crossover-frequency = {{}}, demand = '2 rad/s', usage = 'equality' }}\n\
+         s = {{ maximum-sensitivity = {{}}, demand = 2 }}"
+    ));
+    let wc = &result["criteria"][0];
+    assert!((number(&wc["value"]) - 2.0).abs() < 1e-4 && wc["met"] == true, "{wc}");
+}
+
+#[test]
+fn what_is_never_reached_meets_no_demand_whatever_the_horizon() {
+    for horizon in [0.5_f64, 2.0, 5.0] {
+        for demand in [1.0, 5.0, 50.0] {
+            for (kind, usage) in
+                [("settling-time", "minimise"), ("rise-time", "inequality"), ("delay-time", "minimise")]
+            {
+                let text = GROWTH.replace("HORIZON", &format!("{horizon} s"));
+                // Towards -1 from 0: the response goes the other way.
+                let options = "{ signal = 'y', target = -1, from = 0 }";
+                let result = run(&format!(
+                    "{text} c = {{ {kind} = {options}, demand = '{demand} s', usage = '{usage}' }}\n\
+                     d = {{ peak = {{ signal = 'y' }}, demand = 1 }}"
+                ));
+                let c = &result["criteria"][0];
+                assert!(c["value"].is_null() && c["met"] == false, "{horizon} {demand} {kind}: {c}");
+                assert!(number(&c["scaled"]) > (horizon / demand).max(1.0), "{horizon} {demand} {kind}: {c}");
+                assert!(usage != "inequality" || result["feasible"] == false, "{result}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_solver_leads_a_response_to_where_it_settles() {
+    // A lag that must be fast enough to be within 2 % after 5 s; at the start it is far from that.
+    let result = run("[study]\nname = 'lag'\n[models.m.equations]\nstates = { y = '1' }\nparameters = { a = '1/s' }\n\
+         der = { y = 'a*(1 - y)' }\nhorizon = '5 s'\n[tuners]\na = { start = 0.01, min = 0.001, max = 10, scale = 'log' }\n\
+         [criteria]\ns = { settling-time = { signal = 'y', target = 1 }, demand = '2 s' }\n\
+         e = { maximum-rate = { signal = 'y' }, usage = 'inequality', demand = '3 1/s' }");
+    let s = &result["criteria"][0];
+    assert!((number(&s["value"]) - 50_f64.ln() / 3.0).abs() < 1e-3 && s["met"] == true, "{s}");
+}

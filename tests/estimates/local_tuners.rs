@@ -1,0 +1,77 @@
+//! Tuners that are local to a selection or validation experiment are estimated there.
+
+use mops::{CriterionDraft, Outcome, Role, TunerDraft, Usage};
+
+use super::models::{Calibration, Channel, Curve, fit, normalised};
+
+/// `y = exp(-k t) + 0.3 exp(-s t)`; `k` is 0.5 in the calibration record `a`, 1.5 in `b`.
+fn records(role: Role, start: f64, criterion: fn(&str) -> CriterionDraft) -> Calibration {
+    let of = |name, truth| Channel::new(name, "y", 41, 4.0, truth, 0.01).declared();
+    let b = of("b", |t| (-1.5 * t).exp() + 0.3 * (-0.2 * t).exp());
+    Calibration {
+        model: Box::new(|| Curve::new(&["k", "s"], |p, t| (-p[0] * t).exp() + 0.3 * (-p[1] * t).exp()).into()),
+        tuners: vec![
+            ("k", TunerDraft { per_case: true, ..TunerDraft::new(start, 0.1, 10.0).log() }),
+            ("s", TunerDraft::new(0.5, 0.01, 10.0).log()),
+        ],
+        channels: vec![of("a", |t| (-0.5 * t).exp() + 0.3 * (-0.2 * t).exp()), Channel { role, ..b }],
+        criteria: Box::new(move || vec![("y", criterion("y"))]),
+        uncertainty: None,
+    }
+}
+
+fn tuner(outcome: &Outcome, name: &str) -> f64 {
+    outcome.tuners.iter().find(|tuner| tuner.name == name).unwrap().value
+}
+
+fn error(outcome: &Outcome, experiment: &str) -> f64 {
+    let experiments = &outcome.calibration.as_ref().unwrap().experiments;
+    experiments.iter().find(|e| e.name == experiment).unwrap().channels[0].rmse
+}
+
+#[test]
+fn a_local_tuner_is_estimated_from_its_own_record_wherever_the_search_starts() {
+    for criterion in [normalised, fit] {
+        for role in [Role::Validation, Role::Selection] {
+            let found: Vec<[f64; 2]> = [0.11, 0.7, 1.0, 5.0, 9.9]
+                .map(|start| {
+                    let outcome = records(role, start, criterion).run(0);
+                    [tuner(&outcome, "b/k"), error(&outcome, "b")]
+                })
+                .into();
+            for [k, error] in &found {
+                // Five standard errors, and the noise to what 41 samples tell of it.
+                assert!((k - 1.5).abs() < 0.1 && (error / 0.01 - 1.0).abs() < 0.4, "{role:?}: {found:?}");
+                assert!((k - found[0][0]).abs() < 1e-4 && (error - found[0][1]).abs() < 1e-6, "{role:?}: {found:?}");
+            }
+        }
+    }
+}
+
+/// What is local to a validation record moves nothing else.
+#[test]
+fn calibrated_tuners_do_not_depend_on_validation_records() {
+    let alone = {
+        let mut alone = records(Role::Validation, 1.0, normalised);
+        alone.channels.pop();
+        alone.run(0)
+    };
+    let both = records(Role::Validation, 1.0, normalised).run(0);
+    for name in ["a/k", "s"] {
+        assert_eq!(tuner(&alone, name), tuner(&both, name));
+    }
+}
+
+#[test]
+fn a_local_tuner_that_no_criterion_shows_leaves_no_validation_error() {
+    let outcome = records(Role::Validation, 1.0, normalised).run(0);
+    assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
+    let of =
+        |case: &str, usage: Usage| CriterionDraft { cases: Some(vec![case.into()]), ..normalised("y").used_as(usage) };
+    let mut calibration = records(Role::Validation, 1.0, normalised);
+    calibration.criteria = Box::new(move || vec![("a", of("a", Usage::Minimise)), ("b", of("b", Usage::Monitor))]);
+    let outcome = calibration.run(0);
+    assert!(error(&outcome, "b").is_nan() && error(&outcome, "a").is_finite());
+    let warned = outcome.warnings.iter().any(|w| w.contains("no criterion of `b` can tell `b/k`"));
+    assert!(warned, "{:?}", outcome.warnings);
+}
