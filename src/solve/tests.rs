@@ -95,26 +95,28 @@ fn what_is_cut_off_is_no_evaluation_no_failure_and_kept_nowhere() {
     let catalogue = crate::catalogue();
     for kind in ["genetic", "sqp", "pattern-search", "cma-es", "nelder-mead"] {
         let solver = catalogue.solvers.iter().find(|solver| solver.name == kind).unwrap().default_choice();
-        for (last, cases) in [(0, 1), (1, 1), (2, 1), (7, 1), (30, 1), (0, 3), (1, 3), (8, 3), (31, 3)] {
-            let (study, cancellation) = study(last, cases);
-            let told = Arc::new(Told::default());
-            let store: Arc<dyn Store> = Arc::<Told>::clone(&told) as Arc<dyn Store>;
-            let keeping = Some(Keeping { study: study.clone(), store, begin: None });
-            let options = Options { solver: solver.clone(), keeping, cancellation, ..Options::default() };
-            let solved = solve(study, &options, &()).unwrap();
-            let outcome = &solved.outcome;
-            let (evaluations, what) = (outcome.evaluations, format!("{kind}, {last} of {cases}"));
-            // A start that was cut off is simulated once more, to have something to report.
-            assert!(
-                outcome.stop == Stop::Budget && evaluations >= 1 && evaluations * cases <= last.max(cases),
-                "{what}"
-            );
-            assert!(outcome.failures.is_empty() && solved.best.scaled.is_some(), "{what}: {:?}", outcome.failures);
-            assert!(solved.archive.iter().all(|record| record.merit.objective.is_finite()), "{what}");
-            let told = told.0.lock().unwrap();
-            assert!(told.iter().all(|(_, known)| known.jobs.iter().all(|(_, values)| values.is_ok())), "{what}");
-            let points: HashSet<&Vec<u64>> = told.iter().map(|(tuners, _)| tuners).collect();
-            assert_eq!(points.len(), evaluations, "{what}");
+        for cases in [1, 3] {
+            let options = Options { solver: solver.clone(), max_evaluations: 40, ..Options::default() };
+            let whole = solve(study(usize::MAX, cases).0, &options, &()).unwrap().outcome.evaluations;
+            // Each point takes a simulation of every case at least, so that the request comes while it searches.
+            for last in [0, 1, 2, whole * cases / 3, whole * cases / 2, whole * cases - 1] {
+                let (study, cancellation) = study(last, cases);
+                let told = Arc::new(Told::default());
+                let store: Arc<dyn Store> = Arc::<Told>::clone(&told) as Arc<dyn Store>;
+                let keeping = Some(Keeping { study: study.clone(), store, begin: None });
+                let solved = solve(study, &Options { keeping, cancellation, ..options.clone() }, &()).unwrap();
+                let outcome = &solved.outcome;
+                let what = format!("{kind}, {last} of {cases}: {:?} after {}", outcome.stop, outcome.evaluations);
+                // A start that was cut off is simulated once more, to have something to report.
+                let most = last.max(cases) / cases;
+                assert!(outcome.stop == Stop::Budget && (1..=most).contains(&outcome.evaluations), "{what}");
+                assert!(outcome.failures.is_empty() && solved.best.scaled.is_some(), "{what}: {:?}", outcome.failures);
+                assert!(solved.archive.iter().all(|record| record.merit.objective.is_finite()), "{what}");
+                let told = told.0.lock().unwrap();
+                assert!(told.iter().all(|(_, known)| known.jobs.iter().all(|(_, values)| values.is_ok())), "{what}");
+                let points: HashSet<&Vec<u64>> = told.iter().map(|(tuners, _)| tuners).collect();
+                assert_eq!(points.len(), outcome.evaluations, "{what}");
+            }
         }
     }
 }
