@@ -4,6 +4,7 @@
 //! Input `i` follows from `i` alone, so that a failure can be looked at again.
 
 use std::io;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -182,6 +183,83 @@ fn damaged(text: &str, other: &str, random: &mut SmallRng) -> String {
     text.into_iter().collect()
 }
 
+/// Values that a key may have: right TOML, and mostly wrong there.
+const VALUES: [&str; 40] = [
+    "0",
+    "-1",
+    "1",
+    "-0.0",
+    "1e-320",
+    "1e308",
+    "-1e308",
+    "nan",
+    "inf",
+    "-inf",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "4294967296",
+    "true",
+    "[]",
+    "{}",
+    "[[]]",
+    "[0, 0]",
+    "[1e308, -1e308]",
+    "[\"x\", \"x\"]",
+    "{ x = 1 }",
+    "1979-05-27",
+    "\"\"",
+    "\" \"",
+    "\"x\"",
+    "\"T[i]\"",
+    "\"T[1..3]\"",
+    "\"T[1..1000000000000]\"",
+    "\"T[9223372036854775807]\"",
+    "\"1e400 s\"",
+    "\"-1 s\"",
+    "\"1e-320 s\"",
+    "\"1 m^999999999999\"",
+    "\"1 (((kg\"",
+    "\"300 %\"",
+    "\"1/0\"",
+    "\"0/0\"",
+    "\"der(x) = x'\"",
+    "\"sensor:x\"",
+    "\"../../x.csv\"",
+];
+
+/// A study in which some values are others.
+fn revalued(text: &str, other: &str, random: &mut SmallRng) -> String {
+    let mut text = text.to_owned();
+    for _ in 0..random.random_range(1..4) {
+        let Some(place) = values(&text).choose(random).cloned() else { return text };
+        let value = match values(other).choose(random) {
+            Some(value) if random.random_ratio(1, 4) => other[value.clone()].to_owned(),
+            _ => (*VALUES.choose(random).unwrap()).to_owned(),
+        };
+        text.replace_range(place, &value);
+    }
+    text
+}
+
+/// Where texts and numbers are that may be values.
+fn values(text: &str) -> Vec<Range<usize>> {
+    let (bytes, mut places, mut at) = (text.as_bytes(), Vec::new(), 0);
+    while at < bytes.len() {
+        let is_end = |byte: &u8| !byte.is_ascii_alphanumeric() && !b"+-._".contains(byte);
+        let length = match bytes[at] {
+            b'"' => text[at + 1..].find('"').map_or(1, |end| end + 2),
+            b'0'..=b'9' | b'-' => bytes[at..].iter().position(is_end).unwrap_or(bytes.len() - at).max(1),
+            byte => {
+                at += if is_end(&byte) { 1 } else { bytes[at..].iter().position(is_end).unwrap_or(1) };
+                continue;
+            }
+        };
+        places.push(at..at + length);
+        at += length;
+    }
+    places
+}
+
 /// An expression by its grammar, of this many levels.
 fn grown(levels: u32, random: &mut SmallRng) -> String {
     if levels == 0 || random.random_ratio(1, 6) {
@@ -234,7 +312,7 @@ fn an_expression(corpus: &Corpus, random: &mut SmallRng) {
 
 fn a_study(corpus: &Corpus, random: &mut SmallRng) {
     let [one, other] = [0; 2].map(|_| corpus.studies.choose(random).unwrap());
-    let text = damaged(one, other, random);
+    let text = if random.random_ratio(1, 2) { revalued(one, other, random) } else { damaged(one, other, random) };
     let settings: Vec<String> = match random.random_ratio(1, 4) {
         true => vec![damaged("tuners.k.start=5", "criteria={}", random)],
         false => Vec::new(),

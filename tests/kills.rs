@@ -106,6 +106,10 @@ fn killed(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path), some: usize)
                 wrong.push(format!("{call} {k}: {look} {:?}", looked.status));
             }
         }
+        // A result is that of the run before, or whole.
+        if out.join("result.json").exists() && result(&out).is_none() {
+            wrong.push(format!("{call} {k}: the result is damaged"));
+        }
         let mut again = mops(&STUDY, &out).arg("--resume").output().unwrap();
         let said = String::from_utf8_lossy(&again.stderr).into_owned();
         // Killed before it touched the run that was there, it has not begun.
