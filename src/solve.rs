@@ -257,3 +257,6 @@ fn pareto(run: &Run<'_>, stop: Stop, (store, watch): (Option<&dyn Store>, &dyn W
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

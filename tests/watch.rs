@@ -161,6 +161,29 @@ fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
 }
 
 #[test]
+fn connections_that_say_nothing_keep_no_viewer_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = watched(&folder.path().join("out"), &LONG);
+    let host = format!("127.0.0.1:{}", run.port);
+    // Many more than there are places, all open at once; some have begun to say something.
+    let silent: Vec<TcpStream> = (0..200)
+        .map(|i| {
+            let mut stream = run.connect();
+            if i % 2 == 0 {
+                stream.write_all(b"GET /").unwrap();
+            }
+            stream
+        })
+        .collect();
+    for _ in 0..3 {
+        let page = run.get(&format!("/{}/", run.token), &host);
+        assert!(page.starts_with("HTTP/1.1 200 OK"), "{page}");
+    }
+    assert_eq!(run.first_state()["study"], "pid-design");
+    drop(silent);
+}
+
+#[test]
 fn a_browser_sees_values_move_while_the_run_goes_and_that_it_is_over() {
     let Some(browser) = headless::browser() else {
         eprintln!("{}", headless::SKIPPED);

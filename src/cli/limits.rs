@@ -12,8 +12,9 @@ use super::terminal::say;
 /// How long something may take.
 #[derive(Args, Clone, Copy)]
 pub(super) struct Limit {
-    /// End after this time with the best so far, as after the budget: a number of seconds, or "10 min". A simulation that is
-    /// cut off does not count; with more time `--resume` continues the run.
+    /// End after this time with what is known by then, as after a spent budget: a number of seconds, or "10 min".
+    ///
+    /// A simulation that is cut off does not count. `mops run --resume` continues the run.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time_limit: Option<Duration>,
 }
@@ -38,15 +39,25 @@ pub(super) fn listen(limit: Limit, heard: &'static str) -> Cancellation {
         let insists = of_signals.clone();
         let _ = thread::Builder::new().spawn(move || insist(&insists, begun.elapsed()));
     });
-    if let Some(limit) = limit.time_limit {
-        let of_clock = cancellation.clone();
-        let _ = thread::Builder::new().spawn(move || {
-            thread::sleep(limit);
-            of_clock.request(Halt::Budget);
-            insist(&of_clock, limit);
-        });
-    }
+    wait(limit, &cancellation);
     cancellation
+}
+
+/// Waits for the limit alone: a signal ends the program as usual.
+pub(super) fn within(limit: Limit) -> Cancellation {
+    let cancellation = Cancellation::default();
+    wait(limit, &cancellation);
+    cancellation
+}
+
+fn wait(limit: Limit, cancellation: &Cancellation) {
+    let Some(limit) = limit.time_limit else { return };
+    let of_clock = cancellation.clone();
+    let _ = thread::Builder::new().spawn(move || {
+        thread::sleep(limit);
+        of_clock.request(Halt::Budget);
+        insist(&of_clock, limit);
+    });
 }
 
 /// Lets a run of this age conclude, and then ends that too.

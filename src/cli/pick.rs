@@ -12,6 +12,7 @@ use mops_core::{
 };
 use serde_json::Value;
 
+use super::limits::{Limit, within};
 use super::study::{StudyArguments, open_as};
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, print};
@@ -35,6 +36,8 @@ pub(super) struct Arguments {
     /// Another demand on a criterion, in its unit or with one: settling=12, settling='12 s'.
     #[arg(long = "demand", value_name = "CRITERION=VALUE", required = true, value_parser = demand)]
     demands: Vec<(String, String)>,
+    #[command(flatten)]
+    limit: Limit,
     /// Stay at the point of the front instead of solving from there.
     #[arg(long)]
     no_refine: bool,
@@ -72,7 +75,8 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
         known(&before, name)?;
     }
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
-    let file = open(arguments.demands.iter().map(setting).collect())?;
+    let mut file = open(arguments.demands.iter().map(setting).collect())?;
+    file.study.cancelled_by(&within(arguments.limit));
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
     let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
@@ -150,6 +154,10 @@ fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, E
                 .with_help("name the study of the front with --study")
         })?;
         let at = problem.evaluate_at(&values);
+        if at.is_cancelled() {
+            return Err(Diagnostic::new("the time limit came before the points of the front were evaluated")
+                .with_help("give it more time with --time-limit"));
+        }
         if best.as_ref().is_none_or(|(_, best)| at.merit.is_better_than(&best.merit)) {
             best = Some((i, at));
         }
@@ -165,7 +173,7 @@ fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> Optio
     let mut run = Run::new(problem, Budget { evaluations: EFFORT }, &());
     run.solve(solver.as_mut(), &from.point);
     let best = run.best()?;
-    best.merit.is_better_than(&from.merit).then(|| problem.evaluate_at(&best.tuners))
+    best.merit.is_better_than(&from.merit).then(|| problem.concluding().evaluate_at(&best.tuners))
 }
 
 /// The point beside what it was refined to.

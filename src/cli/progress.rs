@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -83,6 +84,11 @@ impl Progress {
     #[must_use]
     pub fn with_criteria_of(self, study: &Study) -> Self {
         Self { study: Some(study.clone()), ..self }
+    }
+
+    /// Exit status of a benchmark that is over.
+    pub fn status(&self) -> ExitCode {
+        if self.wants_stop() { ExitCode::from(4) } else { ExitCode::SUCCESS }
     }
 
     /// Takes the bar away.

@@ -1,20 +1,119 @@
-//! What is left in the folder beside result and report: predictions, the repaired study and its source by a diagnosis, the
-//! study by a front.
+//! What a run leaves in its folder: result, evaluations, report and plots; predictions, the repaired study and its source by a
+//! diagnosis, the study by a front.
 
 use std::fs;
+use std::io::{self, ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use mops_core::Shipped;
+use mops_core::{Effect, MonteCarloReport, Shipped, Task};
 use mops_discrepancy::Diagnosis;
 
 use super::study::Home;
 use super::{Trouble, cannot_write};
 use crate::diagnosis::{Original, predictions, repaired, source};
-use crate::files;
+use crate::files::{self, Beside};
+use crate::report::Report;
+use crate::solve::Solved;
 use crate::toml_text::settled;
 
+/// How long a full disk is waited for.
+pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What a run leaves in its folder.
+pub(super) struct Remains<'a> {
+    pub folder: &'a Path,
+    pub solved: &'a Solved,
+    /// The text of the study with all settings, and without any.
+    pub text: &'a str,
+    pub plain: &'a str,
+    /// Settings of the command line, and with them those that the command itself makes.
+    pub own: &'a [String],
+    pub settings: &'a [String],
+    pub home: &'a Home,
+    pub effects: &'a [Arc<dyn Effect>],
+    /// Whether the repaired model is written as source too.
+    pub export: bool,
+}
+
+impl Remains<'_> {
+    /// Writes result.json; what was there before stays until all of it is on the disk. A full disk is waited for as long as
+    /// `patience` says.
+    pub(super) fn write_result(&self, patience: Duration) -> Result<(), Trouble> {
+        fs::create_dir_all(self.folder).map_err(cannot_write(self.folder))?;
+        let path = self.folder.join("result.json");
+        let json = serde_json::to_string_pretty(&self.solved.outcome).expect("a result is JSON") + "\n";
+        let until = Instant::now() + patience;
+        let is_full = |error: &io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
+        loop {
+            let written = Beside::create(&path).and_then(|mut file| {
+                file.write_all(json.as_bytes())?;
+                file.settle_on_disk()
+            });
+            match written {
+                Err(error) if is_full(&error) && Instant::now() < until => thread::sleep(Duration::from_millis(100)),
+                written => return written.map_err(cannot_write(&path)),
+            }
+        }
+    }
+
+    /// Writes what stands beside the result: evaluations, samples, report and plots, and what the task adds.
+    pub(super) fn write_others(&self) -> Result<(), Trouble> {
+        let (folder, solved) = (self.folder, self.solved);
+        let evaluations = folder.join("evaluations.csv");
+        write_evaluations(&evaluations, solved).map_err(cannot_write(&evaluations))?;
+        if let Some(found) = &solved.outcome.found.monte_carlo {
+            let samples = folder.join("samples.csv");
+            write_samples(&samples, found).map_err(cannot_write(&samples))?;
+        }
+        let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
+        Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text: self.text }
+            .write(folder)
+            .map_err(cannot_write(folder))?;
+        if let Some(diagnosis) = diagnosis {
+            let (text, settings, study) = (self.plain, self.own, problem.study());
+            let original = Original { text, settings, study, effects: self.effects };
+            leave(folder, diagnosis, &original, self.home, self.export)?;
+        }
+        if outcome.task == Task::Pareto {
+            leave_study(folder, self.plain, self.settings, self.home)?;
+        }
+        Ok(())
+    }
+}
+
+/// One line per sample: uncertain parameters, criteria.
+fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
+    files::write_csv(path, |writer| {
+        let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
+        let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
+        writer.write_record(parameters.chain(criteria))?;
+        for (parameters, values) in &found.table {
+            writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
+        }
+        Ok(())
+    })
+}
+
+/// One line per point: tuners, criteria, objective, violation.
+fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
+    let study = solved.problem.study();
+    files::write_csv(path, |writer| {
+        let tuners = study.tuners.iter().map(|t| format!("{}[{}]", t.name, t.unit));
+        let rows = study.rows.iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
+        writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
+        for record in &solved.archive {
+            let merit = [&record.merit.objective, &record.merit.violation];
+            writer.write_record(record.tuners.iter().chain(&record.values).chain(merit).map(f64::to_string))?;
+        }
+        Ok(())
+    })
+}
+
 /// Writes `predictions/<experiment>.csv`, and where something was found `repaired.toml` and, where asked for, `repaired.rs`.
-pub(super) fn leave(
+fn leave(
     folder: &Path,
     diagnosis: &Diagnosis,
     original: &Original<'_>,
@@ -44,7 +143,7 @@ pub(super) fn leave(
 }
 
 /// Writes `study.toml`: the study of a front, with its settings, so that a point can be picked from it later.
-pub(super) fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), Trouble> {
+fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), Trouble> {
     let text = match home {
         Home::File(study) => settled(text, settings, &|path| seen_from(folder, study, path)),
         Home::Shipped(shipped) => {

@@ -1,25 +1,21 @@
 //! `mops run`: solves a study and leaves the result behind.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Halt, Mistake, MonteCarloReport, Stop, Study, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Halt, Mistake, Stop, Study, Task, Watch, suggestion};
 
 use super::limits::{Limit, listen};
 use super::progress::Progress;
-use super::remains::{leave, leave_study};
-use super::study::{Home, StudyArguments, home, open_as, without_settings};
+use super::remains::{PATIENCE, Remains};
+use super::study::{StudyArguments, home, open_as, without_settings};
 use super::terminal::{print_json, say};
-use super::{Trouble, cannot_write, diagnosis, findings, keep, print, tables};
-use crate::diagnosis::Original;
-use crate::files::{self, Beside};
-use crate::report::{Report, file_name};
-use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solves};
+use super::{Trouble, diagnosis, findings, keep, print, tables};
+use crate::report::file_name;
+use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
 use crate::watch::{Both, Page};
 
@@ -164,6 +160,8 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         keeping: None,
         cancellation: listen(arguments.limit, "interrupted: saving the best point; press Ctrl-C again to quit now"),
     };
+    // Before anything of an earlier run is touched.
+    suits(&file.study, &options.solver).map_err(|why| refused(&why.0, &file, options.solver.kind))?;
     let talks = !arguments.quiet && !arguments.json;
     // N.B.: the name of a study is no path, wherever the study comes from.
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(&file.study.name)));
@@ -199,21 +197,33 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
             return Err(refused(&why.0, &file, options.solver.kind).into());
         }
     };
-    let outcome = &mut solved.outcome;
-    outcome.run = Some(id);
+    solved.outcome.run = Some(id);
+    let ended_early = options.cancellation.requested();
     if let (Stop::Budget, Some(limit), Some(Halt::Budget)) =
-        (outcome.stop, arguments.limit.time_limit, options.cancellation.requested())
+        (solved.outcome.stop, arguments.limit.time_limit, ended_early)
     {
-        let seconds = limit.as_secs_f64();
-        outcome.warnings.push(format!("the time limit of {seconds} s ended it; --resume continues it where it was"));
+        let way_out = if keep::keeps(&file.study) { "; --resume continues it where it was" } else { "" };
+        let warning = format!("the time limit of {} s ended the run{way_out}", limit.as_secs_f64());
+        solved.outcome.warnings.push(warning);
     }
     let told = keep::told(&start, known, &opened);
+    let remains = Remains {
+        folder: &folder,
+        solved: &solved,
+        text: &file.source.text,
+        plain: without_settings(&file.source.text, &settings),
+        own: &arguments.study.settings,
+        settings: &settings,
+        home: &home,
+        effects: &catalogue.effects,
+        export: arguments.export.is_some(),
+    };
 
     // What was found is shown whatever becomes of the files.
     let held = opened.hold();
     let result = match &held {
         // A full disk was waited for already, where evaluations had to go.
-        Ok(_) => write_result(&folder, &solved, if opened.is_whole() { PATIENCE } else { Duration::ZERO }),
+        Ok(_) => remains.write_result(if opened.is_whole() { PATIENCE } else { Duration::ZERO }),
         Err(why) => Err(Trouble::Failure(why.clone())),
     };
     if arguments.json {
@@ -224,10 +234,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     if let Ok(Some(note)) = &held {
         say(&format!("warning: {note}"));
     }
-    let plain = without_settings(&file.source.text, &settings);
-    let original = (plain, arguments.study.settings.as_slice(), settings.as_slice());
-    let written = result
-        .and_then(|()| leave_all(&folder, &solved, (&file, original), (&home, catalogue), arguments.export.is_some()));
+    let written = result.and_then(|()| remains.write_others());
     if let Some(page) = page {
         page.finish(&folder);
     }
@@ -239,14 +246,18 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     }
     written?;
     said.0?;
+    status(&solved, &folder, ended_early.is_some())
+}
+
+/// The exit status of a run whose result is written.
+fn status(solved: &Solved, folder: &Path, ended_early: bool) -> Result<ExitCode, Trouble> {
     if solved.outcome.stop == Stop::Interrupted {
         return Ok(ExitCode::from(4));
     }
     if solved.best.scaled.is_none() {
         let failed = solved.best.failures.first().map(|(_, failure)| format!(": {failure}"));
-        let early = || if options.cancellation.requested().is_some() { " in time" } else { "" }.to_owned();
-        let why = failed.unwrap_or_else(early);
-        let folder = folder.display();
+        let early = || if ended_early { " in time" } else { "" }.to_owned();
+        let (why, folder) = (failed.unwrap_or_else(early), folder.display());
         return Err(Trouble::Failure(format!("no point could be simulated{why}; the result is in {folder}")));
     }
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
@@ -274,7 +285,9 @@ fn shown(solved: &Solved) -> String {
     let tables = match &solved.diagnosis {
         Some(found) => diagnosis::text(found, solved.outcome.seconds),
         // Without a verdict, or of inputs alone, there are no criteria to show.
-        None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => String::new(),
+        None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => {
+            solved.outcome.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect()
+        }
         None => tables::outcome(&solved.outcome),
     };
     tables + &findings::text(&solved.outcome)
@@ -316,87 +329,4 @@ fn introduction(study: &Study, options: &Options) -> String {
         study.cases.len(),
         if solves(study) { options.solver.kind } else { "none (nothing is solved)" }
     )
-}
-
-/// How long a full disk is waited for.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Writes result.json; what was there before stays until all of it is on the disk.
-fn write_result(folder: &Path, solved: &Solved, patience: Duration) -> Result<(), Trouble> {
-    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-    let path = folder.join("result.json");
-    let json = serde_json::to_string_pretty(&solved.outcome).expect("a result is JSON") + "\n";
-    let until = Instant::now() + patience;
-    loop {
-        let written = Beside::create(&path).and_then(|mut file| {
-            std::io::Write::write_all(&mut file, json.as_bytes())?;
-            file.settle_on_disk()
-        });
-        match written {
-            Err(error)
-                if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
-                    && Instant::now() < until =>
-            {
-                thread::sleep(Duration::from_millis(100));
-            }
-            written => return written.map_err(cannot_write(&path)),
-        }
-    }
-}
-
-/// Writes what a run leaves beside its result: evaluations, samples, report and plots, and what its task adds. `original` is the
-/// text of the study without settings, then the settings of the user and all of them.
-fn leave_all(
-    folder: &Path,
-    solved: &Solved,
-    (file, (plain, own, settings)): (&StudyFile, (&str, &[String], &[String])),
-    (home, catalogue): (&Home, &Catalogue),
-    export: bool,
-) -> Result<(), Trouble> {
-    let evaluations = folder.join("evaluations.csv");
-    write_evaluations(&evaluations, solved).map_err(cannot_write(&evaluations))?;
-    if let Some(found) = &solved.outcome.found.monte_carlo {
-        let samples = folder.join("samples.csv");
-        write_samples(&samples, found).map_err(cannot_write(&samples))?;
-    }
-    let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
-    Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text: &file.source.text }
-        .write(folder)
-        .map_err(cannot_write(folder))?;
-    if let Some(diagnosis) = diagnosis {
-        let original = Original { text: plain, settings: own, study: problem.study(), effects: &catalogue.effects };
-        leave(folder, diagnosis, &original, home, export)?;
-    }
-    if outcome.task == Task::Pareto {
-        leave_study(folder, plain, settings, home)?;
-    }
-    Ok(())
-}
-
-/// One line per sample: uncertain parameters, criteria.
-fn write_samples(path: &Path, found: &MonteCarloReport) -> std::io::Result<()> {
-    files::write_csv(path, |writer| {
-        let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
-        let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
-        writer.write_record(parameters.chain(criteria))?;
-        for (parameters, values) in &found.table {
-            writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
-        }
-        Ok(())
-    })
-}
-
-/// One line per point: tuners, criteria, objective, violation.
-fn write_evaluations(path: &Path, solved: &Solved) -> std::io::Result<()> {
-    let study = solved.problem.study();
-    files::write_csv(path, |writer| {
-        let tuners = study.tuners.iter().map(|t| format!("{}[{}]", t.name, t.unit));
-        let rows = study.rows.iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
-        writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
-        for record in &solved.archive {
-            let merit = [&record.merit.objective, &record.merit.violation];
-            writer.write_record(record.tuners.iter().chain(&record.values).chain(merit).map(f64::to_string))?;
-        }
-        Ok(())
-    })
 }

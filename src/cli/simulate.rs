@@ -8,6 +8,7 @@ use clap::Args;
 use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, suggestion};
 
 use super::families::{folded, runs, spelled};
+use super::limits::{Limit, within};
 use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
 use super::{Trouble, cannot_write, print};
@@ -28,13 +29,16 @@ pub(super) struct Arguments {
     /// Number of evenly spaced times in the CSV file.
     #[arg(long, default_value_t = 1001, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     samples: u32,
+    #[command(flatten)]
+    limit: Limit,
     /// Folder for CSV files and plots; nothing is written where absent.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
-    let study = open(catalogue, &arguments.study)?.study;
+    let mut study = open(catalogue, &arguments.study)?.study;
+    study.cancelled_by(&within(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
     if let Some(case) = &arguments.case {
         let names = study.cases.iter().map(|c| c.name.as_str());

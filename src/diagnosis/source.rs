@@ -239,6 +239,73 @@ mod tests {
         assert_eq!(std::fs::read_to_string(path).unwrap(), program);
     }
 
+    /// The program without what stands in literals: raw ones, and those with escapes.
+    fn without_literals(program: &str) -> String {
+        let (mut rest, mut code) = (program, String::new());
+        while let Some(start) = rest.find('"') {
+            let hashes = rest[..start].chars().rev().take_while(|c| *c == '#').count();
+            let is_raw = rest[..start - hashes].ends_with('r');
+            code.push_str(&rest[..start]);
+            rest = &rest[start + 1..];
+            let end = if is_raw { "\"".to_owned() + &"#".repeat(hashes) } else { "\"".to_owned() };
+            let mut at = 0;
+            let close = loop {
+                let found = at + rest[at..].find(&end).expect("literals end");
+                let slashes = rest[..found].chars().rev().take_while(|c| *c == '\\').count();
+                if is_raw || slashes % 2 == 0 {
+                    break found;
+                }
+                at = found + 1;
+            };
+            rest = &rest[close + end.len()..];
+        }
+        code + rest
+    }
+
+    #[test]
+    fn no_name_of_a_study_becomes_code() {
+        let names = [
+            "a`.\nfn evil() {}\n/// `",
+            "a\r\nfn evil() {}\r\n",
+            "a\rfn evil() {}\r//",
+            "\"#; fn evil() {} const A: &str = r#\"",
+            "\"##;\nfn evil() {}\nr##\"",
+            "*/ fn evil() {} /*",
+            "\\\"); fn evil() {} (\"",
+            "a\u{85}fn evil() {}\u{2028}fn evil() {}",
+            "\u{202e}fn evil() {}\u{2066}",
+            "{fn evil() {}}",
+            "\0fn evil() {}\u{1b}[2J",
+        ];
+        for name in names {
+            let key = crate::toml_text::key(name);
+            let text = format!(
+                "[study]\nname = {key}\nseed = 3\n[models.{key}.furuta]\ntolerance = 1e-9\n[tuners.{key}]\nstart = 1.0\nmin = 0.5\n\
+                 max = 2.0\nunit = {key}\ntie = {key}\n[cases.{key}]\na = {key}\n[experiments.{key}]\nfile = {key}\n[criteria.{key}]\n\
+                 overshoot = {{ signal = {key} }}\n",
+                key = if key.starts_with(['"', '\'']) { key.clone() } else { format!("\"{key}\"") }
+            );
+            let program = source(&text, &made_up::coulomb(), name);
+            let code: Vec<String> = without_literals(&program)
+                .lines()
+                .map(|line| line.split("//").next().unwrap_or_default().to_owned())
+                .filter(|line| line.contains("evil"))
+                .collect();
+            assert!(code.is_empty(), "{name:?}: {code:?}");
+            // Nothing of it acts in an editor or a compiler either.
+            assert!(!program.contains(acts) && !program.contains('\r'), "{name:?}");
+        }
+    }
+
+    #[test]
+    fn names_that_a_constant_cannot_tell_apart_have_constants_of_their_own() {
+        let text = "[cases.\"a-b\"]\nx = 1\n[cases.\"a.b\"]\nx = 2\n[cases.a_b]\nx = 3\n[cases.A_B]\nx = 4\n";
+        let program = source(text, &made_up::coulomb(), ".");
+        let names: Vec<&str> =
+            program.lines().filter_map(|l| l.strip_prefix("const CASE")?.split(':').next()).collect();
+        assert_eq!(names, ["_A_B", "_A_B_2", "_A_B_3", "_A_B_4"]);
+    }
+
     #[test]
     fn every_key_of_a_tuner_has_its_place_in_the_program() {
         let of = |text: &str| tuner(&Value::Table(text.parse().unwrap()));

@@ -179,7 +179,7 @@ pub(super) fn stop(outcome: &Outcome) -> &'static str {
         }
         Stop::Converged if outcome.solver == "none" => "nothing was solved: the start values were looked at",
         Stop::Converged => "converged: the solver met its own test of an optimum",
-        Stop::Budget => "the budget of evaluations was spent; more may find better",
+        Stop::Budget => "the budget was spent; a larger one may find a better point",
         Stop::Stalled => "no more improvement was found, but no optimum was shown",
         Stop::Interrupted => "interrupted by the user",
     }

@@ -8,9 +8,11 @@ use std::time::Duration;
 use mops_core::Diagnostic;
 use rusqlite::{Connection, OpenFlags};
 
-use super::database::{Database, RunState, is_passing, with_companions};
+use super::database::{Database, is_passing};
 use super::file;
 use super::keeper::Refusal;
+use super::place::with_companions;
+use super::runs::RunState;
 
 /// Makes room for the database of a new run; what the user may want to know of the old one.
 ///
@@ -24,15 +26,15 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, Refusal> {
         set_aside(folder)?;
         return Ok(None);
     }
-    if Database::is_blank(&path) {
-        return Ok(None);
-    }
     let in_use = |what: &str| {
         Refusal::Mistake(
             Diagnostic::new(format!("{} is open in another program, and {what}", path.display()))
                 .with_help("close it there, or choose another folder with --out"),
         )
     };
+    if Database::is_blank(&path) {
+        return if is_alone(&path) { Ok(None) } else { Err(in_use("cannot be replaced")) };
+    }
     let old = match Database::open(&path, true) {
         Err(error) if is_passing(&error) => return Err(in_use("cannot be replaced")),
         // What cannot be read is not understood.
@@ -65,7 +67,8 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, Refusal> {
     Ok(Some(format!("{which} evaluations of an unfinished run are now in {aside}; --resume would have continued it")))
 }
 
-/// Whether a database of others is open in no other program; what is no database is.
+/// Whether a database of others is open in no other program; what is no database is. Then all of it is in one file: the last
+/// connection that closes takes over what SQLite kept beside it.
 fn is_alone(path: &Path) -> bool {
     let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return true };
     let tried = connection
@@ -75,16 +78,17 @@ fn is_alone(path: &Path) -> bool {
     !tried.is_err_and(|error| is_passing(&error))
 }
 
-/// Moves the database to a name that is free, with what SQLite keeps beside it; where to.
+/// Moves the database to a name that is free, with what is beside it and SQLite could not take over; where to.
 fn set_aside(folder: &Path) -> Result<PathBuf, Refusal> {
     let path = file(folder);
     let names = (1..).map(|i| match i {
         1 => "evaluations.previous.sqlite".to_owned(),
         i => format!("evaluations.previous-{i}.sqlite"),
     });
-    let aside = names.map(|name| folder.join(name)).find(|aside| fs::symlink_metadata(aside).is_err());
-    let aside = aside.expect("some name is free");
-    // The database comes last: a kill in between leaves it where the next run finds it, which chooses the same name.
+    // The log of another database beside it would be taken for a part of this one.
+    let is_free = |aside: &PathBuf| with_companions(aside).iter().all(|name| fs::symlink_metadata(name).is_err());
+    let aside = names.map(|name| folder.join(name)).find(is_free).expect("some name is free");
+    // The database comes last: a kill in between leaves it where the next run finds it.
     for (from, to) in with_companions(&path).into_iter().zip(with_companions(&aside)).rev() {
         if fs::symlink_metadata(&from).is_ok() {
             let cannot = |error| Refusal::Failure(format!("{} cannot be set aside: {error}", path.display()));

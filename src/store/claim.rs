@@ -45,12 +45,17 @@ impl Claim {
     /// # Errors
     /// As [`Claim::take`].
     pub fn renew(&mut self) -> io::Result<bool> {
-        if is_named(&self.file, &self.folder.join(FILE)) {
+        if self.holds() {
             return Ok(true);
         }
         let Some(new) = Self::take(&self.folder)? else { return Ok(false) };
         *self = new;
         Ok(true)
+    }
+
+    /// Whether the folder is still that of this claim.
+    pub fn holds(&self) -> bool {
+        is_named(&self.file, &self.folder.join(FILE))
     }
 
     /// The folder.
@@ -88,7 +93,7 @@ fn is_named(file: &File, path: &Path) -> bool {
 impl Drop for Claim {
     fn drop(&mut self) {
         // The name goes before the lock does, so that nobody takes a file that is about to vanish.
-        if is_named(&self.file, &self.folder.join(FILE)) {
+        if self.holds() {
             let _ = fs::remove_file(self.folder.join(FILE));
         }
     }

@@ -2,19 +2,15 @@
 
 use std::collections::HashMap;
 use std::fs::{self, Metadata};
-use std::io;
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
-use mops_core::file::digest;
-use mops_core::{Failure, JobValues, Known, Missed, RowSlopes, Study, Value};
-use rusqlite::types::{ToSqlOutput, ValueRef};
-use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, ToSql, params};
-use serde_json::json;
+use mops_core::{Known, RowSlopes, Study};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, params};
 
 use super::bytes;
-use crate::files::{beside, is_at};
+use super::columns::{columns, known};
+use super::runs::{RunRow, RunState, begin, now, run_row};
 
 /// `PRAGMA application_id`: the letters of mops.
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
@@ -62,79 +58,11 @@ CREATE TABLE slopes (
 
 /// An open database.
 pub(crate) struct Database {
-    connection: Connection,
+    pub(super) connection: Connection,
     /// Where it is, and the file that had this name when it was opened; none in memory.
     ///
     /// N.B.: not an open file: to close one takes the locks of all connections of this process to it.
-    place: Option<(PathBuf, Metadata)>,
-}
-
-/// A new database that is not yet at its place.
-pub(super) struct Draft {
-    beside: PathBuf,
-    path: PathBuf,
-    run: i64,
-}
-
-/// How a run stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RunState {
-    /// It goes on, or was killed.
-    Running,
-    /// It came to its end.
-    Converged,
-    /// It spent its budget.
-    Budget,
-    /// It could not improve any more.
-    Stalled,
-    /// The user ended it.
-    Interrupted,
-}
-
-impl RunState {
-    const ALL: [(Self, &'static str); 5] = [
-        (Self::Running, "running"),
-        (Self::Converged, "converged"),
-        (Self::Budget, "budget"),
-        (Self::Stalled, "stalled"),
-        (Self::Interrupted, "interrupted"),
-    ];
-
-    /// As it stands in the table.
-    pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(state, _)| *state == self).map_or("running", |(_, name)| name)
-    }
-
-    pub(super) fn of(name: &str) -> Self {
-        Self::ALL.iter().find(|(_, known)| *known == name).map_or(Self::Running, |(state, _)| *state)
-    }
-}
-
-/// A run, as it stands in its table.
-#[derive(Debug, Clone)]
-pub(crate) struct RunRow {
-    pub begun: i64,
-    pub state: RunState,
-    pub mops: String,
-    pub command: String,
-    pub home: PathBuf,
-    pub settings: Vec<String>,
-    pub name: String,
-    pub task: String,
-    pub text: String,
-    pub identity: String,
-    pub seed: u64,
-    pub solver: String,
-    pub max_evaluations: usize,
-    pub begin: Option<Vec<f64>>,
-    pub evaluations: usize,
-}
-
-impl RunRow {
-    /// What the run was asked, as a digest: a result with the same one belongs to it.
-    pub fn id(&self) -> String {
-        digest(self.identity.as_bytes())
-    }
+    pub(super) place: Option<(PathBuf, Metadata)>,
 }
 
 /// A point as it is written.
@@ -160,29 +88,6 @@ impl Database {
         Ok(Self { connection, place: None })
     }
 
-    /// Removes what a run left that was killed while it made its database.
-    pub(super) fn clear_draft(path: &Path) {
-        for left in with_companions(&beside(path)) {
-            let _ = fs::remove_file(left);
-        }
-    }
-
-    /// Makes a new one that holds this run and nothing else. Nobody sees a half of it: it is made beside its place, in one
-    /// transaction, and moved by [`Draft::settle`].
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
-        let beside = beside(path);
-        let mut connection = Connection::open(&beside)?;
-        let transaction = connection.transaction()?;
-        prepare(&transaction)?;
-        let run = begin(&transaction, run)?;
-        transaction.commit()?;
-        connection.close().map_err(|(_, error)| error)?;
-        Ok(Draft { beside, path: path.to_owned(), run })
-    }
-
     /// Opens one that is there, to write or only to read; `None` where the file is none of mops, or of another format.
     ///
     /// # Errors
@@ -206,17 +111,6 @@ impl Database {
         Ok(Some(Self { connection, place }))
     }
 
-    /// Whether no run was ever entered there: a run was killed while it began, in a version that made its database in parts.
-    pub(super) fn is_blank(path: &Path) -> bool {
-        let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
-        let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return false };
-        match count(&connection, "SELECT count(*) FROM sqlite_schema") {
-            Ok(0) => true,
-            Ok(_) => matches!(Self::open(path, false), Ok(Some(ours)) if matches!(ours.last_run(), Ok(None))),
-            Err(_) => false,
-        }
-    }
-
     /// Prepares it for a run that writes often. A killed process loses nothing that is committed; a machine without power,
     /// the last moments.
     ///
@@ -233,50 +127,6 @@ impl Database {
     /// Never, as far as is known.
     pub(super) fn waits(&self, waits: bool) -> rusqlite::Result<()> {
         self.connection.busy_timeout(if waits { WAITS } else { Duration::ZERO })
-    }
-
-    /// Whether its file is still the one that has its name.
-    pub(super) fn is_in_place(&self) -> bool {
-        self.place.as_ref().is_none_or(|(path, file)| is_at(path, file))
-    }
-
-    /// Writes all of it again where its file was removed. `false` where another file has its place.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub(super) fn restore(&mut self) -> io::Result<bool> {
-        let Some((path, _)) = self.place.as_ref().filter(|(path, file)| !is_at(path, file)) else { return Ok(true) };
-        if fs::symlink_metadata(path).is_ok() {
-            return Ok(false);
-        }
-        let path = path.clone();
-        let beside = beside(&path);
-        let _ = fs::remove_file(&beside);
-        let copied = beside.to_str().ok_or_else(|| io::Error::other("its path is no text"));
-        self.connection.execute("VACUUM INTO ?", [copied?]).map_err(io::Error::other)?;
-        fs::rename(&beside, &path)?;
-        if let Some(again) = Self::open(&path, true).map_err(io::Error::other)? {
-            *self = again;
-        }
-        Ok(true)
-    }
-
-    /// Brings all of it into one file, which can be moved. `false` where somebody else has it open.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub(super) fn gather(&self) -> rusqlite::Result<bool> {
-        let until = Instant::now() + WAITS;
-        loop {
-            let mode: rusqlite::Result<String> =
-                self.connection.pragma_update_and_check(None, "journal_mode", "DELETE", |row| row.get(0));
-            match mode {
-                Ok(mode) if mode == "delete" => return Ok(true),
-                Err(error) if !is_passing(&error) => return Err(error),
-                _ if Instant::now() > until => return Ok(false),
-                _ => thread::sleep(Duration::from_millis(50)),
-            }
-        }
     }
 
     /// The run that began last.
@@ -402,26 +252,8 @@ impl Database {
     }
 }
 
-impl Drop for Draft {
-    fn drop(&mut self) {
-        Database::clear_draft(&self.path);
-    }
-}
-
-impl Draft {
-    /// Moves the database to its place and opens it there; with the number of its run.
-    ///
-    /// # Errors
-    /// It cannot be moved, or opened.
-    pub(super) fn settle(self) -> io::Result<(Database, i64)> {
-        fs::rename(&self.beside, &self.path)?;
-        let database = Database::open(&self.path, true).map_err(io::Error::other)?;
-        Ok((database.ok_or_else(|| io::Error::other("it was replaced at once"))?, self.run))
-    }
-}
-
 /// How long others who have the file are waited for.
-const WAITS: Duration = Duration::from_secs(5);
+pub(super) const WAITS: Duration = Duration::from_secs(5);
 
 /// Whether what went wrong may pass: somebody else has the file, or the disk is full.
 pub(super) fn is_passing(error: &rusqlite::Error) -> bool {
@@ -429,205 +261,17 @@ pub(super) fn is_passing(error: &rusqlite::Error) -> bool {
     error.sqlite_error_code().is_some_and(|code| passing.contains(&code))
 }
 
-/// A database with the files that SQLite keeps beside it.
-pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
-    ["", "-wal", "-shm", "-journal"].map(|end| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(end);
-        PathBuf::from(name)
-    })
-}
-
 /// Makes the tables.
-fn prepare(connection: &Connection) -> rusqlite::Result<()> {
+pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "application_id", APPLICATION)?;
     connection.pragma_update(None, "user_version", FORMAT)?;
     connection.execute_batch(TABLES)
 }
 
-/// Enters a run that begins; its number.
-fn begin(connection: &Connection, run: &RunRow) -> rusqlite::Result<i64> {
-    connection.execute(
-        "INSERT INTO runs (begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
-         max_evaluations, begin, evaluations, reused) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0)",
-        params![
-            run.begun,
-            RunState::Running.name(),
-            run.mops,
-            run.command,
-            Home(&run.home),
-            json!(run.settings).to_string(),
-            run.name,
-            run.task,
-            run.text,
-            run.identity,
-            run.seed.cast_signed(),
-            run.solver,
-            integer(run.max_evaluations),
-            run.begin.as_deref().map(bytes::of_numbers),
-        ],
-    )?;
-    Ok(connection.last_insert_rowid())
-}
-
-/// A path in a column: as text, or by its bytes where it is none.
-struct Home<'p>(&'p Path);
-
-impl ToSql for Home<'_> {
-    fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
-        let bytes = self.0.as_os_str().as_encoded_bytes();
-        Ok(ToSqlOutput::Borrowed(self.0.to_str().map_or(ValueRef::Blob(bytes), |text| ValueRef::Text(text.as_bytes()))))
-    }
-}
-
-fn home_of(value: ValueRef<'_>) -> rusqlite::Result<PathBuf> {
-    #[cfg(unix)]
-    if let ValueRef::Blob(bytes) = value {
-        use std::os::unix::ffi::OsStrExt;
-        return Ok(PathBuf::from(std::ffi::OsStr::from_bytes(bytes)));
-    }
-    Ok(PathBuf::from(value.as_str()?))
-}
-
-/// Seconds since 1970-01-01 UTC.
-pub(super) fn now() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    i64::try_from(since).unwrap_or(i64::MAX)
-}
-
-fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
-    Ok(RunRow {
-        begun: row.get(0)?,
-        state: RunState::of(&row.get::<_, String>(1)?),
-        mops: row.get(2)?,
-        command: row.get(3)?,
-        home: home_of(row.get_ref(4)?)?,
-        settings: serde_json::from_str(&row.get::<_, String>(5)?).unwrap_or_default(),
-        name: row.get(6)?,
-        task: row.get(7)?,
-        text: row.get(8)?,
-        identity: row.get(9)?,
-        seed: row.get::<_, i64>(10)?.cast_unsigned(),
-        solver: row.get(11)?,
-        max_evaluations: size(row, 12)?,
-        begin: row.get_ref(13)?.as_blob_or_null()?.map(bytes::numbers),
-        evaluations: size(row, 14)?,
-    })
-}
-
-fn size(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
+pub(super) fn size(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
     Ok(usize::try_from(row.get::<_, i64>(column)?).unwrap_or(0))
 }
 
-fn integer(size: usize) -> i64 {
+pub(super) fn integer(size: usize) -> i64 {
     i64::try_from(size).unwrap_or(i64::MAX)
-}
-
-type Columns = (Vec<u8>, Option<String>, Option<String>, Option<Vec<u8>>);
-
-/// What is known of a point, as columns: criteria, notes, failures, residuals.
-fn columns(known: &Known, rows: usize) -> Columns {
-    let mut criteria = vec![f64::NAN; rows];
-    let mut notes = serde_json::Map::new();
-    let mut failures = Vec::new();
-    let mut residuals: Vec<(usize, &[f64])> = Vec::new();
-    for (job, values) in &known.jobs {
-        match values {
-            Err(failure) => {
-                let (kind, at, why) = match failure {
-                    Failure::Diverged(t) => ("diverged", Some(t), None),
-                    Failure::StepLimit(t) => ("step-limit", Some(t), None),
-                    Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
-                    Failure::EventsAccumulate(t, why) => ("events-accumulate", Some(t), Some(why)),
-                    Failure::Undefined(why) => ("undefined", None, Some(why)),
-                    Failure::RecordLimit(t) => ("record-limit", Some(t), None),
-                    Failure::Criterion(why) => ("criterion", None, Some(why)),
-                    Failure::Cancelled => continue,
-                };
-                // As text, which keeps every bit and what is no number.
-                failures.push(json!({ "job": job, "kind": kind, "at": at.map(f64::to_string), "why": why }));
-            }
-            Ok(values) => {
-                for (row, value) in values {
-                    match value {
-                        Err(why) => failures.push(json!({ "row": row, "why": why })),
-                        Ok(value) => {
-                            criteria[*row] = value.number;
-                            let missed = value.missed.map(|missed| missed.horizon.map(|h| h.to_string()));
-                            match (value.note, missed) {
-                                (None, None) => {}
-                                (Some(note), None) => drop(notes.insert(row.to_string(), json!(note))),
-                                (note, Some(horizon)) => drop(notes.insert(row.to_string(), json!([note, horizon]))),
-                            }
-                            if !value.residuals.is_empty() {
-                                residuals.push((*row, &value.residuals));
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-    let text = |value: serde_json::Value| value.to_string();
-    (
-        bytes::of_numbers(&criteria),
-        (!notes.is_empty()).then(|| text(notes.into())),
-        (!failures.is_empty()).then(|| text(failures.into())),
-        (!residuals.is_empty()).then(|| bytes::of_lists(residuals.into_iter())),
-    )
-}
-
-/// What the columns of a point say; a job is known if it failed, or as far as its rows have a value or none for a reason.
-fn known(row: &Row<'_>, study: &Study, intern: &mut dyn FnMut(&str) -> &'static str) -> rusqlite::Result<Known> {
-    let criteria = bytes::numbers(row.get_ref(1)?.as_blob()?);
-    let json = |column: usize| -> rusqlite::Result<serde_json::Value> {
-        let text = row.get_ref(column)?.as_str_or_null()?;
-        Ok(text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default())
-    };
-    let (notes, failures) = (json(2)?, json(3)?);
-    let lists = row.get_ref(4)?.as_blob_or_null()?.and_then(bytes::lists).unwrap_or_default();
-    let mut residuals: HashMap<usize, Vec<f64>> = lists.into_iter().collect();
-    let failures = failures.as_array().cloned().unwrap_or_default();
-    let of = |key: &str, index: usize| failures.iter().find(|failure| failure[key].as_u64() == Some(index as u64));
-
-    let mut known = Known::default();
-    for job in 0..study.jobs.len() {
-        if let Some(failure) = of("job", job) {
-            known.jobs.push((job, Err(failure_of(failure))));
-            continue;
-        }
-        let mut value = |index: usize| -> Option<Result<Value, String>> {
-            if let Some(why) = of("row", index) {
-                return Some(Err(why["why"].as_str().unwrap_or_default().to_owned()));
-            }
-            let number = *criteria.get(index).filter(|number| number.is_finite())?;
-            // A note; or a note and a horizon, where nothing was reached.
-            let written = &notes[index.to_string()];
-            let missed = written
-                .is_array()
-                .then(|| Missed { horizon: written[1].as_str().and_then(|horizon| horizon.parse().ok()) });
-            let note = written.as_str().or(written[0].as_str()).map(&mut *intern);
-            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note, missed }))
-        };
-        let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
-        let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();
-        if !values.is_empty() {
-            known.jobs.push((job, JobValues::Ok(values)));
-        }
-    }
-    Ok(known)
-}
-
-fn failure_of(written: &serde_json::Value) -> Failure {
-    let at = written["at"].as_str().and_then(|at| at.parse().ok()).unwrap_or(f64::NAN);
-    let why = written["why"].as_str().unwrap_or_default().to_owned();
-    match written["kind"].as_str() {
-        Some("diverged") => Failure::Diverged(at),
-        Some("step-limit") => Failure::StepLimit(at),
-        Some("step-too-small") => Failure::StepTooSmall(at),
-        Some("events-accumulate") => Failure::EventsAccumulate(at, why),
-        Some("record-limit") => Failure::RecordLimit(at),
-        Some("criterion") => Failure::Criterion(why),
-        _ => Failure::Undefined(why),
-    }
 }

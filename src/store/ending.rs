@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::database::{RunRow, RunState};
+use super::runs::{RunRow, RunState};
 use crate::files;
 
 /// The end of a run, for the row of the run that began at the same time.

@@ -9,15 +9,16 @@ use std::sync::{Arc, PoisonError, RwLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::{Cancellation, Diagnostic, Merit, Problem, Store, Study, Watch};
+use mops_core::{Cancellation, Diagnostic, Problem, Store, Study, Watch};
 
 use super::aside::make_room;
-use super::bytes;
+use super::best::best;
 use super::claim::Claim;
-use super::database::{Database, Points, RunRow, RunState, Slopes, is_passing, now};
+use super::database::{Database, Points, Slopes, is_passing};
 use super::ending::Ending;
 use super::identity::Identity;
 use super::memory::{Memory, Message, ROOM};
+use super::runs::{RunRow, RunState};
 use super::writer::{Behind, Unwritten, write};
 use super::{FILE, file};
 
@@ -100,7 +101,6 @@ impl Keeper {
     ) -> Result<Self, Refusal> {
         let claim = claim(folder)?;
         Database::clear_draft(&file(folder));
-        Ending::clear(folder);
         let (mut note, mut known) = (None, None);
         let kept = match start {
             Start::Fresh => None,
@@ -158,6 +158,7 @@ impl Keeper {
         };
         let taken = database.room_taken().map_err(cannot)?;
         database.write_ahead().and_then(|()| database.waits(false)).map_err(cannot)?;
+        Ending::clear(folder);
         let (memory, messages) = memory((points, slopes), known.is_some(), taken, None);
         let rows = study.rows.len();
         Ok(Self { database, run, rows, memory, messages, new, note, id, begun, begin, claim: Some(claim) })
@@ -260,7 +261,7 @@ impl Opened {
                 ended => break ended,
             }
         };
-        if let (Err(_), Some(claim)) = (&ended, &self.claim) {
+        if let (Err(_), Some(claim)) = (&ended, self.claim.as_ref().filter(|claim| claim.holds())) {
             Ending::note(claim.folder(), self.begun, state, evaluations);
         }
         match (self.unwritten, ended) {
@@ -390,65 +391,4 @@ fn same_folder(a: &Path, b: &Path) -> bool {
 
 fn trouble(folder: &Path, error: &rusqlite::Error) -> Refusal {
     Refusal::Failure(format!("{}: {error}", file(folder).display()))
-}
-
-/// The point of the unit box at which the best known point under the demands of the problem lies, of those that the problem
-/// can reach: within the bounds, and with its values of the tuners that are kept.
-fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
-    let mut best: Option<(Merit, &Vec<u64>, Vec<f64>)> = None;
-    for (key, known) in points {
-        if key.len() != problem.study().tuners.len() {
-            continue;
-        }
-        let tuners: Vec<f64> = key.iter().map(|&bits| f64::from_bits(bits)).collect();
-        let Some(found) = problem.known(&tuners, known).filter(|found| found.scaled.is_some()) else { continue };
-        // Of equals the one with the smaller key, whatever the order of a map.
-        let wins = best.as_ref().is_none_or(|(merit, of, _)| {
-            found.merit.is_better_than(merit) || (!merit.is_better_than(&found.merit) && key < *of)
-        });
-        if wins {
-            let point: Vec<f64> = problem.active().iter().map(|&i| position(problem, i, tuners[i])).collect();
-            if bytes::key(&problem.tuners_at(&point)) == *key {
-                best = Some((found.merit, key, point));
-            }
-        }
-    }
-    Some(best?.2)
-}
-
-/// The place of a tuner's value within its bounds, to the bit: the place from which that very value comes, if there is one.
-fn position(problem: &Problem, tuner: usize, value: f64) -> f64 {
-    let tuner = &problem.study().tuners[tuner];
-    let near = tuner.position_of(value);
-    let (mut up, mut down) = (near, near);
-    for _ in 0..64 {
-        for place in [up, down] {
-            if (0.0..=1.0).contains(&place) && tuner.value_at(place) == value {
-                return place;
-            }
-        }
-        (up, down) = (up.next_up(), down.next_down());
-    }
-    near
-}
-
-/// The row of a run that begins now.
-pub(crate) fn row(identity: &Identity) -> RunRow {
-    RunRow {
-        begun: now(),
-        state: RunState::Running,
-        mops: env!("CARGO_PKG_VERSION").to_owned(),
-        command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" "),
-        home: PathBuf::new(),
-        settings: Vec::new(),
-        name: String::new(),
-        task: String::new(),
-        text: String::new(),
-        identity: serde_json::to_string(identity).expect("an identity is JSON"),
-        seed: 0,
-        solver: String::new(),
-        max_evaluations: 0,
-        begin: None,
-        evaluations: 0,
-    }
 }

@@ -2,13 +2,17 @@
 //! was, and a study that asks for something else simulates no known point again. `docs/store.md` has the tables.
 
 mod aside;
+mod best;
 mod bytes;
 mod claim;
+mod columns;
 mod database;
 mod ending;
 mod identity;
 mod keeper;
 mod memory;
+mod place;
+mod runs;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -17,9 +21,9 @@ use std::path::{Path, PathBuf};
 
 pub(crate) use claim::Claim;
 use database::Database;
-pub(crate) use database::{RunRow, RunState};
 pub(crate) use identity::Identity;
-pub(crate) use keeper::{Keeper, Opened, Refusal, Start, claim, row};
+pub(crate) use keeper::{Keeper, Opened, Refusal, Start, claim};
+pub(crate) use runs::{RunRow, RunState, row};
 
 /// The run that last wrote in a folder, and whether it goes on; `None` where there is none, or it cannot be read.
 pub(crate) fn last_run(folder: &Path) -> Option<(RunRow, bool)> {

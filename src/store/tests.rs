@@ -1,11 +1,13 @@
 use std::collections::HashSet;
+use std::fs;
+use std::path::Path;
 use std::sync::Arc;
 
 use mops_core::file::{Files, StudyFile};
 use mops_core::{Failure, Known, Missed, Problem, RowSlopes, RowValue, Study, Value};
 
 use super::database::{Database, PointRow};
-use super::{Identity, bytes, row};
+use super::{FILE, Identity, Keeper, Refusal, RunState, Start, bytes, row};
 
 struct Nothing;
 
@@ -171,4 +173,127 @@ fn what_is_known_makes_the_evaluation_a_simulation_makes_under_any_demand() {
         );
         assert_eq!(format!("{:?}", again.evaluation), format!("{:?}", asking.evaluate(&point)));
     }
+}
+
+/// A run of the shipped study in a folder.
+fn begun(folder: &Path, start: &Start) -> Result<Keeper, Refusal> {
+    let file = file("pid-design", &[]);
+    let identity = Identity::of(&file, &file.study, "auto");
+    Keeper::open(folder, start, &file.study, &identity, &row(&identity))
+}
+
+/// Ends a run after it has learned so many points.
+fn ended(keeper: Keeper, points: usize, state: RunState) {
+    let store = keeper.store();
+    let ((), opened) = keeper.run(&(), |_| {
+        for i in 0..points {
+            let value = Value { number: 0.5, ..Value::default() };
+            store.answered(&[i as f64, 1.0, 1.0], Some(Known { jobs: vec![(0, Ok(vec![(0, Ok(value))]))] }));
+        }
+    });
+    assert_eq!(opened.end(state, points), None);
+}
+
+/// What a run leaves that is killed while it begins, by the calls after which it is: the next one begins, or goes on.
+#[test]
+fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
+    type Leave = fn(&Path);
+    let connection = |path: &Path| rusqlite::Connection::open(path).unwrap();
+    // What is left, and the points that are known then.
+    let states: [(&str, Leave, usize); 9] = [
+        ("nothing", |_| (), 0),
+        ("a lock", |folder| fs::write(folder.join("evaluations.lock"), "").unwrap(), 0),
+        ("half a draft", |folder| fs::write(folder.join(".new-evaluations.sqlite"), [0; 100]).unwrap(), 0),
+        (
+            "a draft and its journal",
+            |folder| {
+                fs::write(folder.join(".new-evaluations.sqlite"), "SQLite format 3\0").unwrap();
+                fs::write(folder.join(".new-evaluations.sqlite-journal"), [0xd9; 600]).unwrap();
+            },
+            0,
+        ),
+        ("an empty file", |folder| fs::write(folder.join(FILE), "").unwrap(), 0),
+        (
+            "no tables yet",
+            |folder| {
+                let database = rusqlite::Connection::open(folder.join(FILE)).unwrap();
+                database.execute_batch("PRAGMA journal_mode=WAL; PRAGMA application_id=1836019827;").unwrap();
+            },
+            0,
+        ),
+        (
+            "no run yet",
+            |folder| {
+                ended(begun(folder, &Start::Fresh).ok().unwrap(), 0, RunState::Running);
+                rusqlite::Connection::open(folder.join(FILE)).unwrap().execute("DELETE FROM runs", []).unwrap();
+            },
+            0,
+        ),
+        ("the end not entered", |folder| ended(begun(folder, &Start::Fresh).ok().unwrap(), 7, RunState::Running), 7),
+        (
+            "a log that was not taken over",
+            |folder| {
+                // As the files are while the run goes.
+                let keeper = begun(folder, &Start::Fresh).ok().unwrap();
+                let store = keeper.store();
+                let copy = folder.join("copy");
+                fs::create_dir(&copy).unwrap();
+                let ((), opened) = keeper.run(&(), |watch| {
+                    for i in 0..300 {
+                        let value = Value { number: 0.5, ..Value::default() };
+                        store.answered(
+                            &[f64::from(i), 1.0, 1.0],
+                            Some(Known { jobs: vec![(0, Ok(vec![(0, Ok(value))]))] }),
+                        );
+                    }
+                    watch.stage("written so far", 0.5);
+                    while fs::metadata(folder.join("evaluations.sqlite-wal")).map_or(0, |log| log.len()) < 30_000 {
+                        std::thread::yield_now();
+                    }
+                    for end in ["", "-wal"] {
+                        fs::copy(folder.join(format!("{FILE}{end}")), copy.join(format!("{FILE}{end}"))).unwrap();
+                    }
+                });
+                drop(opened);
+                for end in ["", "-wal"] {
+                    fs::rename(copy.join(format!("{FILE}{end}")), folder.join(format!("{FILE}{end}"))).unwrap();
+                }
+                fs::remove_dir(&copy).unwrap();
+            },
+            256,
+        ),
+    ];
+    for (what, leave, least) in states {
+        let root = tempfile::tempdir().unwrap();
+        leave(root.path());
+        let keeper = begun(root.path(), &Start::Resume).unwrap_or_else(|_| panic!("{what}: it is refused"));
+        assert!(keeper.known() >= least && (least > 0 || keeper.known() == 0), "{what}: {} points", keeper.known());
+        ended(keeper, 10, RunState::Converged);
+        let mut names: Vec<_> = fs::read_dir(root.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, [FILE], "{what}");
+        let runs =
+            connection(&root.path().join(FILE)).query_row("SELECT count(*) FROM runs", [], |row| row.get::<_, i64>(0));
+        assert_eq!(runs.unwrap(), 1 + i64::from(least > 0), "{what}");
+    }
+}
+
+#[test]
+fn a_database_of_others_is_set_aside_with_its_log_and_beside_no_other_log() {
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    // As a program that was killed leaves it: all that it wrote is in the log.
+    let other = rusqlite::Connection::open(at("other")).unwrap();
+    other.execute_batch("PRAGMA journal_mode=WAL; CREATE TABLE mine (x); INSERT INTO mine VALUES (7);").unwrap();
+    for end in ["", "-wal"] {
+        fs::copy(at(&format!("other{end}")), at(&format!("{FILE}{end}"))).unwrap();
+    }
+    // The log of a database that is gone has the first name.
+    fs::copy(at("other-wal"), at("evaluations.previous.sqlite-wal")).unwrap();
+    let keeper = begun(root.path(), &Start::Fresh).ok().unwrap();
+    assert!(keeper.note.as_ref().unwrap().contains("evaluations.previous-2.sqlite"), "{:?}", keeper.note);
+    ended(keeper, 3, RunState::Converged);
+    assert!(!at("evaluations.sqlite-wal").exists() && at("evaluations.previous.sqlite-wal").exists());
+    let mine = rusqlite::Connection::open(at("evaluations.previous-2.sqlite")).unwrap();
+    assert_eq!(mine.query_row("SELECT x FROM mine", [], |row| row.get::<_, i64>(0)), Ok(7));
 }

@@ -2,6 +2,7 @@
 
 use super::entries::{Entry, Form, entries, header_of, last_line, own_end};
 use super::{TomlText, keys, owned};
+use crate::plain::line;
 
 impl TomlText {
     /// Puts `value`, written as TOML, under these keys: instead of the value or the table that is there, or where it belongs.
@@ -127,7 +128,7 @@ impl TomlText {
         for (i, &start) in starts.iter().enumerate().rev() {
             self.0.insert_str(start, "# ");
             if i == 0 {
-                self.0.insert_str(start, &format!("# {why}\n"));
+                self.0.insert_str(start, &format!("# {}\n", line(why)));
             }
         }
     }

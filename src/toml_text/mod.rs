@@ -9,6 +9,8 @@ use toml::de::DeTable;
 
 use entries::{Entry, Form, entries};
 
+use crate::plain::plain;
+
 /// A TOML text that can be edited. It must be right: what is edited was read before.
 pub(crate) struct TomlText(String);
 
@@ -37,7 +39,8 @@ impl TomlText {
 
     /// Puts a comment above all else.
     pub(crate) fn head(&mut self, comment: &str) {
-        let lines: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        // Of control characters a comment may have tabs alone.
+        let lines: String = comment.lines().map(|line| format!("# {}\n", plain(line))).collect();
         self.0.insert_str(0, &format!("{lines}\n"));
     }
 
@@ -105,9 +108,17 @@ pub(crate) fn key(key: &str) -> String {
     if bare { key.to_owned() } else { quoted(key) }
 }
 
-/// A text as TOML writes it.
+/// A text as TOML writes it, in one line: a key may have no other form.
 pub(crate) fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+    if !text.contains(char::is_control) {
+        return toml::Value::String(text.to_owned()).to_string();
+    }
+    let escaped = |c: char| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04x}", u32::from(c)),
+        c => c.to_string(),
+    };
+    format!("\"{}\"", text.chars().map(escaped).collect::<String>())
 }
 
 /// A number as TOML writes it.

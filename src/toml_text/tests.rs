@@ -89,6 +89,11 @@ fn what_is_removed_becomes_a_comment_that_says_why() {
 #[test]
 fn keys_and_texts_are_quoted_where_they_must_be() {
     assert_eq!([key("arm"), key("arm.torque"), key("")], ["arm", "\"arm.torque\"", "\"\""]);
+    for odd in ["a\nb", "\"\"\"", "'\n\"", "\u{1b}[2J", "a\r\nfn", "\\", "\u{85}\u{7f}", "\t", "\0", "é\n"] {
+        let read: Table = format!("{} = {}\nx = {{ {0} = {1} }}", key(odd), quoted(odd)).parse().unwrap();
+        assert_eq!(read[odd].as_str(), Some(odd));
+        assert!(!key(odd).contains('\n') && !quoted(odd).contains('\n'), "{odd:?}");
+    }
     let text = TomlText::new(TEXT);
     assert_eq!(text.words(&["experiments", "swing", "file"]).as_deref(), Some("swing.csv"));
     assert_eq!(text.keys(&["tuners"]), ["b", "bp", "d"]);
@@ -97,7 +102,7 @@ fn keys_and_texts_are_quoted_where_they_must_be() {
 /// A document, or what a setting says: numbers and tables under a few keys.
 fn tables() -> impl Strategy<Value = Value> {
     let number = (0i64..100).prop_map(Value::Integer);
-    let keys = prop::sample::select(vec!["a", "b", "c d"]);
+    let keys = prop::sample::select(vec!["a", "b", "c \n\"d"]);
     let table = move |inner: BoxedStrategy<Value>| prop::collection::btree_map(keys.clone(), inner, 0..3);
     let named = |table: std::collections::BTreeMap<&str, Value>| {
         Value::Table(table.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
@@ -118,7 +123,7 @@ fn rendered(table: &Table, [header, above]: [&[String]; 2], forms: &mut impl Ite
                 later += &format!("\n[{}]\n{}", header.join("."), rendered(below, [&header, &[]], forms));
             }
             (Some(_), _) => own += &format!("{} = {}\n", path.join("."), inline(value)),
-            (None, _) => own += &format!("{} = {value} # {key}\n", path.join(".")),
+            (None, _) => own += &format!("{} = {value} # a number\n", path.join(".")),
         }
     }
     own + &later

@@ -1,18 +1,23 @@
 //! Connections to the live page: each has a thread, a few seconds to say what it wants and to take what it gets, and there
 //! are only so many.
 
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
-use std::net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream};
-use std::sync::Arc;
+use std::net::{Ipv4Addr, Shutdown, SocketAddrV4, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use super::request::{Answer, LONGEST, answer};
 use super::state::Live;
 
-/// Connections at once, at most.
+/// Viewers at once, at most: connections that have named the address.
 const CONNECTIONS: usize = 32;
+
+/// Connections that have not said yet what they want, at most. Of more, the oldest is ended: a browser says it at once, and who
+/// opens connections and says nothing keeps nobody away.
+const PENDING: usize = 32;
 
 /// Time for a request, and for the viewer to take a part of the answer.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -36,6 +41,8 @@ pub(super) struct Server {
 
 struct Shared {
     live: Arc<Live>,
+    /// Connections that have not said yet what they want, in the order in which they came.
+    pending: Mutex<VecDeque<(u64, TcpStream)>>,
     connections: AtomicUsize,
     /// Streams that wait for a state, and so will take the last one at once.
     waiting: AtomicUsize,
@@ -52,6 +59,7 @@ impl Server {
         let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
         let shared = Arc::new(Shared {
             live,
+            pending: Mutex::default(),
             connections: AtomicUsize::new(0),
             waiting: AtomicUsize::new(0),
             closed: AtomicBool::new(false),
@@ -80,7 +88,7 @@ impl Server {
 }
 
 fn listen(listener: &TcpListener, port: u16, token: &str, shared: &Arc<Shared>) {
-    for stream in listener.incoming() {
+    for (number, stream) in (0..).zip(listener.incoming()) {
         if shared.closed.load(Ordering::Relaxed) {
             return;
         }
@@ -89,14 +97,31 @@ fn listen(listener: &TcpListener, port: u16, token: &str, shared: &Arc<Shared>) 
             thread::sleep(Duration::from_millis(100));
             continue;
         };
-        let place = Place::take(shared);
-        let token = token.to_owned();
-        // N.B.: without a thread or a place the connection is dropped, and the viewer comes again.
-        if let Some(place) = place {
-            let _ = thread::Builder::new().name("viewer".into()).spawn(move || {
-                let _ = serve(stream, port, &token, &place.0);
-            });
+        let Ok(waiting) = stream.try_clone() else { continue };
+        shared.waits((number, waiting));
+        let (token, shared) = (token.to_owned(), Arc::clone(shared));
+        // N.B.: without a thread the connection is dropped, and the viewer comes again.
+        let _ = thread::Builder::new().name("viewer".into()).spawn(move || {
+            let _ = serve(stream, (port, &token), number, &shared);
+        });
+    }
+}
+
+impl Shared {
+    /// A connection came that has said nothing yet.
+    fn waits(&self, connection: (u64, TcpStream)) {
+        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
+        pending.push_back(connection);
+        if pending.len() > PENDING
+            && let Some((_, oldest)) = pending.pop_front()
+        {
+            let _ = oldest.shutdown(Shutdown::Both);
         }
+    }
+
+    /// It has said what it wants, or left.
+    fn said(&self, number: u64) {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner).retain(|(of, _)| *of != number);
     }
 }
 
@@ -119,10 +144,18 @@ impl Drop for Place {
     }
 }
 
-fn serve(mut stream: TcpStream, port: u16, token: &str, shared: &Shared) -> io::Result<()> {
+fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared: &Arc<Shared>) -> io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
-    let wanted = read(&mut stream, port, token)?;
+    let wanted = read(&mut stream, port, token);
+    shared.said(number);
+    let wanted = wanted?;
+    // Who names the address takes a place; without one the connection is dropped, and the viewer comes again.
+    let named = !matches!(wanted, Answer::Refused(..) | Answer::More);
+    let _place = match named.then(|| Place::take(shared)) {
+        Some(None) => return Ok(()),
+        place => place.flatten(),
+    };
     let style = || [crate::report::STYLE, OWN_STYLE].concat();
     match wanted {
         Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", &page(shared)),

@@ -141,7 +141,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         }
         write(folder, "index.html", &diagnosis::page(&text, &tables::stated(&results.rows)))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(progress.status())
 }
 
 /// Writes a file of a benchmark in its folder, which is made where it is not there yet.

@@ -116,7 +116,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         all.extend(before.as_ref().map(|before| ("before".to_owned(), before)));
         write(folder, "index.html", &solvers::page(&text, &all))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(progress.status())
 }
 
 fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic> {

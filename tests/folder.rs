@@ -1,0 +1,401 @@
+//! The folder of a run: what is there is never lost, whoever has it open, whatever stands there and whenever a run ends.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use assert_cmd::cargo::cargo_bin;
+use rusqlite::{Connection, OpenFlags};
+use serde_json::Value;
+
+const SEARCH: [&str; 6] = ["--solver", "cma-es", "--jobs", "1", "--max-evaluations", "1000000"];
+
+/// A task that evaluates nothing that could be kept.
+const LOCAL: [&str; 9] = [
+    "run",
+    "tank-level",
+    "--quiet",
+    "--set",
+    "study.task=\"sensitivity\"",
+    "--set",
+    "sensitivity.at=\"start\"",
+    "--set",
+    "sensitivity.method=\"local\"",
+];
+
+fn command(arguments: &[&str], out: &Path) -> Command {
+    let mut command = Command::new(cargo_bin!("mops"));
+    command.args(arguments).arg("--out").arg(out);
+    command
+}
+
+fn mops(arguments: &[&str], out: &Path) -> Output {
+    command(arguments, out).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat()
+}
+
+/// A command on a folder that is no run.
+fn look(what: &str, folder: &Path) -> Output {
+    Command::new(cargo_bin!("mops")).arg(what).arg(folder).output().unwrap()
+}
+
+fn history(folder: &Path) -> Value {
+    let output = Command::new(cargo_bin!("mops")).arg("history").arg(folder).arg("--json").output().unwrap();
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn result(out: &Path) -> Value {
+    serde_json::from_slice(&fs::read(out.join("result.json")).unwrap()).unwrap()
+}
+
+/// A search that goes on in a new folder, once some points are written.
+fn going(out: &Path) -> Child {
+    let mut child = command(&[&["run", "pid-design", "--quiet"], &SEARCH[..]].concat(), out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while points(&out.join("evaluations.sqlite")) < 300 {
+        assert!(child.try_wait().unwrap().is_none(), "it goes on");
+        std::thread::yield_now();
+    }
+    child
+}
+
+/// A search that was killed after some points.
+fn unfinished(out: &Path) -> usize {
+    let _ = fs::remove_file(out.join("evaluations.sqlite"));
+    let mut child = going(out);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    points(&out.join("evaluations.sqlite"))
+}
+
+/// Points in a database; 0 where there is none.
+fn points(database: &Path) -> usize {
+    let count = || {
+        let connection = Connection::open_with_flags(database, OpenFlags::SQLITE_OPEN_READ_ONLY).ok()?;
+        connection.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).ok()
+    };
+    count().map_or(0, |count| usize::try_from(count).unwrap())
+}
+
+const SHORT: [&str; 7] = ["run", "pid-design", "--quiet", "--solver", "genetic", "--max-evaluations", "60"];
+
+#[test]
+fn what_a_new_run_finds_and_does_not_understand_is_set_aside_and_never_deleted() {
+    let root = tempfile::tempdir().unwrap();
+    type Put = fn(&Path);
+    let puts: [(&str, Put); 6] = [
+        ("no database", |path| fs::write(path, "notes of mine").unwrap()),
+        ("a folder", |path| {
+            fs::create_dir(path).unwrap();
+            fs::write(path.join("a"), "mine").unwrap();
+        }),
+        ("a database of others", |path| {
+            Connection::open(path)
+                .unwrap()
+                .execute_batch("CREATE TABLE mine (x); INSERT INTO mine VALUES (7);")
+                .unwrap();
+        }),
+        ("one of others with its log", |path| {
+            let connection = Connection::open(path).unwrap();
+            connection
+                .execute_batch("PRAGMA journal_mode=WAL; CREATE TABLE mine (x); INSERT INTO mine VALUES (7);")
+                .unwrap();
+        }),
+        ("another version of the tables", |path| {
+            assert!(mops(&SHORT, path.parent().unwrap()).status.success());
+            Connection::open(path).unwrap().pragma_update(None, "user_version", 77).unwrap();
+        }),
+        ("a damaged one", |path| {
+            assert!(mops(&SHORT, path.parent().unwrap()).status.success());
+            let mut bytes = fs::read(path).unwrap();
+            bytes[20..1000].fill(0xee);
+            fs::write(path, bytes).unwrap();
+        }),
+    ];
+    for (what, put) in puts {
+        let out = root.path().join(what.replace(' ', "-"));
+        fs::create_dir(&out).unwrap();
+        let database = out.join("evaluations.sqlite");
+        put(&database);
+        let before = fs::read(&database).ok();
+        let output = mops(&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "60"], &out);
+        assert!(
+            output.status.success() && said(&output).contains("evaluations.previous.sqlite"),
+            "{what}: {}",
+            said(&output)
+        );
+        let aside = out.join("evaluations.previous.sqlite");
+        match before {
+            Some(_) if what.starts_with("one of others") => {
+                let mine =
+                    Connection::open(&aside).unwrap().query_row("SELECT x FROM mine", [], |row| row.get::<_, i64>(0));
+                assert_eq!(mine, Ok(7));
+            }
+            Some(bytes) => assert!(fs::read(&aside).unwrap() == bytes, "{what}"),
+            None => assert_eq!(fs::read_to_string(aside.join("a")).unwrap(), "mine"),
+        }
+        assert!(points(&database) >= 60, "{what}");
+    }
+}
+
+#[test]
+fn points_of_every_unfinished_run_stay_each_under_a_name_of_its_own() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let mut counts = Vec::new();
+    for name in ["evaluations.previous.sqlite", "evaluations.previous-2.sqlite", "evaluations.previous-3.sqlite"] {
+        counts.push((name, unfinished(&out)));
+        let output = mops(&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "1"], &out);
+        assert!(said(&output).contains(name), "{}", said(&output));
+        // The short run came to its end: the next one replaces it.
+    }
+    for (name, count) in counts {
+        assert!(count >= 300);
+        assert_eq!(points(&out.join(name)), count, "{name}");
+    }
+}
+
+#[test]
+fn a_database_that_somebody_reads_is_left_where_it_is_and_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let count = unfinished(&out);
+    let database = out.join("evaluations.sqlite");
+    let reader = Connection::open_with_flags(&database, OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
+    reader.execute_batch("BEGIN").unwrap();
+    assert_eq!(
+        reader.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).unwrap() as usize,
+        count
+    );
+    let output = mops(&SHORT, &out);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("is open in another program"), "{}", said(&output));
+    drop(reader);
+    assert_eq!(points(&database), count);
+    assert!(mops(&SHORT, &out).status.success());
+    assert_eq!(points(&out.join("evaluations.previous.sqlite")), count);
+}
+
+#[test]
+fn a_lock_is_waited_for_and_all_that_waited_is_written_once_it_is_gone() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let mut child = going(&out);
+    let database = out.join("evaluations.sqlite");
+    let other = Connection::open(&database).unwrap();
+    other.busy_timeout(Duration::from_secs(10)).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let committed = points(&database);
+    // Its first word: that it cannot write.
+    let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    std::io::BufRead::read_line(&mut stderr, &mut line).unwrap();
+    assert!(line.contains("evaluations cannot be written (database is locked)"), "{line}");
+    assert_eq!(points(&database), committed);
+    other.execute_batch("ROLLBACK").unwrap();
+    line.clear();
+    std::io::BufRead::read_line(&mut stderr, &mut line).unwrap();
+    assert!(line.contains("evaluations are written again"), "{line}");
+    assert!(points(&database) > committed);
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    std::io::Read::read_to_string(&mut stderr, &mut line).unwrap();
+    assert!(!line.contains("not all"), "{line}");
+    assert_eq!(child.wait().unwrap().code(), Some(4));
+    let (result, kept) = (result(&out), points(&database));
+    assert!(kept as u64 >= result["evaluations"].as_u64().unwrap(), "{kept}: {result}");
+}
+
+#[test]
+fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let child = going(&out);
+    let database = out.join("evaluations.sqlite");
+    let other = Connection::open(&database).unwrap();
+    other.busy_timeout(Duration::from_secs(10)).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", said(&output));
+    assert!(said(&output).contains("evaluations could not be kept: database is locked"), "{}", said(&output));
+    let result = result(&out);
+    assert_eq!(result["stop"], "interrupted");
+    // Neither the history nor a comparison takes it for unfinished, and no report is made of a part of it.
+    let listed = history(&out);
+    assert_eq!((&listed[0]["state"], &listed[0]["evaluations"]), (&"interrupted".into(), &result["evaluations"]));
+    let page = fs::read(out.join("report.html")).unwrap();
+    other.execute_batch("ROLLBACK").unwrap();
+    drop(other);
+    let report = look("report", &out);
+    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
+    assert!(said(&report).contains("of the run's"), "{}", said(&report));
+    assert!(fs::read(out.join("report.html")).unwrap() == page);
+    // What is missing is simulated again.
+    let search = [&["run", "pid-design"], &SEARCH[..4], &["--max-evaluations", "400", "--resume"]].concat();
+    assert!(mops(&search, &out).status.success());
+    assert!(look("report", &out).status.success());
+    assert!(!out.join("evaluations.ended.json").exists());
+}
+
+#[test]
+fn every_task_takes_the_folder_and_makes_it_its_own() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    assert!(mops(&SHORT, &out).status.success());
+    assert!(out.join("plots/response-nominal-y.svg").is_file());
+    fs::write(out.join("plots/mine.svg"), "").unwrap();
+    assert!(mops(&LOCAL, &out).status.success());
+    // Result, database and page are of the new run; pictures of the old one are gone, and nobody else's.
+    let listed = history(&out);
+    assert_eq!(
+        [&listed[0]["study"], &listed[0]["task"], &listed[0]["state"]],
+        [&Value::from("tank-level"), &"sensitivity".into(), &"converged".into()]
+    );
+    assert!(!out.join("plots/response-nominal-y.svg").exists() && out.join("plots/mine.svg").exists());
+    assert_eq!(result(&out)["study"], "tank-level");
+    let page = fs::read(out.join("report.html")).unwrap();
+    let report = look("report", &out);
+    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
+    assert!(fs::read(out.join("report.html")).unwrap() == page);
+    // While another run goes it is refused.
+    let busy = root.path().join("busy");
+    let mut child = going(&busy);
+    for task in [&LOCAL[..], &SHORT[..], &["diagnose", "furuta-swing", "--quiet"]] {
+        let refused = mops(task, &busy);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(said(&refused).contains("another run is writing in"), "{}", said(&refused));
+    }
+    assert_eq!(history(&busy)[0]["state"], "running");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(history(&busy)[0]["state"], "unfinished");
+}
+
+#[test]
+fn a_diagnosis_has_no_scaled_values_in_the_history() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    assert!(mops(&["diagnose", "furuta-swing", "--quiet", "--time-limit", "0.2"], &out).status.success());
+    assert_eq!((&result(&out)["stop"], &result(&out)["diagnosis"]), (&"budget".into(), &Value::Null));
+    let listed = &history(&out)[0];
+    for key in ["worst_scaled", "feasible", "evaluations"] {
+        assert_eq!(listed[key], Value::Null, "{key}");
+    }
+    assert_eq!([&listed["task"], &listed["state"]], ["diagnosis", "budget"]);
+}
+
+#[test]
+fn runs_are_compared_although_some_have_no_result() {
+    let root = tempfile::tempdir().unwrap();
+    let [a, b] = ["a", "b"].map(|name| root.path().join(name));
+    assert!(mops(&SHORT, &a).status.success());
+    unfinished(&b);
+    let compared = Command::new(cargo_bin!("mops")).arg("compare").args([&a, &b]).output().unwrap();
+    assert!(compared.status.success(), "{}", said(&compared));
+    let text = said(&compared);
+    assert!(text.contains("unfinished, no result yet") && text.contains("nominal/overshoot"), "{text}");
+    let none = Command::new(cargo_bin!("mops")).arg("compare").args([&b, &b]).output().unwrap();
+    assert_eq!(none.status.code(), Some(2));
+}
+
+#[test]
+fn a_report_searches_nothing_beyond_the_points_that_are_known() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    assert!(mops(&SHORT, &out).status.success());
+    let database = out.join("evaluations.sqlite");
+    let change = |sql: &str| Connection::open(&database).unwrap().execute(sql, []).unwrap();
+    let kept = points(&database);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    for state in ["budget", "converged", "stalled", "interrupted", "running"] {
+        change(&format!("UPDATE runs SET max_evaluations = 100000000, state = '{state}'"));
+        let report = look("report", &out);
+        assert!(report.status.success() && said(&report).contains("60 evaluations"), "{state}: {}", said(&report));
+        assert_eq!(points(&database), kept);
+    }
+    change("UPDATE runs SET max_evaluations = 60, state = 'budget'");
+    assert!(look("report", &out).status.success());
+    assert!(fs::read_to_string(out.join("report.html")).unwrap() == page);
+    // A part of the points is no report of the whole run.
+    change("DELETE FROM points WHERE id > 30");
+    let report = look("report", &out);
+    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
+    assert!(fs::read_to_string(out.join("report.html")).unwrap() == page);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let child = going(&out);
+    fs::remove_dir_all(&out).unwrap();
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", said(&output));
+    assert!(said(&output).contains("was removed while the run went; it is written again"), "{}", said(&output));
+    assert!(points(&out.join("evaluations.sqlite")) as u64 >= result(&out)["evaluations"].as_u64().unwrap());
+    assert!(look("report", &out).status.success());
+    // Where another run has taken the place meanwhile, nothing of it is touched.
+    let out = root.path().join("taken");
+    let child = going(&out);
+    fs::remove_dir_all(&out).unwrap();
+    let mut other = going(&out);
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
+    assert!(said(&output).contains("another run writes there now"), "{}", said(&output));
+    assert!(!out.join("result.json").exists());
+    other.kill().unwrap();
+    other.wait().unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn what_links_lead_to_stays_as_it_is() {
+    use std::os::unix::fs::symlink;
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let precious = root.path().join("precious");
+    fs::write(&precious, "mine").unwrap();
+    for name in ["result.json", "report.html", "evaluations.csv", ".new-result.json", ".new-evaluations.sqlite"] {
+        symlink(&precious, out.join(name)).unwrap();
+    }
+    assert!(mops(&SHORT, &out).status.success());
+    assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
+    assert_eq!(result(&out)["study"], "pid-design");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_whose_name_is_no_text_works_as_any_other() {
+    use std::os::unix::ffi::OsStrExt;
+    let root = tempfile::tempdir().unwrap();
+    let odd = root.path().join(std::ffi::OsStr::from_bytes(b"out\xff"));
+    assert!(mops(&SHORT, &odd).status.success());
+    assert!(mops(&[&SHORT[..], &["--resume"]].concat(), &odd).status.success());
+    assert!(look("report", &odd).status.success());
+    // A study that lies in such a folder, with its data.
+    let study = odd.join("study");
+    fs::create_dir(&study).unwrap();
+    for (name, bytes) in mops::catalogue().studies.iter().find(|s| s.name == "step-identification").unwrap().files {
+        fs::create_dir_all(study.join(name).parent().unwrap()).unwrap();
+        fs::write(study.join(name), bytes).unwrap();
+    }
+    let run = Command::new(cargo_bin!("mops"))
+        .args(["run", "study.toml", "--quiet", "--max-evaluations", "5", "--out", "out"])
+        .current_dir(&study)
+        .output()
+        .unwrap();
+    assert!(matches!(run.status.code(), Some(0 | 1)), "{}", said(&run));
+    let report = Command::new(cargo_bin!("mops")).args(["report", "out"]).current_dir(&study).output().unwrap();
+    assert!(report.status.success(), "{}", said(&report));
+}
