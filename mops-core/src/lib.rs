@@ -23,6 +23,7 @@ pub mod identification;
 mod known;
 pub mod linear;
 mod linearised;
+pub mod math;
 mod model;
 mod outcome;
 mod placement;

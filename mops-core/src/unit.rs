@@ -7,6 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 
 use crate::diagnostic::nearest;
+use crate::math;
 
 /// Exponents of the base units m, kg, s, A, K, mol, and of the decibel (a unit apart, as it is not a ratio).
 type Dimension = [i32; 7];
@@ -114,7 +115,7 @@ impl Unit {
             for (sum, exponent) in unit.dimension.iter_mut().zip(factor.dimension) {
                 *sum += sign * exponent;
             }
-            unit.factor *= factor.factor.powi(sign);
+            unit.factor *= math::powi(factor.factor, sign);
             divide = false;
             rest = after.trim_start();
         }
@@ -218,7 +219,7 @@ fn factor(text: &str) -> Option<(Unit, &str)> {
     let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '-')).unwrap_or(rest.len());
     let exponent = if end == 0 { 1 } else { rest[..end].parse::<i32>().ok().filter(|e| e.abs() < 100)? };
     unit.dimension = unit.dimension.map(|e| e * exponent);
-    unit.factor = unit.factor.powi(exponent);
+    unit.factor = math::powi(unit.factor, exponent);
     Some((unit, &rest[end..]))
 }
 

@@ -4,6 +4,7 @@ use std::sync::Mutex;
 
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::simulatedannealing::{Anneal, SATempFunc, SimulatedAnnealing};
+use mops_core::math;
 use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
 use rand_distr::{Distribution, Normal};
 use schemars::JsonSchema;
@@ -68,7 +69,7 @@ impl Solver for Annealing {
         if start.is_empty() {
             return Ok(Progress::Converged);
         }
-        let cooling = COLD.powf(1.0 / self.options.max_iterations.max(1) as f64);
+        let cooling = math::powf(COLD, 1.0 / self.options.max_iterations.max(1) as f64);
         let spacing = oracle.shape().spacing.clone();
         let [accepting, moving] =
             ["simulated-annealing", "simulated-annealing steps"].map(|label| oracle.stream(label));

@@ -10,6 +10,7 @@
 
 use std::fmt::Write;
 
+use mops_core::math;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -106,7 +107,7 @@ impl Device {
 
     /// Mass matrix and torques without friction.
     fn mass_and_force(&self, q: Vector, w: Vector) -> ([Vector; 3], Vector) {
-        let [[sf, cf], [st, ct], [sp, cp]] = q.map(|angle| [angle.sin(), angle.cos()]);
+        let [[sf, cf], [st, ct], [sp, cp]] = q.map(|angle| [math::sin(angle), math::cos(angle)]);
         let about_vertical = |[x, y, z]: Vector| [x * cf + z * sf, y, z * cf - x * sf];
         let axes = [[0.0, 1.0, 0.0], [cf, 0.0, -sf], about_vertical([0.0, -st, ct])];
         let rod = about_vertical([-sp, cp * ct, cp * st]);

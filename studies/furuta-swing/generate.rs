@@ -8,6 +8,7 @@
 
 use std::fmt::Write;
 
+use mops_core::math;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -58,7 +59,7 @@ fn advance([phi, v, theta, w]: [f64; 4]) -> [f64; 4] {
     let [a, b, c, d] = LUMPED;
     let half = 0.5 * STEP;
     let angle = theta + half * w;
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = math::sin_cos(angle);
     // Mass matrix in the order arm, pendulum, and its inverse.
     let (m11, m12, m22) = (b + a * sin * sin, c * cos, a);
     let determinant = m11 * m22 - m12 * m12;

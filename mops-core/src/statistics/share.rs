@@ -32,13 +32,14 @@ pub(super) fn at_most(hits: usize, count: usize, p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math;
 
     /// No hit: `1 - (alpha/2)^(1/n)`. Five of ten: 0.1870860, 0.8129140 (R, binom.test). 263 of 300 by the sum of the
     /// binomial distribution at the ends.
     #[test]
     fn the_interval_is_that_of_clopper_and_pearson() {
         let [low, high] = share_interval(0, 20, 0.95);
-        assert!(low == 0.0 && (high - (1.0 - 0.025_f64.powf(1.0 / 20.0))).abs() < 1e-10, "{high}");
+        assert!(low == 0.0 && (high - (1.0 - math::powf(0.025, 1.0 / 20.0))).abs() < 1e-10, "{high}");
         let [low, high] = share_interval(5, 10, 0.95);
         assert!((low - 0.187_086_0).abs() < 1e-7 && (high - 0.812_914_0).abs() < 1e-7, "{low} {high}");
         let [low, high] = share_interval(263, 300, 0.95);

@@ -2,6 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::math;
 use crate::unit::Unit;
 
 /// A parameter of models, or a tuner, that is not known exactly.
@@ -55,19 +56,19 @@ impl Distribution {
             Self::Uniform => ((x - min) / (max - min)).clamp(0.0, 1.0),
             Self::Normal { mean, deviation } => standard.cdf((x - mean) / deviation),
             Self::LogNormal { .. } if x <= 0.0 => 0.0,
-            Self::LogNormal { median, deviation } => standard.cdf((x / median).ln() / deviation),
+            Self::LogNormal { median, deviation } => standard.cdf(math::ln(x / median) / deviation),
             Self::Triangular { mode } if x <= mode => {
                 if x <= min {
                     0.0
                 } else {
-                    (x - min).powi(2) / ((max - min) * (mode - min))
+                    math::powi(x - min, 2) / ((max - min) * (mode - min))
                 }
             }
             Self::Triangular { mode } => {
                 if x >= max {
                     1.0
                 } else {
-                    1.0 - (max - x).powi(2) / ((max - min) * (max - mode))
+                    1.0 - math::powi(max - x, 2) / ((max - min) * (max - mode))
                 }
             }
         }
@@ -79,7 +80,7 @@ impl Distribution {
         match self {
             Self::Uniform => min + p * (max - min),
             Self::Normal { mean, deviation } => mean + deviation * standard(p),
-            Self::LogNormal { median, deviation } => median * (deviation * standard(p)).exp(),
+            Self::LogNormal { median, deviation } => median * math::exp(deviation * standard(p)),
             Self::Triangular { mode } => {
                 let (span, rise) = (max - min, mode - min);
                 if p * span <= rise {
@@ -136,7 +137,7 @@ mod tests {
         for (found, exact) in [
             (normal.quantile(0.841_344_746_068_542_9), 2.5),
             (normal.quantile(0.022_750_131_948_179_21), 1.0),
-            (log.quantile(0.841_344_746_068_542_9), 3.0 * 0.2_f64.exp()),
+            (log.quantile(0.841_344_746_068_542_9), 3.0 * math::exp(0.2)),
             (log.quantile(0.5), 3.0),
             (triangle.quantile(0.25), 1.0),
             (triangle.quantile(0.0625), 0.5),

@@ -26,7 +26,7 @@ impl Draw {
 
     /// Uniform in the logarithm between two positive numbers.
     pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
+        libm::exp(self.between(libm::log(low), libm::log(high)))
     }
 
     /// Standard normal.

@@ -149,7 +149,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let (turned, n, phase) = (s.plant.places[0].state(), (1 + s.below(6)) as f64, s.between(-3.0, 3.0));
             Family::up_to(0.9, move |a| {
-                let ripple = move |at: &At<'_>, u: f64| u * (1.0 + a * (n * at.x[turned] + phase).sin());
+                let ripple = move |at: &At<'_>, u: f64| u * (1.0 + a * libm::sin(n * at.x[turned] + phase));
                 (
                     Law { actuate: Some(Box::new(ripple)), ..Law::default() },
                     vec![("share", a), ("waves", n), ("phase", phase)],

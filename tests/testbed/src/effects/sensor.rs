@@ -117,7 +117,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let phase = s.between(-3.0, 3.0);
             Family::up_to(0.3, move |a| {
-                (curve(move |y| y + a * (y + phase).sin()), vec![("amplitude", a), ("phase", phase)])
+                (curve(move |y| y + a * libm::sin(y + phase)), vec![("amplitude", a), ("phase", phase)])
             })
         },
     },
