@@ -1,10 +1,10 @@
 //! Which records share a variance, and these variances by restricted maximum likelihood.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::records::Record;
 use crate::math;
+use crate::statistics::f_cdf;
 
 /// Probability below which a record contradicts the noise declared for it and for the others.
 const CONTRADICTED: f64 = 0.01;
@@ -255,11 +255,11 @@ fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usi
             let freedom: f64 = others().map(|&j| own[j].freedom).sum();
             let usual = others().map(|&j| ratio(j) * own[j].freedom).sum::<f64>() / freedom;
             let known = own[i].freedom >= SHOWN && freedom >= SHOWN && usual > 0.0;
-            let distribution = FisherSnedecor::new(own[i].freedom, freedom).ok().filter(|_| known);
-            distribution.map_or(1.0, |distribution| {
-                let below = distribution.cdf(ratio(i) / usual);
-                2.0 * below.min(1.0 - below)
-            })
+            if !known {
+                return 1.0;
+            }
+            let below = f_cdf(ratio(i) / usual, own[i].freedom, freedom);
+            2.0 * below.min(1.0 - below)
         };
         let least = kept.iter().map(|&i| (i, chance(i))).min_by(|a, b| a.1.total_cmp(&b.1));
         // Of two, which contradict each other, it is the one farther from its own.

@@ -3,8 +3,6 @@
 use mops_core::Stream;
 use mops_core::math;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rand::Rng;
-use rand_distr::StandardNormal;
 
 use super::strategy::Strategy;
 
@@ -53,7 +51,7 @@ impl Distribution {
 
     /// Steps `y = B D z` of a generation, one per column; a member is `mean + sigma y`.
     pub fn sample(&self, random: &mut Stream) -> DMatrix<f64> {
-        let mut z = DMatrix::from_fn(self.mean.len(), self.strategy.population, |_, _| random.sample(StandardNormal));
+        let mut z = DMatrix::from_fn(self.mean.len(), self.strategy.population, |_, _| math::normal(random));
         for mut column in z.column_iter_mut() {
             column.component_mul_assign(&self.lengths);
         }

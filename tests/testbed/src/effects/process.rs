@@ -1,9 +1,10 @@
 //! Flows of liquid, heat and charge.
 
+use mops_math as math;
+
 use super::{Effect, Family, processes};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
-use crate::power::powi;
 
 /// 0 degC, K.
 const ICE: f64 = 273.15;
@@ -64,11 +65,11 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             // Around: the second input in a room, else 20 degC. The range of temperatures sees little of the fourth power.
             let outdoors = s.plant.name == "room";
-            let span = 4.0 * powi(ICE + s.range.1, 3) * (s.range.1 - 10.0).abs().max(10.0);
+            let span = 4.0 * math::powi(ICE + s.range.1, 3) * (s.range.1 - 10.0).abs().max(10.0);
             Family::up_to(6.0 * s.force / span, move |k| {
                 let law = move |at: &At<'_>| {
                     let around = if outdoors { at.u[1] } else { 20.0 };
-                    -k * (powi(at.q + ICE, 4) - powi(around + ICE, 4))
+                    -k * (math::powi(at.q + ICE, 4) - math::powi(around + ICE, 4))
                 };
                 (Law { force: Some(Box::new(law)), ..Law::default() }, vec![("coefficient", k)])
             })

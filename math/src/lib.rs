@@ -6,9 +6,13 @@
 //! for exact operations (square root, fused product and sum).
 //!
 //! Errors are below 1 unit in the last place, but for `sinh`, `cosh`, `tanh` and the inverses `asinh`, `acosh` and `atanh`,
-//! at most 2 (tests/math.rs).
+//! at most 2 (tests/references.rs).
 
 pub mod complex;
+mod layers;
+mod normal;
+
+pub use normal::normal;
 
 /// Sine of an angle in rad.
 #[inline]
@@ -196,6 +200,20 @@ pub fn cbrt(x: f64) -> f64 {
 #[must_use]
 pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
+}
+
+/// Complementary error function, `2/sqrt(pi)` times the integral of `exp(-t^2)` from `x` on.
+#[inline]
+#[must_use]
+pub fn erfc(x: f64) -> f64 {
+    libm::erfc(x)
+}
+
+/// Natural logarithm of the absolute value of the gamma function.
+#[inline]
+#[must_use]
+pub fn ln_gamma(x: f64) -> f64 {
+    libm::lgamma(x)
 }
 
 /// `a * b + c`, rounded once; without such an instruction in software, which is slow.
