@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use mops::{Budget, Oracle, Problem, Run, Shipped, file};
+use mops_core::math;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const STUDIES: [&str; 3] = ["pid-design", "pid-design-multi-case", "furuta-swing"];
@@ -93,8 +94,8 @@ fn evaluate(problem: &Problem, points: &[Vec<f64>]) {
 fn points(dimension: usize) -> Vec<Vec<f64>> {
     // The positive root of g^(d + 1) = g + 1.
     #[allow(clippy::cast_precision_loss)]
-    let root = (0..60).fold(2.0_f64, |g, _| (1.0 + g).powf(1.0 / (dimension + 1) as f64));
-    let coordinate = |i: u32, j: i32| (0.5 + f64::from(i) * root.powi(-1 - j)).fract();
+    let root = (0..60).fold(2.0_f64, |g, _| math::powf(1.0 + g, 1.0 / (dimension + 1) as f64));
+    let coordinate = |i: u32, j: i32| (0.5 + f64::from(i) * math::powi(root, -1 - j)).fract();
     (0..POINTS).map(|i| (0..).take(dimension).map(|j| coordinate(i, j)).collect()).collect()
 }
 

@@ -10,6 +10,7 @@ use mops::solvers::genetic::GeneticOptions;
 use mops::solvers::pattern_search::PatternSearchOptions;
 use mops::solvers::sqp::SqpOptions;
 use mops::{Budget, Evaluation, Evaluator, Run, Shape, Solver, SolverOptions, Usage};
+use mops_core::math;
 
 const TAKES: Duration = Duration::from_millis(200);
 
@@ -30,7 +31,7 @@ impl Evaluator for Slow {
 
     fn evaluate(&self, point: &[f64]) -> Evaluation {
         sleep(TAKES);
-        let bowl = |centre: f64| point.iter().map(|u| (u - centre).powi(2)).sum::<f64>() + 1.0;
+        let bowl = |centre: f64| point.iter().map(|u| math::powi(u - centre, 2)).sum::<f64>() + 1.0;
         let scaled = vec![bowl(0.3), bowl(0.6)];
         Evaluation {
             point: point.to_vec(),

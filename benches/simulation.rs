@@ -188,13 +188,14 @@ impl<D: Dynamics<f64, State = [f64; 4]>> Sink<f64, D> for Samples {
 /// Plain arrays, one plant, one tolerance; no events, no failures, no dense output.
 mod hand_written {
     use super::{ABSOLUTE, TOLERANCE};
+    use mops_core::math;
 
     type State = [f64; 4];
 
     /// The pendulum with viscous friction under `u = 0.05 sin 4t`; states as in the model.
     fn derivative(&[a, b, c, d, ba, bp, ..]: &[f64; 8], t: f64, &[_, dphi, theta, dtheta]: &State) -> State {
-        let u = 0.05 * (4.0 * t).sin();
-        let (sin, cos) = theta.sin_cos();
+        let u = 0.05 * math::sin(4.0 * t);
+        let (sin, cos) = math::sin_cos(theta);
         let (m12, m22) = (c * cos, b + a * sin * sin);
         let f1 = a * dphi * dphi * sin * cos + d * sin - bp * dtheta;
         let f2 = c * dtheta * dtheta * sin - 2.0 * a * dtheta * dphi * sin * cos + u - ba * dphi;
@@ -211,7 +212,7 @@ mod hand_written {
     /// Root mean square of `v` in units of the tolerance at `scale`.
     fn norm(v: &State, scale: &State) -> f64 {
         let ratio = |j: usize| v[j] / (ABSOLUTE + TOLERANCE.relative * scale[j].abs());
-        ((0..4).map(|j| ratio(j).powi(2)).sum::<f64>() / 4.0).sqrt()
+        ((0..4).map(|j| math::powi(ratio(j), 2)).sum::<f64>() / 4.0).sqrt()
     }
 
     /// The state at the end, and the number of right-hand sides.
@@ -248,7 +249,7 @@ mod hand_written {
                 (71.0 / 57600.0, &k1), (-71.0 / 16695.0, &k3), (71.0 / 1920.0, &k4), (-17253.0 / 339_200.0, &k5),
                 (22.0 / 525.0, &k6), (-1.0 / 40.0, &k7)]);
             let error = norm(&difference, &std::array::from_fn(|j| x[j].abs().max(next[j].abs())));
-            let growth = error.powf(0.2 - 0.04 * 0.75);
+            let growth = math::powf(error, 0.2 - 0.04 * 0.75);
             if error > 1.0 {
                 h /= (growth / 0.9).min(5.0);
                 rejected = true;
@@ -256,7 +257,7 @@ mod hand_written {
             }
             t = if last { end } else { t + h };
             (x, k1) = (next, k7);
-            let shrink = (growth / last_error.powf(0.04) / 0.9).clamp(0.1, 5.0);
+            let shrink = (growth / math::powf(last_error, 0.04) / 0.9).clamp(0.1, 5.0);
             h /= if rejected { shrink.max(1.0) } else { shrink };
             last_error = error.max(1e-4);
             rejected = false;
@@ -269,6 +270,6 @@ mod hand_written {
         let h0 = 0.01 * d0 / d1;
         let k2 = f(h0, &combine(x, h0, [(1.0, k1)]));
         let d2 = norm(&std::array::from_fn(|j| k2[j] - k1[j]), x) / h0;
-        (100.0 * h0).min((0.01 / d1.max(d2)).powf(0.2))
+        (100.0 * h0).min(math::powf(0.01 / d1.max(d2), 0.2))
     }
 }

@@ -6,6 +6,7 @@ use criterion::Criterion;
 use mops::models::equations::{Equations, EquationsOptions};
 use mops::models::kernel::{Dynamics, IntegrationMethod, Tolerance, integrate};
 use mops::{Case, Job, Model, Scalar};
+use mops_core::math;
 
 const CELLS: usize = 100;
 /// Exchange of heat between neighbouring cells, 1/s.
@@ -28,7 +29,7 @@ impl<S: Scalar> Dynamics<S> for Rod {
             let left = if i > 0 { x[i - 1] } else { S::from(HOT) };
             let right = if i + 1 < CELLS { x[i + 1] } else { x[i] };
             let square = x[i] * x[i];
-            dx[i] = (left - x[i] * 2.0 + right) * EXCHANGE - (square * square - COLD.powi(4)) * RADIATION;
+            dx[i] = (left - x[i] * 2.0 + right) * EXCHANGE - (square * square - math::powi(COLD, 4)) * RADIATION;
         }
     }
 

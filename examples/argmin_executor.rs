@@ -1,6 +1,7 @@
 //! A solver of mops under argmin's executor: a problem with argmin's traits, a box, and CMA-ES with its restarts.
 
 use argmin::core::{CostFunction, Error, Executor, State};
+use mops::math;
 use mops::solvers::cma_es::CmaEsOptions;
 use mops::solvers::for_argmin::Driven;
 
@@ -12,7 +13,7 @@ impl CostFunction for Rastrigin {
     type Output = f64;
 
     fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
-        Ok(x.iter().map(|x| x * x + 10.0 * (1.0 - (std::f64::consts::TAU * x).cos())).sum())
+        Ok(x.iter().map(|x| x * x + 10.0 * (1.0 - math::cos(std::f64::consts::TAU * x))).sum())
     }
 }
 

@@ -11,6 +11,7 @@ use mops::{
 };
 
 use function::{End, Function};
+use mops_core::math;
 
 /// A study of `f` over the box [-2, 2]^n, starting at 1.5, with a usage for every value.
 fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
@@ -121,13 +122,13 @@ const MINIMISE: &[Usage] = &[Usage::Minimise, Usage::Minimise];
 /// Two parabolas that meet at a kink: max is least at (0.5, 0), where it is 1.25.
 fn kink(x: &[f64]) -> Option<Vec<f64>> {
     let rest: f64 = x[1..].iter().map(|x| x * x).sum();
-    Some(vec![x[0].powi(2) + rest + 1.0, (x[0] - 1.0).powi(2) + rest + 1.0])
+    Some(vec![math::powi(x[0], 2) + rest + 1.0, math::powi(x[0] - 1.0, 2) + rest + 1.0])
 }
 
 /// A smooth criterion that is least where [`kink`] is, and has the same value there.
 fn bowl(x: &[f64]) -> Option<Vec<f64>> {
     let rest: f64 = x[1..].iter().map(|x| x * x).sum();
-    Some(vec![(x[0] - 0.5).powi(2) + rest + 1.25])
+    Some(vec![math::powi(x[0] - 0.5, 2) + rest + 1.25])
 }
 
 /// One criterion alone, with every kind of solver that accepts it.
@@ -318,7 +319,7 @@ fn every_solver_fits_a_line_as_the_normal_equations_do() {
     let (n, t, tt, y, ty) = (30.0, sum(&|t, _| t), sum(&|t, _| t * t), sum(&|_, y| y), sum(&|t, y| t * y));
     let slope = (n * ty - t * y) / (n * tt - t * t);
     let offset = (y - slope * t) / n;
-    let least = sum(&|t, y| (slope * t + offset - y).powi(2));
+    let least = sum(&|t, y| math::powi(slope * t + offset - y, 2));
     for kind in solvers(&problem) {
         let best = solve(&problem, &kind, 5000, &()).best;
         assert!(best.merit.objective <= least * 1.001, "{}: {} {least}", kind.name, best.merit.objective);
@@ -357,7 +358,7 @@ fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
 fn whole_numbers_and_few_of_them_end_at_the_best() {
     // The least of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
     let whole = [Objective::Max, Objective::Each].map(|objective| {
-        let mut whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![(x[0] - 1.3).powi(2)]));
+        let mut whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
         whole.tuners[0].grid = mops::Grid::Integer;
         whole.tuners[0].start = -2.0;
         Problem::new(Arc::new(whole))
@@ -385,7 +386,7 @@ fn the_front_of_a_run_has_no_point_that_another_is_better_than() {
         let better = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a <= b) && a != b;
         assert!(front.iter().all(|a| !front.iter().any(|b| better(b, a))), "{}", kind.name);
         // On the true front f1 = (sqrt(f0 - 1) - 1)^2 + 1.
-        let off = |f: &&[f64]| f[1] - ((f[0] - 1.0).max(0.0).sqrt() - 1.0).powi(2) - 1.0;
+        let off = |f: &&[f64]| f[1] - math::powi((f[0] - 1.0).max(0.0).sqrt() - 1.0, 2) - 1.0;
         let mean = front.iter().map(off).sum::<f64>() / front.len() as f64;
         assert!(mean < 0.01, "{}: {mean}", kind.name);
         assert!(front.iter().all(|f| f[0] >= 1.16 - 1e-5), "{}: the constraint holds", kind.name);

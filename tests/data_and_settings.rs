@@ -1,6 +1,7 @@
 //! Bare numbers of channels, and settings of the command line that are no TOML.
 
 use assert_cmd::cargo::cargo_bin_cmd;
+use mops_core::math;
 use serde_json::Value;
 
 const STUDY: &str = r#"
@@ -26,7 +27,7 @@ fn run(noise: &str, settings: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let row = |i: i32| {
         let t = 0.05 * f64::from(i);
-        format!("{t},{}\n", (0.5 * (-0.8 * t).exp()).to_degrees() + if i % 2 == 0 { 0.2 } else { -0.2 })
+        format!("{t},{}\n", (0.5 * math::exp(-0.8 * t)).to_degrees() + if i % 2 == 0 { 0.2 } else { -0.2 })
     };
     let table = format!("t,th[deg]\n{}", (0..=60).map(row).collect::<String>());
     std::fs::write(folder.path().join("e.csv"), table).unwrap();

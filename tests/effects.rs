@@ -6,6 +6,7 @@ use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::{EffectDraft, ModelDraft};
+use mops_core::math;
 use serde_json::Value;
 
 /// A torsion pendulum, `w'' = -4 th`, with what the tests put under `effects` and `tuners`.
@@ -42,7 +43,7 @@ fn swing(c: f64, t: f64) -> f64 {
     let half = (t * angular / PI).floor();
     let sign = if half % 2.0 == 0.0 { 1.0 } else { -1.0 };
     let amplitude = 0.5 - (2.0 * half + 1.0) * offset;
-    sign * offset + amplitude * (angular * t).cos()
+    sign * offset + amplitude * math::cos(angular * t)
 }
 
 /// Runs the study on a recording with dry friction 0.15 N m; the result.

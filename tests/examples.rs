@@ -1,5 +1,7 @@
 //! The examples run, and give what they say.
 
+use mops_core::math;
+
 #[path = "../examples/own_study.rs"]
 mod own_study;
 
@@ -87,7 +89,7 @@ impl mops::file::Files for AnyRecording {
     fn read(&self, _: &str) -> std::io::Result<Vec<u8>> {
         let row = |i: u32| {
             let t = f64::from(i) * 0.05;
-            format!("{t},{},{},{},{}\n", t.cos(), t.sin(), (2.0 * t).sin(), (3.0 * t).cos())
+            format!("{t},{},{},{},{}\n", math::cos(t), math::sin(t), math::sin(2.0 * t), math::cos(3.0 * t))
         };
         let rows: String = (0..=800).map(row).collect();
         Ok(format!("time,phi,theta,position,torque\n{rows}").into_bytes())

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::front::hypervolume;
+use mops_core::math;
 use serde_json::Value;
 
 /// Settling time, s, and overshoot of points of the front of the PID design: an independent computation with SciPy, the
@@ -66,7 +67,7 @@ fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
             |[settling, overshoot]: &&[f64; 2]| *settling < known[0] * 0.999 && *overshoot < known[1] * 0.999 - PRINTED;
         assert_eq!(front.iter().find(better), None, "{known:?}");
         // A point of the front lies near it, as near as thirty points can.
-        let near = |p: &[f64; 2]| ((p[0] - known[0]) / 27.0).hypot((p[1] - known[1]) / 0.43);
+        let near = |p: &[f64; 2]| math::hypot((p[0] - known[0]) / 27.0, (p[1] - known[1]) / 0.43);
         assert!(front.iter().map(near).fold(1.0, f64::min) < 0.05, "{known:?}");
     }
     let reference = [30.0, 0.5];

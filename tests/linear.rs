@@ -4,6 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin_cmd;
+use mops_core::math;
 use serde_json::Value;
 
 fn mops(arguments: &[&str]) -> Command {
@@ -131,11 +132,11 @@ fn a_lag_with_delay_is_identified_from_its_frequency_response() {
     let (k, t, l) = (3.0, 0.5, 0.2);
     let mut data = "f [Hz],magnitude [dB],phase [deg]\n".to_owned();
     for i in 0..30 {
-        let f = 0.05 * 1.15f64.powi(i);
+        let f = 0.05 * math::powi(1.15, i);
         let w = std::f64::consts::TAU * f;
-        let size: f64 = k / (1.0 + (w * t).powi(2)).sqrt();
-        let phase = (-(w * t).atan() - w * l).to_degrees();
-        data += &format!("{f},{},{phase}\n", 20.0 * size.log10());
+        let size: f64 = k / (1.0 + math::powi(w * t, 2)).sqrt();
+        let phase = (-math::atan(w * t) - w * l).to_degrees();
+        data += &format!("{f},{},{phase}\n", 20.0 * math::log10(size));
     }
     std::fs::write(folder.path().join("sweep.csv"), data).unwrap();
     let text = "

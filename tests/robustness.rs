@@ -16,6 +16,7 @@ use mops::{
 use serde_json::Value as Json;
 
 use function::{End, Function};
+use mops_core::math;
 
 fn end(i: usize, demand: f64, usage: Usage) -> (String, CriterionDraft) {
     (format!("c{i}"), CriterionDraft::minimise(End(format!("f{i}")), demand).used_as(usage))
@@ -84,7 +85,7 @@ fn cases_that_are_the_same_without_their_uncertain_values_are_searched_once() {
 fn worst_cases_are_where_closed_forms_have_them() {
     let f = |p: &[f64]| {
         let [t, x, y] = [p[0], p[1], p[2]];
-        let bump = |a: f64, b: f64| (-20.0 * ((x - a).powi(2) + (y - b).powi(2))).exp();
+        let bump = |a: f64, b: f64| math::exp(-20.0 * (math::powi(x - a, 2) + math::powi(y - b, 2)));
         Some(vec![3.0 * x - 2.0 * y + t, bump(0.3, -0.2) + 0.6 * bump(-0.6, 0.5), x, 2.0 + y])
     };
     let mut criteria = vec![
@@ -190,7 +191,7 @@ fn samples_that_fail_do_not_meet_a_demand() {
 /// `min over t of max over x0 of (t - x0)^2`: t = 0, and 1 at both ends; nominally t = 0.5 would do with 0.
 #[test]
 fn a_design_against_the_worst_cases_stands_in_the_middle_of_the_box() {
-    let f = |p: &[f64]| Some(vec![(p[0] - p[1]).powi(2) + 0.1 * p[2].powi(2)]);
+    let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + 0.1 * math::powi(p[2], 2)]);
     let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
     draft.tasks.robust = Some(RobustTask::default());
     let study = draft.build().unwrap();
@@ -206,7 +207,7 @@ fn a_design_against_the_worst_cases_stands_in_the_middle_of_the_box() {
     // What is reported is the worst that was found, not what the design was made for.
     assert!((solved.outcome.worst_scaled - round.found).abs() < 2e-3);
     // An independent look at the whole box.
-    let worst = (0..=100).map(|i| (t - (-1.0 + 0.02 * f64::from(i))).powi(2) + 0.1).fold(0.0, f64::max);
+    let worst = (0..=100).map(|i| math::powi(t - (-1.0 + 0.02 * f64::from(i)), 2) + 0.1).fold(0.0, f64::max);
     assert!(worst <= round.found + 1e-9, "{worst} {}", round.found);
 }
 
@@ -235,7 +236,7 @@ fn effects_of_an_additive_criterion_are_its_slopes() {
 
 #[test]
 fn thread_count_does_not_change_a_single_bit() {
-    let f = |p: &[f64]| Some(vec![(p[0] - p[1]).powi(2) + (3.0 * p[2]).sin()]);
+    let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + math::sin(3.0 * p[2])]);
     for (task, robust) in [(Task::WorstCase, false), (Task::MonteCarlo, false), (Task::Design, true)] {
         let results: Vec<Json> = [1, 2, 3]
             .map(|jobs| {
@@ -298,7 +299,7 @@ fn fitted_line(task: UncertaintyTask) -> Fitted {
     let determinant = n * stt - st * st;
     let inverse = [[stt / determinant, -st / determinant], [-st / determinant, n / determinant]];
     let estimates = [inverse[0][0] * sy + inverse[0][1] * sty, inverse[1][0] * sy + inverse[1][1] * sty];
-    let variance = sum(&|t, y| (y - estimates[0] - estimates[1] * t).powi(2)) / (n - 2.0);
+    let variance = sum(&|t, y| math::powi(y - estimates[0] - estimates[1] * t, 2)) / (n - 2.0);
     let channel =
         ChannelDraft { signal: "y".into(), times, values, noise: Some(0.1.into()), ..ChannelDraft::default() };
     let interface = Interface {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin_cmd;
+use mops_core::math;
 use serde_json::Value;
 
 fn mops(arguments: &[&str]) -> Command {
@@ -42,7 +43,7 @@ fn recording() -> String {
         let t = f64::from(i) / 100.0;
         let (u, now) = (f64::from(2 * bit) - 1.0, 1.5 * y[0] - 0.7 * y[1] + before[0] + 0.5 * before[1]);
         let pulse = u8::from(i == 200);
-        let (step, sine, five) = (u8::from(i >= 300), t.sin(), [1.0, -0.3, 0.7, 2.0, 0.1][i as usize % 5]);
+        let (step, sine, five) = (u8::from(i >= 300), math::sin(t), [1.0, -0.3, 0.7, 2.0, 0.1][i as usize % 5]);
         text += &format!("{t},{pulse},{step},{sine},{five},{u},{now}\n");
         (before, y) = ([u, before[0]], [now, y[0]]);
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
+use mops::math;
 use serde_json::Value;
 
 fn mops(folder: &Path, arguments: &[&str]) -> (i32, String) {
@@ -46,7 +47,7 @@ fn the_angle_of_a_motor_that_runs_out_is_the_integral_of_its_speed() {
         )
     };
     let found = values(&text("final-value = { signal = 'x' }, demand = '10 rad'"), "");
-    assert!((found[0].1 - 600.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-5, "{found:?}");
+    assert!((found[0].1 - 600.0 * (1.0 - math::exp(-1.0))).abs() < 1e-5, "{found:?}");
     assert_eq!(found[0].2, "deg");
 }
 
@@ -103,7 +104,7 @@ fn recorded_temperatures_are_converted_and_their_noise_is_a_difference() {
     let data = |unit: &str, factor: f64, zero: f64| {
         let row = |k: i32| {
             let t = 10.0 * f64::from(k);
-            format!("{t},{}\n", (20.5 + 60.0 * (-0.01 * t).exp()) * factor + zero)
+            format!("{t},{}\n", (20.5 + 60.0 * math::exp(-0.01 * t)) * factor + zero)
         };
         format!("t [s],T [{unit}]\n{}", (0..20).map(row).collect::<String>())
     };

@@ -89,6 +89,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::math;
     use std::f64::consts::TAU;
 
     use super::*;
@@ -96,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_sinusoid_about_its_resting_value_has_the_effort_of_a_sinusoid() {
-        let period = simulated(TAU, |t| 2.0 + 3.0 * t.sin());
+        let period = simulated(TAU, |t| 2.0 + 3.0 * math::sin(t));
         let square =
             ControlEffort { signal: "u".into(), offset: Some(quantity("2000 mV")), ..ControlEffort::default() };
         assert_near(value(&square, &period).number, 4.5 * TAU, 1e-10);
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn without_an_offset_the_signal_itself_is_integrated() {
-        let decay = simulated(30.0, |t| -2.0 * (-t).exp());
+        let decay = simulated(30.0, |t| -2.0 * math::exp(-t));
         let effort = |of| value(&ControlEffort { signal: "u".into(), of, offset: None }, &decay).number;
         assert_near(effort(Effort::Square), 2.0, 1e-12);
         assert_near(effort(Effort::Absolute), 2.0, 1e-12);

@@ -1,6 +1,7 @@
 //! Smallest damping ratio of all poles.
 
 use mops_core::linear::Complex;
+use mops_core::math::complex;
 use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,7 +39,7 @@ impl CriterionSpec for DampingRatio {
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
         let of = self.of;
-        let damping = |p: &Complex| if p.norm() == 0.0 { 0.0 } else { -p.re / p.norm() };
+        let damping = |p: &Complex| if complex::norm(*p) == 0.0 { 0.0 } else { -p.re / complex::norm(*p) };
         let value = move |system| Ok(poles(&system, of)?.iter().map(damping).fold(1.0, f64::min).into());
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::one(), Sense::More).within(-1.0, 1.0), value))
     }

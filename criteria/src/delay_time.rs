@@ -88,6 +88,7 @@ impl Criterion for Bound {
 #[cfg(test)]
 mod tests {
     use mops_core::Missed;
+    use mops_core::math;
 
     use super::*;
     use crate::common::testing::{assert_near, mistake, simulated, value};
@@ -98,18 +99,18 @@ mod tests {
 
     #[test]
     fn a_first_order_lag_is_half_way_after_its_half_life() {
-        let lag = simulated(20.0, |t| 1.0 - (-t / 3.0).exp());
-        assert_near(value(&delay(), &lag).number, 3.0 * 2f64.ln(), 1e-10);
+        let lag = simulated(20.0, |t| 1.0 - math::exp(-t / 3.0));
+        assert_near(value(&delay(), &lag).number, 3.0 * math::ln(2.0), 1e-10);
         let level = DelayTime { level: Some(0.632.into()), ..delay() };
-        assert_near(value(&level, &lag).number, -3.0 * 0.368f64.ln(), 1e-10);
+        assert_near(value(&level, &lag).number, -3.0 * math::ln(0.368), 1e-10);
     }
 
     #[test]
     fn a_response_that_does_not_get_there_is_noted() {
-        let low = simulated(7.0, |t| 0.4 * (1.0 - (-t).exp()));
+        let low = simulated(7.0, |t| 0.4 * (1.0 - math::exp(-t)));
         let missed = value(&delay(), &low);
         // 0.1 below the level, and a little more as it has not arrived.
-        let rest = 0.4 * ((-6.3_f64).exp() - (-7.0_f64).exp()) / 0.7;
+        let rest = 0.4 * (math::exp(-6.3) - math::exp(-7.0)) / 0.7;
         assert_near(missed.number, 7.0 * (1.0 + (0.1 + rest) / (0.11 + rest)), 1e-9);
         assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(7.0) }), Some("level not reached")));
     }

@@ -54,11 +54,12 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, mistake, simulated, value};
+    use mops_core::math;
 
     #[test]
     fn the_value_at_the_end_is_that_of_the_curve() {
         let last = FinalValue { signal: "u".into() };
-        assert_near(value(&last, &simulated(4.0, f64::cos)).number, 4f64.cos(), 1e-14);
+        assert_near(value(&last, &simulated(4.0, math::cos)).number, math::cos(4.0), 1e-14);
         assert_eq!((bound(&last).unit(), bound(&last).signals()), (Unit::known("V"), vec!["u".to_owned()]));
     }
 

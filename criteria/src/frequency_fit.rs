@@ -98,6 +98,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::math::complex;
     use mops_core::{Experiment, ResponseData};
 
     use super::*;
@@ -129,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_phase_error_counts_as_much_as_one_of_the_magnitude() {
-        let turned = measured(|w| lag(w) * Complex::from_polar(1.0, 1e-3));
+        let turned = measured(|w| lag(w) * complex::from_polar(1.0, 1e-3));
         let larger = measured(|w| lag(w) * (1.0 + 1e-3));
         let at = |case: &Case| value_in(case, &fit(), &linear(&[3.0], &[1.0, 2.0])).number;
         assert_near(at(&turned) / at(&larger), 1.0, 3e-3);

@@ -74,6 +74,7 @@ impl Criterion for Bound {
 #[cfg(test)]
 mod tests {
     use mops_core::Trace;
+    use mops_core::math;
 
     use super::*;
     use crate::common::testing::{analysis, assert_near, bound, simulated, undefined, value};
@@ -84,8 +85,8 @@ mod tests {
 
     #[test]
     fn the_largest_rate_is_that_of_the_curve_whichever_its_sign() {
-        assert_near(value(&rate(), &simulated(9.0, |t| 2.0 * (3.0 * t).sin())).number, 6.0, 1e-8);
-        assert_near(value(&rate(), &simulated(9.0, |t| 5.0 * (-2.0 * t).exp())).number, 10.0, 1e-6);
+        assert_near(value(&rate(), &simulated(9.0, |t| 2.0 * math::sin(3.0 * t))).number, 6.0, 1e-8);
+        assert_near(value(&rate(), &simulated(9.0, |t| 5.0 * math::exp(-2.0 * t))).number, 10.0, 1e-6);
         assert_eq!(bound(&rate()).unit(), Unit::known("m/s"));
     }
 

@@ -1,5 +1,6 @@
 //! Distance of a step response from that of a reference model.
 
+use mops_core::math;
 use mops_core::{
     Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
 };
@@ -104,20 +105,20 @@ impl Reference {
     /// The unit step response.
     fn response(&self, t: f64) -> f64 {
         match *self {
-            Self::First { time_constant } => -(-t / time_constant).exp_m1(),
+            Self::First { time_constant } => -math::exp_m1(-t / time_constant),
             Self::Second { frequency, damping } if damping < 1.0 => {
                 let damped = frequency * (1.0 - damping * damping).sqrt();
-                let (sin, cos) = (damped * t).sin_cos();
-                1.0 - (-damping * frequency * t).exp() * (cos + damping * frequency / damped * sin)
+                let (sin, cos) = math::sin_cos(damped * t);
+                1.0 - math::exp(-damping * frequency * t) * (cos + damping * frequency / damped * sin)
             }
             Self::Second { frequency, damping } => {
                 // exp(-z w t) (cosh(b t) + z w sinh(b t)/b) with b = w sqrt(z^2 - 1), in a form that neither overflows
                 // nor cancels where b is 0.
                 let b = frequency * (damping * damping - 1.0).sqrt();
                 let slow = frequency / (damping + (damping * damping - 1.0).sqrt());
-                let sinh_over_b = if b > 0.0 { -(-2.0 * b * t).exp_m1() / (2.0 * b) } else { t };
-                let cosh = 0.5 * (1.0 + (-2.0 * b * t).exp());
-                1.0 - (-slow * t).exp() * (cosh + damping * frequency * sinh_over_b)
+                let sinh_over_b = if b > 0.0 { -math::exp_m1(-2.0 * b * t) / (2.0 * b) } else { t };
+                let cosh = 0.5 * (1.0 + math::exp(-2.0 * b * t));
+                1.0 - math::exp(-slow * t) * (cosh + damping * frequency * sinh_over_b)
             }
         }
     }
@@ -215,13 +216,13 @@ mod tests {
 
     #[test]
     fn a_response_equal_to_its_reference_is_at_no_distance() {
-        assert_near(value(&first(2.0), &simulated(10.0, |t| 1.0 - (-t / 2.0).exp())).number, 0.0, 1e-12);
+        assert_near(value(&first(2.0), &simulated(10.0, |t| 1.0 - math::exp(-t / 2.0))).number, 0.0, 1e-12);
         let oscillation = second_order_reference("1 rad/s", 0.3);
         assert_near(value(&oscillation, &simulated(30.0, second_order(0.3))).number, 0.0, 1e-12);
         // Critical damping, and poles at 1 and 4 rad/s: frequency 2, damping 1.25; downwards, 3 s late.
-        let critical = simulated(20.0, |t| 1.0 - (1.0 + 2.0 * t) * (-2.0 * t).exp());
+        let critical = simulated(20.0, |t| 1.0 - (1.0 + 2.0 * t) * math::exp(-2.0 * t));
         assert_near(value(&second_order_reference("2 rad/s", 1.0), &critical).number, 0.0, 1e-12);
-        let two_poles = |t: f64| 1.0 - (4.0 * (-t).exp() - (-4.0 * t).exp()) / 3.0;
+        let two_poles = |t: f64| 1.0 - (4.0 * math::exp(-t) - math::exp(-4.0 * t)) / 3.0;
         let down = simulated(20.0, |t| if t < 3.0 { 7.0 } else { 7.0 - 2.0 * two_poles(t - 3.0) });
         let overdamped = ModelTracking {
             target: 5.0.into(),
@@ -242,7 +243,7 @@ mod tests {
         let [a, b, length] = [100.0f64, 0.01, 3000.0];
         let still = analysis(&sampled(length, 1, |_| 1.0));
         let apart = second_order_reference("1 rad/s", 0.5 * (a + b));
-        let integral = (a * a / (2.0 * b) - 2.0 * a * b / (a + b) + b * b / (2.0 * a)) / (a - b).powi(2);
+        let integral = (a * a / (2.0 * b) - 2.0 * a * b / (a + b) + b * b / (2.0 * a)) / math::powi(a - b, 2);
         assert_near(value(&apart, &still).number, (integral / length).sqrt(), 1e-11);
         // (1 - y_ref)^2 of damping z integrates to (1 + 4 z^2)/(4 z w).
         let ringing = second_order_reference("20 rad/s", 0.1);

@@ -92,6 +92,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::math;
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
@@ -100,11 +101,11 @@ mod tests {
     #[test]
     fn the_peaks_of_a_decaying_oscillation_are_those_of_the_curve() {
         // exp(-t) sin(t) peaks at pi/4, then at pi/4 + pi.
-        let swing = simulated(10.0, |t| (-t).exp() * t.sin());
+        let swing = simulated(10.0, |t| math::exp(-t) * math::sin(t));
         let peak = |of| value(&Peak { signal: "y".into(), of }, &swing).number;
-        let highest = (-0.5 * FRAC_PI_2).exp() * 0.5f64.sqrt();
+        let highest = math::exp(-0.5 * FRAC_PI_2) * 0.5f64.sqrt();
         assert_near(peak(Extremum::Maximum), highest, 1e-13);
-        assert_near(peak(Extremum::Minimum), -highest * (-2.0 * FRAC_PI_2).exp(), 1e-13);
+        assert_near(peak(Extremum::Minimum), -highest * math::exp(-2.0 * FRAC_PI_2), 1e-13);
         assert_near(peak(Extremum::Absolute), highest, 1e-13);
     }
 

@@ -47,13 +47,14 @@ impl CriterionSpec for PhaseMargin {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, linear, linear_delayed, value};
+    use mops_core::math;
 
     #[test]
     fn the_margin_of_the_second_order_loop_has_its_closed_form() {
         // w^2/(s (s + 2 z w)): atan(2 z/sqrt(sqrt(1 + 4 z^4) - 2 z^2)).
         for z in [0.1f64, 0.5, 0.9] {
             let margin = value(&PhaseMargin::default(), &linear(&[9.0], &[1.0, 6.0 * z, 0.0])).number;
-            let exact = (2.0 * z / ((1.0 + 4.0 * z.powi(4)).sqrt() - 2.0 * z * z).sqrt()).atan();
+            let exact = math::atan(2.0 * z / ((1.0 + 4.0 * math::powi(z, 4)).sqrt() - 2.0 * z * z).sqrt());
             assert_near(margin, exact, 1e-11);
         }
     }

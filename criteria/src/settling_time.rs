@@ -138,6 +138,7 @@ fn last_outside(trace: &Trace, low: f64, high: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use mops_core::Missed;
+    use mops_core::math;
 
     use super::*;
     use crate::common::testing::{analysis, assert_near, mistake, quantity, second_order, simulated, value};
@@ -153,12 +154,12 @@ mod tests {
 
     #[test]
     fn a_first_order_lag_settles_after_the_logarithm_of_the_band() {
-        let lag = simulated(40.0, |t| 1.0 - (-t / 3.0).exp());
-        assert_near(value(&settling(0.01), &lag).number, 3.0 * 100f64.ln(), 1e-9);
+        let lag = simulated(40.0, |t| 1.0 - math::exp(-t / 3.0));
+        assert_near(value(&settling(0.01), &lag).number, 3.0 * math::ln(100.0), 1e-9);
         let by_default = SettlingTime { band: None, ..settling(1.0) };
-        assert_near(value(&by_default, &lag).number, 3.0 * 50f64.ln(), 1e-9);
+        assert_near(value(&by_default, &lag).number, 3.0 * math::ln(50.0), 1e-9);
         let percent = SettlingTime { relative_band: Some(quantity("5 %")), ..by_default };
-        assert_near(value(&percent, &lag).number, 3.0 * 20f64.ln(), 1e-9);
+        assert_near(value(&percent, &lag).number, 3.0 * math::ln(20.0), 1e-9);
     }
 
     #[test]
@@ -192,9 +193,9 @@ mod tests {
 
     #[test]
     fn a_response_outside_the_band_at_the_end_has_not_settled() {
-        let lag = simulated(4.0, |t| 1.0 - (-t).exp());
+        let lag = simulated(4.0, |t| 1.0 - math::exp(-t));
         // Mean distance over the last tenth of the time from the step.
-        let mean = |tenth: f64| ((tenth - 4.0).exp() - (-4.0_f64).exp()) / tenth;
+        let mean = |tenth: f64| (math::exp(tenth - 4.0) - math::exp(-4.0)) / tenth;
         let exact = |length: f64| length * (1.0 + mean(0.1 * length) / (mean(0.1 * length) + 0.01));
         let missed = value(&settling(0.01), &lag);
         assert_near(missed.number, exact(4.0), 1e-9);
@@ -206,9 +207,9 @@ mod tests {
 
     #[test]
     fn the_time_counts_from_the_step() {
-        let late = simulated(30.0, |t| if t < 2.0 { 0.0 } else { 1.0 - (2.0 - t).exp() });
+        let late = simulated(30.0, |t| if t < 2.0 { 0.0 } else { 1.0 - math::exp(2.0 - t) });
         let settling = SettlingTime { step_time: Some(2.0.into()), ..settling(0.1) };
-        assert_near(value(&settling, &late).number, 10f64.ln(), 1e-10);
+        assert_near(value(&settling, &late).number, math::ln(10.0), 1e-10);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::io;
 
 use mops_core::file::{Files, describe, read};
+use mops_core::math;
 use mops_core::{
     Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Mistake, Model, ModelKind, ModelOptions, Problem,
     Response, Solver, SolverKind, SolverOptions, Trace, Variable,
@@ -171,7 +172,8 @@ impl Model for LagModel {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let trace: Trace = crate::common::testing::sampled(job.horizon, 500, |t| 1.0 - (-t / job.parameters[0]).exp());
+        let trace: Trace =
+            crate::common::testing::sampled(job.horizon, 500, |t| 1.0 - math::exp(-t / job.parameters[0]));
         Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
     }
 }

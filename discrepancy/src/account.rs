@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use mops_core::Role;
+use mops_core::math;
 
 use crate::candidate::Candidate;
 use crate::diagnosis::{Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked, StrengthValue};
@@ -45,7 +46,7 @@ pub fn ranking<'a>(
     #[allow(clippy::cast_precision_loss)]
     let candidates = round.screened.len().max(1) as f64;
     let nothing = criteria[0] + gained(search, &round.from, best);
-    criteria.push(nothing - 2.0 * candidates.ln());
+    criteria.push(nothing - 2.0 * math::ln(candidates));
     let probabilities = probabilities(&criteria);
     let one = |k: usize| ranked(round, k, probabilities[k], nothing - criteria[k]);
     let mut all: Vec<Ranked> = (0..round.trials.len()).filter_map(one).collect();

@@ -1,5 +1,6 @@
 //! The fit of the model as declared: by windows that grow to the whole record, from several starts.
 
+use mops_core::math;
 use mops_core::{Role, Stream, stream};
 use rand::Rng;
 
@@ -120,7 +121,7 @@ pub fn fit(subject: &Subject, seed: u64, simulations: &Meter<'_>) -> Option<Fitt
 fn around(start: &[f64], globals: &[Global], random: &mut Stream) -> Vec<f64> {
     let one = |(global, &value): (&Global, &f64)| {
         let by: f64 = random.random_range(-0.7..0.7);
-        let moved = if global.log { value * by.exp() } else { value + by * global.scale };
+        let moved = if global.log { value * math::exp(by) } else { value + by * global.scale };
         moved.clamp(global.bounds[0], global.bounds[1])
     };
     globals.iter().zip(start).map(one).collect()

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Mistake, Role, Study};
 use rayon::prelude::*;
 
@@ -58,7 +59,7 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
             let fitted = fit.solve(start, ITERATIONS)?;
             let unknowns = |point: &Point| point.globals.len() + point.locals.iter().map(Vec::len).sum::<usize>();
             let more = unknowns(&fitted.point) - unknowns(&declared.point);
-            Some(fitted.chi2 - declared.chi2 + more as f64 * (fitted.count as f64).ln())
+            Some(fitted.chi2 - declared.chi2 + more as f64 * math::ln(fitted.count as f64))
         })
         .collect();
     let mut best = BruteForce { best: None, bic: 0.0, refits: refitted.iter().flatten().count(), simulations: 0 };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
 
 use crate::gap::Gap;
@@ -200,7 +201,7 @@ impl Sizes {
 
     /// The typical size of a strength.
     pub fn of(&self, dimension: Dimension) -> f64 {
-        let power = |size: f64, n: i8| size.powi(n.into());
+        let power = |size: f64, n: i8| math::powi(size, n.into());
         power(self.output, dimension.output)
             * power(self.position, dimension.position)
             * power(self.speed, dimension.speed)

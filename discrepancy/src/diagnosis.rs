@@ -1,6 +1,7 @@
 //! What a diagnosis gives: the block `diagnosis` of `result.json`, and what its report shows.
 
 use mops_core::Role;
+use mops_core::math;
 use serde::Serialize;
 
 use crate::stability::Stability;
@@ -154,7 +155,7 @@ pub struct ExperimentError {
 /// Error on the experiments of a role together, the root of their mean square, in units of the noise; `None` where there are none.
 #[allow(clippy::cast_precision_loss)]
 pub fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
-    let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| e.normalised.powi(2)).collect();
+    let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| math::powi(e.normalised, 2)).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 

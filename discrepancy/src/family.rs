@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::gaussian::{joined, matern};
+use mops_core::math;
 
 /// What a signal is a function of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,8 +126,8 @@ impl Family {
             // Friction jumps where the speed changes its sign: an even number of knots, dense about 0.
             let side = SPEEDS / 2;
             let shares = (1..=side).map(|k| f64::from(2 * k - 1) / f64::from(2 * side - 1));
-            let back = shares.clone().rev().map(|s| (low * s.powf(1.7), -0.5 * s));
-            back.chain(shares.map(|s| (high * s.powf(1.7), 0.5 * s))).unzip()
+            let back = shares.clone().rev().map(|s| (low * math::powf(s, 1.7), -0.5 * s));
+            back.chain(shares.map(|s| (high * math::powf(s, 1.7), 0.5 * s))).unzip()
         } else {
             let count = if over == Over::Time { TIMES } else { KNOTS };
             let shares = (0..count).map(|k| f64::from(k) / f64::from(count - 1));
@@ -254,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_thinned_table_keeps_its_ends_and_its_points_where_it_bends() {
-        let bump = |x: f64| (-((x - 0.3) / 0.1).powi(2)).exp();
+        let bump = |x: f64| math::exp(-math::powi((x - 0.3) / 0.1, 2));
         let table: Vec<[f64; 2]> = (0..=40).map(|k| f64::from(k) / 40.0).map(|x| [x, bump(x)]).collect();
         let few = thinned(table);
         assert_eq!((few.len(), few[0][0], few[14][0]), (15, 0.0, 1.0));

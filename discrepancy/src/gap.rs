@@ -57,13 +57,14 @@ pub fn gap(values: &[f64], noise: f64) -> Option<Gap> {
 mod tests {
     use super::*;
     use crate::testing::white;
+    use mops_core::math;
 
     const NOISE: f64 = 1e-3;
 
     /// A wave through a sensor with a gap about 0.2, sampled evenly over its phase: by the golden angle.
     fn wave(half_width: f64) -> Vec<f64> {
         let shown = |y: f64| if (y - 0.2).abs() < half_width { 0.2 } else { y };
-        let of = |(k, e): (usize, f64)| shown((3.883222 * k as f64).sin()) + e;
+        let of = |(k, e): (usize, f64)| shown(math::sin(3.883222 * k as f64)) + e;
         white("gap", NOISE, 5000).into_iter().enumerate().map(of).collect()
     }
 

@@ -4,6 +4,7 @@
 //! Source: D. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415 (evidence, effective number of parameters); C. Rasmussen,
 //! C. Williams, Gaussian Processes for Machine Learning (2006), equation 4.17 (Matern covariance) and section 5.4.
 
+use mops_core::math;
 use nalgebra::linalg::SymmetricTridiagonal;
 use nalgebra::{DMatrix, DVector};
 
@@ -69,7 +70,7 @@ impl Normals {
             let (q, diagonal, off) = SymmetricTridiagonal::new(matrix).unpack();
             (diagonal, off, q.tr_mul(&pull))
         };
-        let of = |exponent: f64| self.likelihood(&diagonal, &off, &pull, 10.0_f64.powf(exponent) / trace);
+        let of = |exponent: f64| self.likelihood(&diagonal, &off, &pull, math::powf(10.0, exponent) / trace);
         let rest = self.likelihood(&diagonal, &off, &pull, 0.0);
         let grid = (-4..=24).map(|k| 0.5 * f64::from(k)).map(|e| (e, of(e)));
         let Some((mut best, mut value)) = grid.max_by(|a, b| a.1.total_cmp(&b.1)) else { return none };
@@ -82,7 +83,7 @@ impl Normals {
             }
         }
         let evidence = value - rest;
-        if evidence > 0.0 { Likeliest { evidence, variance: 10.0_f64.powf(best) / trace } } else { none }
+        if evidence > 0.0 { Likeliest { evidence, variance: math::powf(10.0, best) / trace } } else { none }
     }
 
     /// Logarithm of the marginal likelihood up to a constant, the matrix given as a tridiagonal one.
@@ -97,12 +98,12 @@ impl Normals {
             if pivot <= 0.0 {
                 return f64::NEG_INFINITY;
             }
-            determinant += pivot.ln();
+            determinant += math::ln(pivot);
             explained += left * left / pivot;
         }
         let rest = (self.chi2 - variance * explained).max(0.0);
         let noise = (rest / self.freedom.max(1.0)).max(1.0);
-        -0.5 * (determinant + self.freedom * noise.ln() + rest / noise)
+        -0.5 * (determinant + self.freedom * math::ln(noise) + rest / noise)
     }
 
     /// The most probable coefficients under a prior of this variance; `None` where they cannot be told apart.
@@ -124,7 +125,7 @@ pub fn matern(points: &[f64], length: f64) -> Option<DMatrix<f64>> {
     let n = points.len();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
         let d = 3.0_f64.sqrt() * (points[i] - points[j]).abs() / length;
-        (1.0 + d) * (-d).exp() + if i == j { 1e-9 } else { 0.0 }
+        (1.0 + d) * math::exp(-d) + if i == j { 1e-9 } else { 0.0 }
     });
     Some(covariance.cholesky()?.unpack())
 }
@@ -160,7 +161,7 @@ mod tests {
         let found = normals.likeliest(&prior);
         // Stationary where 1 + v x'x = (x'y)^2/x'x, here 25: v = 6, ln L = (25 - 1)/2 - ln(25)/2.
         assert!((found.variance / 6.0 - 1.0).abs() < 0.1, "{found:?}");
-        assert!((found.evidence - (12.0 - 0.5 * 25.0_f64.ln())).abs() < 1e-2, "{found:?}");
+        assert!((found.evidence - (12.0 - 0.5 * math::ln(25.0))).abs() < 1e-2, "{found:?}");
         let estimate = normals.estimate(&prior, 6.0).expect("it is regular");
         assert!((estimate.coefficients[0] - 6.0 * 10.0 / 25.0).abs() < 1e-12);
         assert!((estimate.freedom - 24.0 / 25.0).abs() < 1e-12);
@@ -169,8 +170,8 @@ mod tests {
     #[test]
     fn a_tridiagonal_likelihood_is_that_of_the_full_covariance() {
         // Seven residuals, three columns, against the density of N(0, I + v F K F') written out.
-        let columns = DMatrix::from_fn(7, 3, |i, j| (0.7 + 1.3 * i as f64 + 2.1 * (i * j) as f64).sin());
-        let residuals = DVector::from_fn(7, |i, _| (0.4 * i as f64).cos() * 0.9);
+        let columns = DMatrix::from_fn(7, 3, |i, j| math::sin(0.7 + 1.3 * i as f64 + 2.1 * (i * j) as f64));
+        let residuals = DVector::from_fn(7, |i, _| math::cos(0.4 * i as f64) * 0.9);
         let root = matern(&[0.0, 0.3, 1.0], 0.8).expect("it is positive");
         let normals = Normals {
             gram: columns.tr_mul(&columns),
@@ -189,7 +190,7 @@ mod tests {
             let covariance = DMatrix::identity(7, 7) + &shaped * shaped.transpose() * v;
             let density = |m: &DMatrix<f64>| {
                 let solved = m.clone().cholesky().expect("positive").solve(&residuals);
-                -0.5 * (m.determinant().ln() + residuals.dot(&solved))
+                -0.5 * (math::ln(m.determinant()) + residuals.dot(&solved))
             };
             density(&covariance) - density(&DMatrix::identity(7, 7))
         };

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use mops_core::Watch;
+use mops_core::math;
 use rayon::prelude::*;
 
 use crate::diagnose::{Options, UNEXPLAINED};
@@ -396,5 +397,5 @@ fn chance(from: &Trial<'_>, with: &Trial<'_>, directions: f64) -> f64 {
     let worth = dispersion.worth(with.fitted.count);
     let added = (with.added.len() - from.added.len()) as i32;
     let gain = criterion(from, &dispersion) - criterion(with, &dispersion) + f64::from(added) * worth;
-    by_chance(gain, directions.powi(added))
+    by_chance(gain, math::powi(directions, added))
 }

@@ -1,5 +1,7 @@
 //! What the samples of a channel tell before any model is looked at: their noise, and samples that stand alone.
 
+use mops_core::math;
+
 /// Standard deviation of the noise of a channel, without a model: from what local parabolas over seven samples leave, by the
 /// median absolute deviation, so that a few jumps do not count. `None` where fewer samples, or samples that never change, tell
 /// nothing of it.
@@ -32,13 +34,13 @@ fn parabola(chosen: &[usize], x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let scale = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let mut m = nalgebra::Matrix3::zeros();
     for &k in chosen {
-        let row = nalgebra::Vector3::new(1.0, x[k] / scale, (x[k] / scale).powi(2));
+        let row = nalgebra::Vector3::new(1.0, x[k] / scale, math::powi(x[k] / scale, 2));
         m += row * row.transpose();
     }
     let inverse = m.try_inverse()?;
     let (mut value, mut leverage) = (0.0, 0.0);
     for &k in chosen {
-        let row = nalgebra::Vector3::new(1.0, x[k] / scale, (x[k] / scale).powi(2));
+        let row = nalgebra::Vector3::new(1.0, x[k] / scale, math::powi(x[k] / scale, 2));
         let weight = (inverse * row)[0];
         value += weight * y[k];
         leverage += weight * weight;
@@ -80,7 +82,7 @@ mod tests {
         let times: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.01).collect();
         // A fixed sequence that is as good as white: the fractional parts of multiples of the golden ratio, uniform.
         let white = |k: usize| ((k as f64 * 0.618_033_988_749_894_9).fract() - 0.5) * 12.0_f64.sqrt();
-        let values = times.iter().enumerate().map(|(k, t)| (3.0 * t).sin() + noise * white(k * k + 7 * k)).collect();
+        let values = times.iter().enumerate().map(|(k, t)| math::sin(3.0 * t) + noise * white(k * k + 7 * k)).collect();
         (times, values)
     }
 

@@ -1,7 +1,7 @@
 //! The judgement: whether what was found explains the data, and a table where nothing does.
 
 use mops_core::Role;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use mops_core::statistics::chi_squared_sf;
 
 use crate::diagnose::UNEXPLAINED;
 use crate::diagnosis::{Unexplained, Verdict};
@@ -147,7 +147,7 @@ fn contradiction(last: &Trial<'_>, after: &Calibrated<'_>) -> f64 {
 /// Mathematical Statistics 9 (1938) 60.
 #[allow(clippy::cast_precision_loss)]
 fn contradicts(rise: f64, unknowns: usize) -> bool {
-    ChiSquared::new(unknowns as f64).is_ok_and(|chance| chance.sf(rise) < CONTRADICTED)
+    unknowns > 0 && chi_squared_sf(rise, unknowns as f64) < CONTRADICTED
 }
 
 /// By which share a free signal at the likeliest place would lower the error that a model leaves on samples left out; and

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::fit::{Fit, Fitted, Global, Known, Point, Residuals, Sets, Slopes, dot};
 use crate::subject::Local;
 use crate::weigh::Dispersion;
+use mops_core::math;
 
 /// How far, in units of its scale, a start value may be expected from where it begins: what the data say nothing of, such as a
 /// speed while the sensor is saturated, stays there.
@@ -30,7 +31,7 @@ impl Normal {
     /// Whether no slope tells anything of an unknown of a piece, by its index among all unknowns: only what is expected of it
     /// stands on the diagonal.
     pub(crate) fn tells_nothing_of(&self, local: usize) -> bool {
-        self.matrix[(local, local)] == WIDE.powi(-2)
+        self.matrix[(local, local)] == math::powi(WIDE, -2)
     }
 }
 
@@ -40,7 +41,7 @@ impl Fit<'_> {
         let globals: f64 = self.expected.iter().map(|expected| expected.at(point).norm_squared()).sum();
         let locals = self.pieces.iter().zip(&point.locals);
         let locals = locals.flat_map(|(piece, values)| piece.locals.iter().zip(values));
-        globals + locals.map(|(local, &value)| far(local, value).powi(2)).sum::<f64>()
+        globals + locals.map(|(local, &value)| math::powi(far(local, value), 2)).sum::<f64>()
     }
 
     /// What a fit makes least: the sum of the squares of the residuals, and of what something is expected of.
@@ -104,7 +105,7 @@ impl Fit<'_> {
             }
             for (k, local) in self.pieces[piece].locals.iter().enumerate() {
                 gradient[offset + k] += far(local, point.locals[piece][k]) / WIDE;
-                matrix[(offset + k, offset + k)] += WIDE.powi(-2);
+                matrix[(offset + k, offset + k)] += math::powi(WIDE, -2);
             }
             offset += locals;
         }
@@ -132,7 +133,8 @@ impl Fit<'_> {
         let mut moved = point.clone();
         for (k, global) in self.globals.iter().enumerate() {
             let value = point.globals[k];
-            let to = if global.log { value * step[k].clamp(-3.0, 3.0).exp() } else { value + step[k] * global.scale };
+            let to =
+                if global.log { value * math::exp(step[k].clamp(-3.0, 3.0)) } else { value + step[k] * global.scale };
             moved.globals[k] = to.clamp(global.bounds[0], global.bounds[1]);
         }
         let mut offset = self.globals.len();
@@ -269,7 +271,7 @@ impl Fit<'_> {
             Sets::Parameter(parameter) if parameter > first || parameter == first && !global.is_stepped() => {
                 let width = (global.bounds[1] - global.bounds[0]) / self.stretch(k, fitted.point.globals[k]);
                 uniform(match (width.is_finite(), global.log, global.is_stepped()) {
-                    (_, true, _) if global.open => 2.0 * 10.0_f64.ln(),
+                    (_, true, _) if global.open => 2.0 * math::ln(10.0),
                     (false, false, true) => STEPPED,
                     _ => width,
                 })
@@ -280,7 +282,7 @@ impl Fit<'_> {
         let all = dispersion.worth(fitted.count);
         let mut unknowns: Vec<(f64, f64)> = self.globals.iter().enumerate().map(|g| (global(g), all)).collect();
         for (piece, r) in self.pieces.iter().zip(&fitted.residuals) {
-            let local = |local: &Local| if local.parameter >= first { START.powi(-2) } else { 0.0 };
+            let local = |local: &Local| if local.parameter >= first { math::powi(START, -2) } else { 0.0 };
             unknowns.extend(piece.locals.iter().map(|l| (local(l), dispersion.worth(r.len()))));
         }
         let held = self.held(&fitted.point, &normal.gradient);
@@ -293,7 +295,7 @@ impl Fit<'_> {
             let (before, whole) = unknowns[k];
             let stepped = before > 0.0 && self.globals.get(k).is_some_and(Global::is_stepped);
             let variance = if stepped { self.stepped_variance(fitted, k, dispersion) } else { after[(i, i)] };
-            let narrowed = -(before * variance).ln();
+            let narrowed = -math::ln(before * variance);
             if before > 0.0 { whole - narrowed.clamp(0.0, whole) } else { 0.0 }
         };
         free.iter().enumerate().map(spared).sum()
@@ -303,8 +305,8 @@ impl Fit<'_> {
     /// squares is larger by one unit, as one standard error to both sides.
     fn stepped_variance(&self, fitted: &Fitted, k: usize, dispersion: &Dispersion) -> f64 {
         let Some([low, high]) = self.stepped_interval(fitted, k, dispersion.weight()) else { return 0.0 };
-        let width = if self.globals[k].log { (high / low).ln() } else { (high - low) / self.globals[k].scale };
-        (0.5 * width).powi(2)
+        let width = if self.globals[k].log { math::ln(high / low) } else { (high - low) / self.globals[k].scale };
+        math::powi(0.5 * width, 2)
     }
 
     /// Covariance of the globals, the locals eliminated, where `weight` units of the sum of squares count as one: the inverse of
@@ -322,7 +324,7 @@ impl Fit<'_> {
             for (i, &k) in free.iter().enumerate().filter(|(_, k)| **k < g) {
                 let [low, high] = self.globals[k].bounds;
                 if (high - low).is_finite() {
-                    matrix[(i, i)] += 12.0 * (stretch(k) / (high - low)).powi(2);
+                    matrix[(i, i)] += 12.0 * math::powi(stretch(k) / (high - low), 2);
                 }
             }
             wide_inverse(&matrix)

@@ -1,5 +1,6 @@
 //! Places of residuals, on a mass with spring and damper behind a slow motor; the data come from equations of their own.
 
+use mops_core::math;
 use mops_core::{Hold, Input};
 
 use crate::diagnosis::Evidence;
@@ -40,7 +41,7 @@ fn times() -> Vec<f64> {
 /// A rich input: steps of 0.25 s that never repeat.
 fn command(t: f64) -> f64 {
     let k = (t / 0.25 + 1e-7).floor();
-    8.0 * (1.0 + k * 0.7).sin() * (0.4 + (2.3 * k).cos())
+    8.0 * math::sin(1.0 + k * 0.7) * (0.4 + math::cos(2.3 * k))
 }
 
 fn plant(hidden: Hidden, label: &str) -> Subject {
@@ -77,7 +78,7 @@ fn shown(found: &[Located]) -> Vec<(&str, f64, f64, f64)> {
 }
 
 fn bump(t: f64) -> f64 {
-    3.0 * (-((t - 3.0) / 0.3).powi(2)).exp()
+    3.0 * math::exp(-math::powi((t - 3.0) / 0.3, 2))
 }
 
 #[test]
@@ -87,8 +88,8 @@ fn a_force_pulse_is_found_at_its_joint_with_its_shape() {
     assert_eq!(best.place, "joint:x", "{:?}", shown(&found));
     assert!(best.share > 0.99 && best.evidence > found[1].evidence.evidence + 20.0, "{:?}", shown(&found));
     let curve = &best.over_time[0].1;
-    let error =
-        curve.x.iter().zip(&curve.estimated).map(|(&t, f)| (f - bump(t)).powi(2)).sum::<f64>() / curve.x.len() as f64;
+    let error = curve.x.iter().zip(&curve.estimated).map(|(&t, f)| math::powi(f - bump(t), 2)).sum::<f64>()
+        / curve.x.len() as f64;
     // What is left is of second order: the fit without the force has other parameters.
     assert!(error.sqrt() < 0.08 * 3.0, "{}", error.sqrt());
     assert!(gain > 0.1, "{gain}");
@@ -97,7 +98,7 @@ fn a_force_pulse_is_found_at_its_joint_with_its_shape() {
 
 #[test]
 fn dry_friction_is_found_at_its_joint_as_a_function_of_the_speed() {
-    let friction = |_: f64, x: &[f64; 3]| -0.6 * (x[1] / 1e-3).tanh();
+    let friction = |_: f64, x: &[f64; 3]| -0.6 * math::tanh(x[1] / 1e-3);
     let (found, gain) = places(&plant(Hidden { force: Some(friction), ..Hidden::default() }, "dry"));
     assert_eq!(found[0].evidence.place, "joint:x", "{:?}", shown(&found));
     let first = found[0].unexplained().expect("there is a table");
@@ -134,7 +135,7 @@ fn white_residuals_speak_for_no_place() {
 #[test]
 fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
     fn bulge(x: f64) -> f64 {
-        4.0 * (-((x - 0.1) / 0.05).powi(2)).exp()
+        4.0 * math::exp(-math::powi((x - 0.1) / 0.05, 2))
     }
     let subject = plant(Hidden { force: Some(|_, x| bulge(x[0])), ..Hidden::default() }, "bulge");
     let simulations = Meter::new(&());
@@ -157,7 +158,7 @@ fn a_table_over_the_position_stands_for_a_force_that_no_effect_has() {
     let off: Vec<[f64; 2]> = unexplained.table.iter().map(|p| [p[0], p[1] - bulge(p[0])]).collect();
     let mean = |f: &dyn Fn(&[f64; 2]) -> f64| off.iter().map(f).sum::<f64>() / off.len() as f64;
     let middle = [mean(&|p| p[0]), mean(&|p| p[1])];
-    let slope = mean(&|p| (p[0] - middle[0]) * (p[1] - middle[1])) / mean(&|p| (p[0] - middle[0]).powi(2));
+    let slope = mean(&|p| (p[0] - middle[0]) * (p[1] - middle[1])) / mean(&|p| math::powi(p[0] - middle[0], 2));
     let worst = off.iter().map(|p| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs()).fold(0.0, f64::max);
     assert!(worst < 0.1 * 4.0, "{worst}: {off:?}");
 }

@@ -1,6 +1,7 @@
 //! The experiment that would separate two models which the data cannot tell apart: variations of those there are, judged by
 //! how far the models then differ.
 
+use mops_core::math;
 use mops_core::{Case, Input, Job};
 
 use crate::search::Trial;
@@ -47,7 +48,7 @@ pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<Stri
 #[allow(clippy::cast_precision_loss)]
 fn difference(a: &Trial<'_>, b: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<f64> {
     let [x, y] = [outputs(a, piece, input, start)?, outputs(b, piece, input, start)?];
-    let square: f64 = x.iter().zip(&y).map(|(x, y)| (x - y).powi(2)).sum();
+    let square: f64 = x.iter().zip(&y).map(|(x, y)| math::powi(x - y, 2)).sum();
     let rms = (square / x.len().max(1) as f64).sqrt();
     rms.is_finite().then_some(rms)
 }

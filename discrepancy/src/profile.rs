@@ -1,6 +1,7 @@
 //! Intervals of fitted unknowns by the profile of the sum of squares.
 
 use crate::fit::{Fit, Fitted, Point};
+use mops_core::math;
 
 /// Standard normal quantile at 0.975.
 pub const QUANTILE: f64 = 1.959_964;
@@ -45,7 +46,7 @@ fn end(fit: &Fit<'_>, fitted: &Fitted, k: usize, step: f64, weight: f64) -> f64 
     let least = fit.total(fitted);
     let place = |away: f64| {
         let place =
-            if global.log { value * (away * step / value).clamp(-MOST, MOST).exp() } else { value + away * step };
+            if global.log { value * math::exp((away * step / value).clamp(-MOST, MOST)) } else { value + away * step };
         place.clamp(global.bounds[0], global.bounds[1])
     };
     let mut held = fit.clone();

@@ -3,6 +3,7 @@
 //! Source: D. G. Kendall, Hunting quanta, Philosophical Transactions of the Royal Society A 276 (1974) 231: the cosine
 //! quantogram, here the mean of the cosines.
 
+use mops_core::math;
 use std::f64::consts::TAU;
 
 /// The mean cosine from which values count as multiples of a quantum: that of values which scatter about them by a fifth.
@@ -27,7 +28,8 @@ pub fn quantum(values: &[f64], finest: f64, coarsest: f64) -> Option<f64> {
         return None;
     }
     #[allow(clippy::cast_precision_loss)]
-    let mean = |frequency: f64| values.iter().map(|v| (TAU * frequency * v).cos()).sum::<f64>() / values.len() as f64;
+    let mean =
+        |frequency: f64| values.iter().map(|v| math::cos(TAU * frequency * v)).sum::<f64>() / values.len() as f64;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let frequencies: Vec<f64> = (0..=count as u32).map(|k| lowest + f64::from(k) * step).collect();
     let means: Vec<f64> = frequencies.iter().map(|&frequency| mean(frequency)).collect();
@@ -54,7 +56,7 @@ mod tests {
     use crate::testing::white;
 
     fn wave(size: f64, noise: f64) -> Vec<f64> {
-        let of = |(k, e): (usize, f64)| size * ((0.021 * k as f64).sin() * 0.9 / size).round() + e;
+        let of = |(k, e): (usize, f64)| size * (math::sin(0.021 * k as f64) * 0.9 / size).round() + e;
         white("quantum", noise, 700).into_iter().enumerate().map(of).collect()
     }
 
@@ -77,7 +79,7 @@ mod tests {
 
     #[test]
     fn values_that_come_in_no_steps_have_none() {
-        let smooth: Vec<f64> = (0..700).map(|k| 0.9 * (0.021 * f64::from(k)).sin()).collect();
+        let smooth: Vec<f64> = (0..700).map(|k| 0.9 * math::sin(0.021 * f64::from(k))).collect();
         assert!(quantum(&smooth, 3e-3, 0.06).is_none());
         assert!(quantum(&wave(0.004, 3e-3), 3e-3, 0.06).is_none(), "noise hides them");
     }

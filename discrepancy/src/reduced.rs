@@ -1,6 +1,7 @@
 //! What can be left out of a model: effects that others make superfluous, declared terms that effects do.
 
 use mops_core::Role;
+use mops_core::math;
 use rayon::prelude::*;
 
 use crate::diagnose::UNEXPLAINED;
@@ -59,7 +60,7 @@ impl<'a> Search<'a> {
             let explains = |less: &Trial<'a>| less.is_physical() && less.fitted.normalised() <= UNEXPLAINED;
             let less = self.without(trial, index).filter(explains)?;
             let left = self.left_on_selection_data(&less)?;
-            let apart: f64 = left.iter().zip(&whole).map(|(a, b)| (a - b).powi(2)).sum();
+            let apart: f64 = left.iter().zip(&whole).map(|(a, b)| math::powi(a - b, 2)).sum();
             (apart / weight >= SEEN).then(|| (dot(&left, &left), less))
         };
         let tried: Vec<(f64, Trial<'a>)> = (0..trial.added.len()).into_par_iter().filter_map(less).collect();

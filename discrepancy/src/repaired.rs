@@ -1,5 +1,6 @@
 //! The repaired model: its parameters from calibration data alone, its errors on every experiment.
 
+use mops_core::math;
 use mops_core::{Port, Role};
 use nalgebra::DMatrix;
 
@@ -154,8 +155,8 @@ impl Calibrated<'_> {
         let error = |(m, said): (&Measurement, &Prognosis)| {
             let (mut sum, mut count) = (0.0, 0);
             let channels = m.series.iter().zip(&said.predicted).map(|(s, predicted)| {
-                let square: f64 = predicted.iter().zip(&s.values).map(|(p, y)| (p - y).powi(2)).sum();
-                sum += square / s.noise.powi(2);
+                let square: f64 = predicted.iter().zip(&s.values).map(|(p, y)| math::powi(p - y, 2)).sum();
+                sum += square / math::powi(s.noise, 2);
                 count += s.values.len();
                 (s.name.clone(), (square / s.values.len().max(1) as f64).sqrt())
             });

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Port, Trials, stream};
-use rand_distr::{Distribution, StandardNormal};
+use mops_core::{Port, Trials, math, stream};
 use rayon::prelude::*;
 
 use crate::base;
@@ -84,7 +83,7 @@ pub(crate) fn best_in(rounds: &[Arc<Round<'_>>], is: impl Fn(&Candidate) -> bool
 
 fn white(count: usize) -> Vec<Vec<f64>> {
     let mut random = stream(0, "white");
-    (0..DRAWS).map(|_| (0..count).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
+    (0..DRAWS).map(|_| (0..count).map(|_| math::normal(&mut random)).collect()).collect()
 }
 
 impl<'a> Search<'a> {

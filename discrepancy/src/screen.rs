@@ -3,6 +3,7 @@
 //! A score (Lagrange multiplier) test: source: C. R. Rao, Linear Statistical Inference and its Applications, 2nd edition
 //! (1973), section 6e.3.
 
+use mops_core::math;
 use mops_core::{Port, Scope, Strength, Trials};
 use mops_models::WithEffects;
 use rayon::prelude::*;
@@ -141,7 +142,7 @@ impl Screening {
     /// distribution `(1 - exp(-g/2))^n`, of which this is the likeliest `n`; `None` without draws.
     #[allow(clippy::cast_precision_loss)]
     pub fn independent(&self) -> Option<f64> {
-        let logarithms: f64 = self.by_chance.iter().map(|gain| (-(-0.5 * gain).exp()).ln_1p()).sum();
+        let logarithms: f64 = self.by_chance.iter().map(|gain| math::ln_1p(-math::exp(-0.5 * gain))).sum();
         // At least one: where all signs are wrong, draws gain nothing.
         (logarithms < 0.0).then(|| (-(self.by_chance.len() as f64) / logarithms).max(1.0))
     }
@@ -347,7 +348,7 @@ mod tests {
     fn as_many_directions_are_told_as_the_best_gain_was_drawn_from() {
         for n in [3.0, 200.0] {
             // Quantiles of the best of n gains: (1 - exp(-g/2))^n = u.
-            let quantile = |k: usize| -2.0 * (1.0 - ((k as f64 + 0.5) / 400.0).powf(1.0 / n)).ln();
+            let quantile = |k: usize| -2.0 * math::ln(1.0 - math::powf((k as f64 + 0.5) / 400.0, 1.0 / n));
             let screening = Screening { screened: Vec::new(), by_chance: (0..400).map(quantile).collect() };
             let told = screening.independent().expect("there are draws");
             assert!((told - n).abs() < 0.02 * n, "{told}");

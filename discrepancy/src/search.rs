@@ -2,8 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use mops_core::{Effect, Role, Scope, Strength, stream};
-use rand_distr::{Distribution, StandardNormal};
+use mops_core::{Effect, Role, Scope, Strength, math, stream};
 
 use crate::base;
 use crate::candidate::Candidate;
@@ -193,7 +192,7 @@ impl<'a> Search<'a> {
         const SPREAD: f64 = 3.0;
         let mut random = stream(0, "beginnings");
         let mut draw = |local: &Local| {
-            let z: f64 = StandardNormal.sample(&mut random);
+            let z = math::normal(&mut random);
             (local.start + SPREAD * local.scale * z).clamp(local.bounds[0], local.bounds[1])
         };
         let given = beginnings.len();

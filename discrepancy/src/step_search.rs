@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use crate::fit::{Fit, Fitted, Global, Residuals, Slopes};
 use crate::least_squares::{damped_step, sum_of_squares};
+use mops_core::math;
 
 /// How thoroughly sizes are looked for.
 struct Effort {
@@ -59,7 +60,7 @@ impl Fit<'_> {
             if halvings > effort.halvings {
                 break;
             }
-            let stride = global.scale * 0.5_f64.powi(halvings);
+            let stride = global.scale * math::powi(0.5, halvings);
             let beside = |by: f64| self.beside(&best, &slopes, k, by);
             let better = |fitted: &Fitted| fitted.chi2 < best.chi2;
             match [stride, -stride].into_iter().find_map(|by| beside(by).filter(better)) {
@@ -98,8 +99,8 @@ impl Fit<'_> {
         let end = |side: f64| {
             let place = |by: f64| (value + by).clamp(bounds[0], bounds[1]);
             let mut inner = 0.0;
-            let mut outer = side * scale * 0.5_f64.powi(THOROUGH.halvings);
-            let farthest = outer.abs() * 2.0_f64.powi(DOUBLINGS);
+            let mut outer = side * scale * math::powi(0.5, THOROUGH.halvings);
+            let farthest = outer.abs() * math::powi(2.0, DOUBLINGS);
             while is_within(outer) {
                 if place(outer) == bounds[0] || place(outer) == bounds[1] || outer.abs() >= farthest {
                     return place(outer);

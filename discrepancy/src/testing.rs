@@ -2,13 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
+use mops_core::math;
 use mops_core::{
     Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role,
     Scale, Study, Task, Tasks, Tuner, Unit, stream,
 };
 use mops_models::effects::effects;
 use mops_models::equations::EquationsOptions;
-use rand_distr::{Distribution, Normal};
 
 use crate::base::{first_locals, pieces};
 use crate::fit::{Fit, Fitted};
@@ -165,9 +165,8 @@ pub fn catalogue(names: &[&str]) -> Vec<Arc<dyn Effect>> {
 
 /// White noise.
 pub fn white(label: &str, size: f64, count: usize) -> Vec<f64> {
-    let normal = Normal::new(0.0, size).expect("it is positive");
     let mut random = stream(7, label);
-    (0..count).map(|_| normal.sample(&mut random)).collect()
+    (0..count).map(|_| size * math::normal(&mut random)).collect()
 }
 
 /// States at evenly spaced times by the classical Runge-Kutta method, 20 steps between samples.

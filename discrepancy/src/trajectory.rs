@@ -228,6 +228,7 @@ fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::math;
     use mops_core::{Hold, Input, Job, Model};
 
     use crate::meter::Meter;
@@ -243,7 +244,7 @@ mod tests {
 
     fn record(names: &[&'static str], amplitude: f64, step: f64) -> Record {
         let times: Vec<f64> = (0..200).map(|k| f64::from(k) * step).collect();
-        let values = times.iter().map(|t| amplitude * (3.0 * t).sin()).collect();
+        let values = times.iter().map(|t| amplitude * math::sin(3.0 * t)).collect();
         let input = Input::Sampled { times: times.clone(), values, hold: Hold::First };
         let signals = names.iter().map(|&name| (name, vec![0.0; 200], 0.5)).collect();
         Record { inputs: vec![("u", input)], times, signals }
@@ -260,7 +261,7 @@ mod tests {
         let response = along.response(along.inputs(), &unit);
         for k in 0..200_u32 {
             let t = 0.1 * f64::from(k);
-            let x = (1.0 - (2.0 * t).cos()) / 8.0 / 0.5;
+            let x = (1.0 - math::cos(2.0 * t)) / 8.0 / 0.5;
             assert!((response[k as usize] - x).abs() < 1e-5, "{t}: {} {x}", response[k as usize]);
         }
         // The pulse of one interval: nothing before it.

@@ -6,6 +6,7 @@ use crate::candidate::FARTHEST_SHAPE;
 use crate::fit::{Fit, Fitted};
 use crate::search::Trial;
 use crate::variant::Added;
+use mops_core::math;
 
 /// How far apart criteria are where the data clearly prefer one model. Source: R. E. Kass, A. E. Raftery, Bayes Factors, JASA
 /// 90 (1995), section 3.2: strong evidence.
@@ -56,7 +57,7 @@ impl Dispersion {
     /// What an unknown costs that so many samples tell: the logarithm of as many as are independent.
     #[allow(clippy::cast_precision_loss)]
     pub fn worth(&self, samples: usize) -> f64 {
-        (samples as f64 / self.repeats).max(2.0).ln()
+        math::ln((samples as f64 / self.repeats).max(2.0))
     }
 
     /// How many units of the sum of squares count as one.
@@ -113,7 +114,7 @@ fn is_plausible(added: &Added) -> bool {
 /// Probabilities of models from their criteria, lower being better.
 pub fn probabilities(criteria: &[f64]) -> Vec<f64> {
     let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
-    let weights: Vec<f64> = criteria.iter().map(|c| (-0.5 * (c - best)).exp()).collect();
+    let weights: Vec<f64> = criteria.iter().map(|c| math::exp(-0.5 * (c - best))).collect();
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|w| if sum > 0.0 { w / sum } else { 0.0 }).collect()
 }
@@ -126,12 +127,12 @@ pub fn by_chance(gain: f64, directions: f64) -> f64 {
     if gain <= 0.0 {
         return 1.0;
     }
-    -((directions * (-(-0.5 * gain).exp()).ln_1p()).exp_m1())
+    -(math::exp_m1(directions * math::ln_1p(-math::exp(-0.5 * gain))))
 }
 
 /// The gain of which [`by_chance`] gives this probability.
 pub fn needed_gain(level: f64, directions: f64) -> f64 {
-    -2.0 * (-((-level).ln_1p() / directions).exp_m1()).ln()
+    -2.0 * math::ln(-math::exp_m1(math::ln_1p(-level) / directions))
 }
 
 #[cfg(test)]
@@ -142,13 +143,13 @@ mod tests {
     fn models_that_do_as_well_share_the_probability_and_six_points_leave_a_twentieth() {
         let p = probabilities(&[10.0, 10.0, 16.0]);
         assert_eq!(p[0], p[1]);
-        assert!((p[2] / p[0] - (-3.0_f64).exp()).abs() < 1e-12 && (p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((p[2] / p[0] - math::exp(-3.0)).abs() < 1e-12 && (p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn the_best_of_many_directions_gains_by_chance() {
-        assert!((by_chance(2.0 * 100.0_f64.ln(), 1.0) - 0.01).abs() < 1e-12);
-        assert!((by_chance(2.0 * 10_000.0_f64.ln(), 100.0) - 0.01).abs() < 1e-4);
+        assert!((by_chance(2.0 * math::ln(100.0), 1.0) - 0.01).abs() < 1e-12);
+        assert!((by_chance(2.0 * math::ln(10_000.0), 100.0) - 0.01).abs() < 1e-4);
         assert_eq!(by_chance(0.0, 10.0), 1.0);
         for (level, directions) in [(0.01, 1.0), (1e-6, 500.0), (0.5, 40.0)] {
             assert!((by_chance(needed_gain(level, directions), directions) / level - 1.0).abs() < 1e-9);

@@ -4,6 +4,7 @@
 //! Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
 //! Problems (1983) 95.
 
+use mops_core::math;
 use mops_core::{Case, Input, Model};
 
 use crate::fit::Piece;
@@ -96,7 +97,7 @@ fn local_line(series: &Series, at: f64) -> (f64, f64) {
     let (t, y) = (&series.times[from..to], &series.values[from..to]);
     let count = t.len() as f64;
     let (mt, my) = (t.iter().sum::<f64>() / count, y.iter().sum::<f64>() / count);
-    let square: f64 = t.iter().map(|t| (t - mt).powi(2)).sum();
+    let square: f64 = t.iter().map(|t| math::powi(t - mt, 2)).sum();
     let product: f64 = t.iter().zip(y).map(|(t, y)| (t - mt) * (y - my)).sum();
     let slope = if square > 0.0 { product / square } else { 0.0 };
     (my + slope * (at - mt), slope)
@@ -107,7 +108,7 @@ fn local_line(series: &Series, at: f64) -> (f64, f64) {
 fn spread(series: &Series) -> f64 {
     let n = series.values.len().max(1) as f64;
     let mean = series.values.iter().sum::<f64>() / n;
-    (series.values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt().max(series.noise)
+    (series.values.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / n).sqrt().max(series.noise)
 }
 
 /// Slopes over eight samples.

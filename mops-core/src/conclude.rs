@@ -6,6 +6,7 @@ use crate::catalogue::SolverChoice;
 use crate::experiment::{Channel, Role};
 use crate::front;
 use crate::identification::{self, Local, Point, SensitivityReport};
+use crate::math;
 use crate::model::Analysis;
 use crate::outcome::{
     self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Findings, Outcome, ParameterReport,
@@ -254,7 +255,7 @@ fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) ->
     let n = channel.values.len();
     #[allow(clippy::cast_precision_loss)]
     let mean = channel.values.iter().sum::<f64>() / n as f64;
-    let spread: f64 = channel.values.iter().map(|v| (v - mean).powi(2)).sum();
+    let spread: f64 = channel.values.iter().map(|v| math::powi(v - mean, 2)).sum();
     let residuals: Option<Vec<f64>> = simulated.map(|s| channel.values.iter().zip(&s).map(|(a, b)| a - b).collect());
     let squares = residuals.as_ref().map_or(f64::NAN, |residuals| residuals.iter().map(|e| e * e).sum());
     #[allow(clippy::cast_precision_loss)]

@@ -1,5 +1,6 @@
 //! Slopes by differences, for problems whose models give no exact ones.
 
+use crate::math;
 use crate::problem::Evaluation;
 use crate::solver::{Halt, Linearisation, Oracle};
 
@@ -24,7 +25,7 @@ impl Differences {
     /// The step of a central difference for slopes that are to describe the problem within `reach`: a tenth of it, at most
     /// a fifth of the cube root of the noise, and not so small that the noise takes over.
     pub fn step(self, reach: f64) -> f64 {
-        (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * self.noise.cbrt())
+        (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * math::cbrt(self.noise))
     }
 
     fn one_sided(self, reach: f64) -> bool {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::band_limited;
+use crate::math;
 use crate::unit::Unit;
 
 /// What an experiment is used for.
@@ -92,7 +93,7 @@ impl Input {
                 }
             }
             Self::Sine { amplitude, frequency, phase, offset } => {
-                offset + amplitude * (std::f64::consts::TAU * frequency * t + phase).sin()
+                offset + amplitude * math::sin(std::f64::consts::TAU * frequency * t + phase)
             }
             Self::Sampled { times, values, hold } => {
                 let after = times.partition_point(|&time| time <= t);
@@ -223,13 +224,13 @@ mod tests {
     #[test]
     fn a_band_limited_input_passes_through_its_samples_and_wants_them_evenly_spaced() {
         let sampled = |times: Vec<f64>| Input::Sampled {
-            values: times.iter().map(|t| (4.0 * t).sin()).collect(),
+            values: times.iter().map(|t| math::sin(4.0 * t)).collect(),
             times,
             hold: Hold::BandLimited,
         };
         let even = sampled((0..100).map(|i| 0.2 * f64::from(i)).collect());
-        assert!((even.at(10.0) - 40.0_f64.sin()).abs() < 1e-12 && (even.at(10.1) - 40.4_f64.sin()).abs() < 1e-4);
-        assert_eq!((even.at(-1.0), even.at(99.0)), (0.0, (4.0_f64 * 0.2 * 99.0).sin()));
+        assert!((even.at(10.0) - math::sin(40.0)).abs() < 1e-12 && (even.at(10.1) - math::sin(40.4)).abs() < 1e-4);
+        assert_eq!((even.at(-1.0), even.at(99.0)), (0.0, math::sin(4.0 * 0.2 * 99.0)));
         assert_eq!((even.uneven(), sampled(vec![0.0, 0.2, 0.5, 0.6]).uneven()), (None, Some(0.2)));
     }
 
@@ -240,11 +241,11 @@ mod tests {
             values: (0..200).map(|i| value(f64::from(i))).collect(),
             hold,
         };
-        assert!(sampled(Hold::Zero, &|t| (0.1 * t).sin()).looks_smooth());
-        assert!(!sampled(Hold::First, &|t| (0.1 * t).sin()).looks_smooth());
+        assert!(sampled(Hold::Zero, &|t| math::sin(0.1 * t)).looks_smooth());
+        assert!(!sampled(Hold::First, &|t| math::sin(0.1 * t)).looks_smooth());
         // Switching, a staircase, and a new value at every sample.
-        assert!(!sampled(Hold::Zero, &|t| (0.1 * t).sin().signum()).looks_smooth());
-        assert!(!sampled(Hold::Zero, &|t| (0.1 * (t / 5.0).floor()).sin()).looks_smooth());
-        assert!(!sampled(Hold::Zero, &|t| (t * t).sin()).looks_smooth());
+        assert!(!sampled(Hold::Zero, &|t| math::sin(0.1 * t).signum()).looks_smooth());
+        assert!(!sampled(Hold::Zero, &|t| math::sin(0.1 * (t / 5.0).floor())).looks_smooth());
+        assert!(!sampled(Hold::Zero, &|t| math::sin(t * t)).looks_smooth());
     }
 }

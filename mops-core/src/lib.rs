@@ -70,6 +70,7 @@ pub use model::{
     Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
     Variable, WithTangents, Work,
 };
+pub use mops_math as math;
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,

@@ -285,6 +285,7 @@ fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{self, complex};
     use crate::model::{Parameter, State};
 
     /// A pendulum with torque u: `angle'' = g sin(angle) - u`, angle 0 upright.
@@ -302,10 +303,11 @@ mod tests {
         }
         fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
             let (g, [angle, speed], u) = (at.parameters[0], [at.states[0], at.states[1]], at.inputs[0]);
-            let slopes = [[0.0, 1.0, 0.0], [g * angle.cos(), 0.0, -1.0], [angle.cos(), 0.0, 0.0], [0.0, 1.0, 0.0]];
+            let slopes =
+                [[0.0, 1.0, 0.0], [g * math::cos(angle), 0.0, -1.0], [math::cos(angle), 0.0, 0.0], [0.0, 1.0, 0.0]];
             Some(Ok(Local {
-                rates: vec![speed, g * angle.sin() - u],
-                signals: vec![angle.sin(), speed],
+                rates: vec![speed, g * math::sin(angle) - u],
+                signals: vec![math::sin(angle), speed],
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
                 frictionless: Vec::new(),
             }))
@@ -330,7 +332,7 @@ mod tests {
     fn the_operating_point_is_what_is_given_else_the_start_value() {
         let by_start = Linearised::new(pendulum(), &Linearise::default()).unwrap();
         let resting = by_start.at(&Case::default(), &[9.0, 0.5]).unwrap();
-        assert_eq!((resting.states[0], resting.system.a[(1, 0)]), (0.5, 9.0 * 0.5f64.cos()));
+        assert_eq!((resting.states[0], resting.system.a[(1, 0)]), (0.5, 9.0 * math::cos(0.5)));
         let at = vec![("angle".into(), quantity("180 deg"))];
         let outputs = Some(vec!["side".into()]);
         let hanging = Linearised::new(pendulum(), &Linearise { at, outputs, ..Linearise::default() }).unwrap();
@@ -344,7 +346,7 @@ mod tests {
             (system.a[(1, 0)], system.c[(0, 0)], system.outputs.as_slice()),
             (-9.0, -1.0, &["side".to_owned()][..])
         );
-        assert!(system.poles().unwrap().iter().all(|p| (p.norm() - 3.0).abs() < 1e-14 && p.re == 0.0));
+        assert!(system.poles().unwrap().iter().all(|p| (complex::norm(*p) - 3.0).abs() < 1e-14 && p.re == 0.0));
     }
 
     #[test]
@@ -352,7 +354,7 @@ mod tests {
         let at = vec![("angle".into(), quantity("0.4"))];
         let trim = Linearise { at: at.clone(), equilibrium: true, free: vec!["u".into()], ..Linearise::default() };
         let resting = Linearised::new(pendulum(), &trim).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap();
-        assert!((resting.inputs[0] - 9.0 * 0.4f64.sin()).abs() < 1e-12 && resting.states[0] == 0.4);
+        assert!((resting.inputs[0] - 9.0 * math::sin(0.4)).abs() < 1e-12 && resting.states[0] == 0.4);
         let held = Linearise { at, equilibrium: true, ..Linearise::default() };
         let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
         assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");

@@ -1,5 +1,6 @@
 //! Numbers that equations are written in: `f64`, and dual numbers that carry derivatives along.
 
+use crate::math;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -42,31 +43,31 @@ pub trait Scalar:
     /// Sine of an angle in rad.
     #[must_use]
     fn sin(self) -> Self {
-        let (sin, cos) = self.value().sin_cos();
+        let (sin, cos) = math::sin_cos(self.value());
         self.chain(sin, cos)
     }
     /// Cosine of an angle in rad.
     #[must_use]
     fn cos(self) -> Self {
-        let (sin, cos) = self.value().sin_cos();
+        let (sin, cos) = math::sin_cos(self.value());
         self.chain(cos, -sin)
     }
     /// Sine and cosine at once.
     #[must_use]
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = self.value().sin_cos();
+        let (sin, cos) = math::sin_cos(self.value());
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
     /// Exponential.
     #[must_use]
     fn exp(self) -> Self {
-        let e = self.value().exp();
+        let e = math::exp(self.value());
         self.chain(e, e)
     }
     /// Natural logarithm.
     #[must_use]
     fn ln(self) -> Self {
-        self.chain(self.value().ln(), 1.0 / self.value())
+        self.chain(math::ln(self.value()), 1.0 / self.value())
     }
     /// Square root.
     #[must_use]
@@ -77,13 +78,13 @@ pub trait Scalar:
     /// Hyperbolic tangent.
     #[must_use]
     fn tanh(self) -> Self {
-        let t = self.value().tanh();
+        let t = math::tanh(self.value());
         self.chain(t, 1.0 - t * t)
     }
     /// Power with a constant exponent.
     #[must_use]
     fn powf(self, exponent: f64) -> Self {
-        self.chain(self.value().powf(exponent), exponent * self.value().powf(exponent - 1.0))
+        self.chain(math::powf(self.value(), exponent), exponent * math::powf(self.value(), exponent - 1.0))
     }
     /// Absolute value; the derivative at 0 is 0.
     #[must_use]
@@ -109,6 +110,20 @@ impl Scalar for f64 {
     #[inline]
     fn chain(self, value: f64, _: f64) -> f64 {
         value
+    }
+
+    // The defaults would compute derivatives that nobody reads.
+    #[inline]
+    fn sin(self) -> f64 {
+        math::sin(self)
+    }
+    #[inline]
+    fn cos(self) -> f64 {
+        math::cos(self)
+    }
+    #[inline]
+    fn powf(self, exponent: f64) -> f64 {
+        math::powf(self, exponent)
     }
 }
 

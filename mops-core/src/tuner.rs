@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::Expression;
+use crate::math;
 use crate::unit::Unit;
 
 /// How the range of a tuner is spread over [0, 1].
@@ -76,7 +77,7 @@ impl Tuner {
             _ if u == 0.0 => min,
             _ if u == 1.0 => max,
             Scale::Linear => min + u * (max - min),
-            Scale::Log => min.signum() * (min.abs().ln() + u * (max / min).ln()).exp(),
+            Scale::Log => min.signum() * math::exp(math::ln(min.abs()) + u * math::ln(max / min)),
         };
         match &self.grid {
             Grid::Continuous => spread(u),
@@ -90,7 +91,7 @@ impl Tuner {
         let [min, max] = self.bounds;
         match self.scale {
             Scale::Linear => max - min,
-            Scale::Log => value * (max / min).ln(),
+            Scale::Log => value * math::ln(max / min),
         }
     }
 
@@ -106,7 +107,7 @@ impl Tuner {
                 return nearest as f64 / (values.len() - 1) as f64;
             }
             (_, Scale::Linear) => (value - min) / (max - min),
-            (_, Scale::Log) => (value / min).ln() / (max / min).ln(),
+            (_, Scale::Log) => math::ln(value / min) / math::ln(max / min),
         };
         u.clamp(0.0, 1.0)
     }

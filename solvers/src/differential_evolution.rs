@@ -1,8 +1,8 @@
 //! Differential evolution that adapts its own factors (SHADE).
 
+use mops_core::math;
 use mops_core::{Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
 use rand::Rng;
-use rand_distr::{Cauchy, Distribution, Normal};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -209,14 +209,14 @@ impl Memory {
 
     fn draw(&self, random: &mut Stream) -> [f64; 2] {
         let [factor, rate] = self.means[random.random_range(0..self.means.len())];
-        let spread = Cauchy::new(factor, 0.1).expect("a positive scale");
+        // Of the Cauchy distribution around `factor`, and of the normal one around `rate`.
         let factor = loop {
-            let drawn: f64 = spread.sample(random);
+            let drawn = factor + 0.1 * math::tan(std::f64::consts::PI * random.random::<f64>());
             if drawn > 0.0 {
                 break drawn.min(1.0);
             }
         };
-        let rate: f64 = Normal::new(rate, 0.1).expect("a positive deviation").sample(random);
+        let rate = rate + 0.1 * math::normal(random);
         [factor, rate.clamp(0.0, 1.0)]
     }
 

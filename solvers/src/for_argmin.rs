@@ -227,6 +227,7 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Oracle for Asked<'_, O> {
 #[cfg(test)]
 mod tests {
     use argmin::core::Executor;
+    use mops_core::math;
 
     use super::*;
     use crate::nelder_mead::NelderMeadOptions;
@@ -241,7 +242,7 @@ mod tests {
 
         fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
             assert!(x.iter().all(|x| (-2.0..=5.0).contains(x)), "{x:?}");
-            Ok(if x[0] > 3.0 { f64::NAN } else { (x[0] - 1.0).powi(2) + 2.0 * (x[1] + 3.0).powi(2) })
+            Ok(if x[0] > 3.0 { f64::NAN } else { math::powi(x[0] - 1.0, 2) + 2.0 * math::powi(x[1] + 3.0, 2) })
         }
     }
 

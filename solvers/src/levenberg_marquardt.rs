@@ -1,5 +1,6 @@
 //! The Levenberg-Marquardt method for sums of squares, with bounds and several starts.
 
+use mops_core::math;
 use mops_core::{Halt, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -153,7 +154,7 @@ impl Solver for Local {
         for (scale, column) in state.scale.iter_mut().zip(state.jacobian.column_iter()) {
             *scale = scale.max(column.norm_squared());
         }
-        state.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+        state.damping *= (1.0 - math::powi(2.0 * ratio - 1.0, 3)).max(1.0 / 3.0);
         state.growth = 2.0;
         state.idle = if achieved <= 100.0 * self.options.tolerance * sum { state.idle + 1 } else { 0 };
         Ok(if state.idle >= 3 { state.verdict() } else { Progress::Continue })

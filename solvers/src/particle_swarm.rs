@@ -57,8 +57,16 @@ impl Solver for Swarm {
             return Ok(Progress::Converged);
         }
         let random = oracle.stream("particle-swarm");
-        let method =
-            ParticleSwarm::new((vec![0.0; n], vec![1.0; n]), self.options.particles).with_rng_generator(random);
+        // The factors that argmin has by itself, but from a logarithm whose last digit depends on the processor.
+        let attraction = 0.5 + std::f64::consts::LN_2;
+        let Ok(method) = ParticleSwarm::new((vec![0.0; n], vec![1.0; n]), self.options.particles)
+            .with_rng_generator(random)
+            .with_inertia_factor(0.5 / std::f64::consts::LN_2)
+            .and_then(|method| method.with_cognitive_factor(attraction))
+            .and_then(|method| method.with_social_factor(attraction))
+        else {
+            return Ok(Progress::Stalled);
+        };
         let cost = Cost::new(oracle, None);
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
         match (cost.halt(), run) {

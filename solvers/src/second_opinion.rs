@@ -1,5 +1,6 @@
 //! Two solvers of different kinds from one start, the first to rough accuracy until the other has been heard.
 
+use mops_core::math;
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
 
 use crate::own::Own;
@@ -117,5 +118,5 @@ impl Solver for SecondOpinion {
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    a.iter().zip(b).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>().sqrt()
 }

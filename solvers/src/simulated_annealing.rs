@@ -1,23 +1,21 @@
-//! The simulated annealing of argmin.
+//! Simulated annealing.
 
-use std::sync::Mutex;
-
-use argmin::core::{CostFunction, Error, Executor};
-use argmin::solver::simulatedannealing::{Anneal, SATempFunc, SimulatedAnnealing};
+use mops_core::math;
 use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
-use rand_distr::{Distribution, Normal};
+use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::argmin_adapter::Cost;
+use crate::penalty::penalised;
 use crate::start::usable_start;
 
-/// Simulated annealing, by argmin: a walk that takes every better point, and a worse one the more seldom the cooler it is. It
-/// sees one number per point, the penalised maximum. The temperature falls from 1, in units of the objective at the start,
-/// to a millionth; steps are normally distributed, shrink with the root of the temperature, and end on the face of the box
-/// they would cross. Ends after a number of iterations.
+/// Simulated annealing: a walk that takes every better point, and a worse one the more seldom the cooler it is, with
+/// probability `1/(1 + exp(rise/temperature))`. It sees one number per point, the penalised maximum. The temperature falls
+/// from 1, in units of the objective at the start, to a millionth; steps are normally distributed, shrink with the root of
+/// the temperature, and end on the face of the box they would cross. Ends after a number of iterations.
 ///
-/// Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Science 220 (1983) 671-680.
+/// Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Science 220 (1983) 671-680; the probability by R. J. Glauber, Journal
+/// of Mathematical Physics 4 (1963) 294-307.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SimulatedAnnealingOptions {
@@ -39,13 +37,24 @@ impl SolverOptions for SimulatedAnnealingOptions {
     const KIND: &'static str = "simulated-annealing";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Annealing { options: self.clone(), start: None })
+        Box::new(Annealing { options: self.clone(), walk: None })
     }
 }
 
+/// The solver of the kind `simulated-annealing`.
 struct Annealing {
     options: SimulatedAnnealingOptions,
-    start: Option<Vec<f64>>,
+    walk: Option<Walk>,
+}
+
+struct Walk {
+    point: Vec<f64>,
+    cost: f64,
+    /// Unit of the temperature.
+    unit: f64,
+    iteration: u64,
+    accepting: Stream,
+    moving: Stream,
 }
 
 /// The last temperature.
@@ -57,65 +66,43 @@ impl Solver for Annealing {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.start = usable_start(oracle, start)?;
+        self.walk = None;
+        let Some(point) = usable_start(oracle, start)? else { return Ok(()) };
+        let cost = penalised(&oracle.evaluate(std::slice::from_ref(&point))?[0]);
+        let unit = if cost == 0.0 { 1.0 } else { cost.abs() };
+        let [accepting, moving] =
+            ["simulated-annealing", "simulated-annealing steps"].map(|label| oracle.stream(label));
+        self.walk = Some(Walk { point, cost, unit, iteration: 0, accepting, moving });
         Ok(())
     }
 
-    /// argmin runs to its end in one step.
     #[allow(clippy::cast_precision_loss)]
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let Some(start) = &self.start else { return Ok(Progress::Stalled) };
-        if start.is_empty() {
+        // A walk has no test of an optimum.
+        let Some(walk) = &mut self.walk else { return Ok(Progress::Stalled) };
+        if walk.point.is_empty() {
             return Ok(Progress::Converged);
         }
-        let cooling = COLD.powf(1.0 / self.options.max_iterations.max(1) as f64);
-        let spacing = oracle.shape().spacing.clone();
-        let [accepting, moving] =
-            ["simulated-annealing", "simulated-annealing steps"].map(|label| oracle.stream(label));
-        let Ok(method) = SimulatedAnnealing::new_with_rng(1.0, accepting) else { return Ok(Progress::Stalled) };
-        let method = method.with_temp_func(SATempFunc::Exponential(cooling));
-        let cost = Cost::new(oracle, None);
-        let walk = Walk { cost: &cost, size: self.options.size, spacing, random: Mutex::new(moving) };
-        let iterations = self.options.max_iterations;
-        let run = Executor::new(walk, method).configure(|state| state.param(start.clone()).max_iters(iterations)).run();
-        match (cost.halt(), run) {
-            (Some(halt), _) => Err(halt),
-            // A walk has no test of an optimum.
-            _ => Ok(Progress::Stalled),
+        if walk.iteration >= self.options.max_iterations {
+            return Ok(Progress::Stalled);
         }
+        let temperature = math::powf(COLD, walk.iteration as f64 / self.options.max_iterations as f64);
+        walk.iteration += 1;
+        let next = walk.moved(self.options.size * temperature.sqrt(), &oracle.shape().spacing);
+        let cost = penalised(&oracle.evaluate(std::slice::from_ref(&next))?[0]);
+        let chance = 1.0 / (1.0 + math::exp((cost - walk.cost) / (walk.unit * temperature)));
+        if cost < walk.cost || walk.accepting.random::<f64>() < chance {
+            (walk.point, walk.cost) = (next, cost);
+        }
+        Ok(Progress::Continue)
     }
 }
 
-/// A problem with its steps.
-struct Walk<'a> {
-    cost: &'a Cost<'a>,
-    size: f64,
-    spacing: Vec<f64>,
-    random: Mutex<Stream>,
-}
-
-impl CostFunction for Walk<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
-        self.cost.cost(point)
-    }
-}
-
-impl Anneal for Walk<'_> {
-    type Param = Vec<f64>;
-    type Output = Vec<f64>;
-    type Float = f64;
-
-    /// On a grid a step is not shorter than to the next value.
-    fn anneal(&self, point: &Vec<f64>, temperature: f64) -> Result<Vec<f64>, Error> {
-        let mut random = self.random.lock().expect("nobody panics holding the lock");
-        let size = self.size * temperature.sqrt();
-        let moved = point.iter().zip(&self.spacing).map(|(u, spacing)| {
-            let steps = Normal::new(0.0, size.max(*spacing)).expect("a deviation that is not negative");
-            (u + steps.sample(&mut *random)).clamp(0.0, 1.0)
-        });
-        Ok(moved.collect())
+impl Walk {
+    /// The point after a step; on a grid it is not shorter than to the next value.
+    fn moved(&mut self, size: f64, spacing: &[f64]) -> Vec<f64> {
+        let random = &mut self.moving;
+        let along = |(u, spacing): (&f64, &f64)| (u + size.max(*spacing) * math::normal(random)).clamp(0.0, 1.0);
+        self.point.iter().zip(spacing).map(along).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! What the rows of a problem are like near a point, found out from a few values along lines.
 
+use mops_core::math;
 use mops_core::{Halt, Oracle, Usage};
 use rand::Rng;
 
@@ -97,7 +98,7 @@ fn along(oracle: &mut dyn Oracle, line: &[[f64; 2]], further: f64) -> Result<Opt
 /// Root mean square of the differences of neighbours.
 #[allow(clippy::cast_precision_loss)]
 fn spread(values: &[f64]) -> f64 {
-    let squares: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let squares: f64 = values.windows(2).map(|pair| math::powi(pair[1] - pair[0], 2)).sum();
     (squares / (values.len() - 1) as f64).sqrt()
 }
 
@@ -138,7 +139,7 @@ mod tests {
         let mut random = mops_core::stream(1, "noise");
         let mut ratios = Vec::new();
         for _ in 0..100 {
-            let mut noisy = |i: u32| 3.0 + (f64::from(i) * 1e-3).powi(2) + 1e-4 * random.random_range(-1.0..1.0);
+            let mut noisy = |i: u32| 3.0 + math::powi(f64::from(i) * 1e-3, 2) + 1e-4 * random.random_range(-1.0..1.0);
             let values: Vec<f64> = (0..7).map(&mut noisy).collect();
             // The standard deviation of even noise between -1 and 1.
             ratios.extend(of_values(&values).map(|noise| noise / (1e-4 / 3.0_f64.sqrt())));
@@ -146,7 +147,9 @@ mod tests {
         ratios.sort_by(f64::total_cmp);
         assert!(ratios.len() > 70 && (0.5..2.0).contains(&ratios[ratios.len() / 2]), "{ratios:?}");
         let smooth = |f: fn(f64) -> f64| of_values(&(0..7).map(|i| f(f64::from(i) * 1e-3)).collect::<Vec<_>>());
-        for f in [|x: f64| (30.0 * x).sin() + 2.0, |x: f64| (50.0 * x).exp(), |x: f64| 1e6 * x.powi(4) + 1.0] {
+        for f in
+            [|x: f64| math::sin(30.0 * x) + 2.0, |x: f64| math::exp(50.0 * x), |x: f64| 1e6 * math::powi(x, 4) + 1.0]
+        {
             assert!(smooth(f).is_none_or(|noise| noise < 1e-9), "{:?}", smooth(f));
         }
     }

@@ -1,6 +1,7 @@
 //! Crossover and mutation of real numbers in the unit box, without allocation.
 
 use mops_core::Stream;
+use mops_core::math;
 use rand::Rng;
 
 /// Simulated binary crossover and polynomial mutation, the mutation within the bounds. N.B.: a density of the crossover that
@@ -43,7 +44,8 @@ impl Variation {
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
             let u: f64 = random.random();
             let share = 2.0 * u;
-            let spread = if share <= 1.0 { share.powf(1.0 / power) } else { (2.0 - share).powf(-1.0 / power) };
+            let spread =
+                if share <= 1.0 { math::powf(share, 1.0 / power) } else { math::powf(2.0 - share, -1.0 / power) };
             // Children that leave the box end on its face: a face is where an optimum often lies.
             let first = (middle - half * spread).clamp(0.0, 1.0);
             let second = (middle + half * spread).clamp(0.0, 1.0);
@@ -60,9 +62,9 @@ impl Variation {
             }
             let u: f64 = random.random();
             let step = if u < 0.5 {
-                (2.0 * u + (1.0 - 2.0 * u) * (1.0 - *x).powf(power)).powf(1.0 / power) - 1.0
+                math::powf(2.0 * u + (1.0 - 2.0 * u) * math::powf(1.0 - *x, power), 1.0 / power) - 1.0
             } else {
-                1.0 - (2.0 * (1.0 - u) + (2.0 * u - 1.0) * x.powf(power)).powf(1.0 / power)
+                1.0 - math::powf(2.0 * (1.0 - u) + (2.0 * u - 1.0) * math::powf(*x, power), 1.0 / power)
             };
             *x = (*x + step).clamp(0.0, 1.0);
         }

@@ -1,5 +1,6 @@
 //! What is shown of points whose optimality is known.
 
+use mops_core::math;
 use mops_core::{Budget, Evaluation, Evaluator, Objective, Pareto, Run, Shape, Usage};
 use mops_solvers::certify;
 
@@ -56,17 +57,17 @@ impl Evaluator for Two {
 
 /// How far a point is from a bent sheet, which is a kink of both rows and holds their front.
 fn off(x: &[f64]) -> f64 {
-    (x[1] - 0.5 - 4.0 * (x[0] - 0.5).powi(2) - (x[2] - 0.4).powi(2)).abs()
+    (x[1] - 0.5 - 4.0 * math::powi(x[0] - 0.5, 2) - math::powi(x[2] - 0.4, 2)).abs()
 }
 
 /// On the sheet the rows are squared distances to two points: the front is what lies between them.
 fn kinked(x: &[f64]) -> [f64; 2] {
-    let distance = |x1: f64| (x[0] - x1).powi(2) + (x[2] - 0.4).powi(2);
+    let distance = |x1: f64| math::powi(x[0] - x1, 2) + math::powi(x[2] - 0.4, 2);
     [distance(0.3) + 2.0 * off(x), distance(0.7) + 0.5 * off(x)]
 }
 
 fn on_the_sheet(x1: f64) -> [f64; 3] {
-    [x1, 0.5 + 4.0 * (x1 - 0.5).powi(2), 0.4]
+    [x1, 0.5 + 4.0 * math::powi(x1 - 0.5, 2), 0.4]
 }
 
 #[test]
@@ -90,15 +91,15 @@ fn a_point_of_the_kink_that_both_rows_can_leave_behind_is_not_certified() {
 
 /// A steep kink of the first row alone, oblique and strongly bent: steps along it leave it, or see the mean of both sides.
 fn steep(x: &[f64]) -> [f64; 2] {
-    let off = x[1] - 0.5 - BENT * (x[0] - 0.5).powi(2) - (x[2] - 0.4);
-    let distance = |x1: f64| (x[0] - x1).powi(2) + (x[2] - 0.4).powi(2);
+    let off = x[1] - 0.5 - BENT * math::powi(x[0] - 0.5, 2) - (x[2] - 0.4);
+    let distance = |x1: f64| math::powi(x[0] - x1, 2) + math::powi(x[2] - 0.4, 2);
     [distance(0.3) + (20.0 * off).max(-60.0 * off), distance(0.7)]
 }
 
 const BENT: f64 = 5.0;
 
 fn on_the_steep_sheet(x1: f64) -> [f64; 3] {
-    [x1, 0.5 + BENT * (x1 - 0.5).powi(2), 0.4]
+    [x1, 0.5 + BENT * math::powi(x1 - 0.5, 2), 0.4]
 }
 
 #[test]
@@ -116,7 +117,7 @@ fn a_jump_nearby_certifies_nothing() {
     // Up to the jump both rows fall along the second coordinate.
     let jump = |x: &[f64]| {
         let beyond = if x[1] > 0.5002 { 10.0 } else { 0.0 };
-        [beyond - x[1] + (x[0] - 0.4).powi(2), beyond - 2.0 * x[1] + (x[0] - 0.6).powi(2)]
+        [beyond - x[1] + math::powi(x[0] - 0.4, 2), beyond - 2.0 * x[1] + math::powi(x[0] - 0.6, 2)]
     };
     assert_ne!(Two::new(jump).shown([0.5, 0.5, 0.5]), Pareto::CertifiedLocal);
 }

@@ -1,6 +1,7 @@
 //! Fronts found by `weighted-chebyshev`, `nsga2` and `nsga3`, against fronts that are known.
 
 use mops_core::front::{hypervolume, inverted_generational_distance, thinned};
+use mops_core::math;
 use mops_core::{Budget, Run, Stop};
 use mops_problems::{Answer, Posed, Slope};
 use mops_solvers::evolution::{Evolution, Survival};
@@ -97,7 +98,7 @@ fn weighted_chebyshev_spreads_points_over_a_sphere() {
     // No direction of the octant is without a point near it: the mesh of 28 weights has triangles with sides of up to 0.4.
     let (_, all) = known_front(&problem, 1);
     let far = |at: &Vec<f64>| {
-        let square = |row: &Vec<f64>| row.iter().zip(at).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let square = |row: &Vec<f64>| row.iter().zip(at).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>();
         rows.iter().map(square).fold(f64::INFINITY, f64::min).sqrt()
     };
     let farthest = all.iter().max_by(|a, b| far(a).total_cmp(&far(b))).unwrap();

@@ -7,6 +7,7 @@ use clap::Args;
 use mops_core::Diagnostic;
 use mops_core::data::DataFile;
 use mops_core::identification::{excitation_report, spacing};
+use mops_core::math;
 
 use super::tables::{number, table};
 use super::{Trouble, findings, print};
@@ -110,7 +111,7 @@ fn noise(values: &[f64], times: Option<&[f64]>, longest: f64) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
     let follows = |i: usize| times.is_none_or(|t| t[i..i + 4].windows(2).all(|pair| pair[1] - pair[0] <= longest));
     let windows = values.windows(4).enumerate().filter(|(i, w)| w.iter().all(|v| v.is_finite()) && follows(*i));
-    let squares = windows.map(|(_, w)| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2));
+    let squares = windows.map(|(_, w)| math::powi(w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0], 2));
     let (count, sum) = squares.fold((0_u32, 0.0), |(count, sum), square| (count + 1, sum + square));
     (count >= 20).then(|| (sum / f64::from(count) / 20.0).sqrt())
 }

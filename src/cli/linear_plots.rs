@@ -2,6 +2,7 @@
 
 use mops_core::StateSpace;
 use mops_core::linear::{Complex, FrequencyResponse, eigenvalues, zeros};
+use mops_core::math::{self, complex};
 
 use crate::report::{Curve, CurveStyle, Ink, Plot, Sweep, bode, frequencies};
 
@@ -28,13 +29,13 @@ fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> 
 
 fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
     // What is far away hides what happens around -1; a gain at frequency 0 is shown where it is moderate.
-    let limit = response.scalar(0.0).norm().clamp(1.5, 8.0) * 1.1;
+    let limit = complex::norm(response.scalar(0.0)).clamp(1.5, 8.0) * 1.1;
     let limit = if limit.is_finite() { limit } else { 3.0 };
     let shown = |sign: f64| -> Vec<(f64, f64)> {
-        let inside = |z: &Complex| z.norm() <= limit;
+        let inside = |z: &Complex| complex::norm(*z) <= limit;
         values.iter().map(|z| if inside(z) { (z.re, sign * z.im) } else { (f64::NAN, f64::NAN) }).collect()
     };
-    let circle = (0..=200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin_cos());
+    let circle = (0..=200).map(|i| math::sin_cos(std::f64::consts::TAU * f64::from(i) / 200.0));
     let curve = |name: &str, points, style, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
     Plot {
         title: format!("Nyquist curve of {name}"),
@@ -55,7 +56,7 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
 /// negative. A delay is left out.
 fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let (poles, zeros) = (system.poles()?, zeros(system)?);
-    let size = shown(poles.iter().chain(&zeros).map(|z| z.norm()).collect());
+    let size = shown(poles.iter().chain(&zeros).map(|z| complex::norm(*z)).collect());
     let direct = system.d[(0, 0)];
     let closed = |k: f64| eigenvalues(&(&system.a - &system.b * &system.c * (k / (1.0 + k * direct))));
     let mut branches: Vec<Vec<Complex>> = poles.iter().map(|&pole| vec![pole]).collect();
@@ -72,8 +73,8 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
             continue;
         };
         let moved = matched(&branches, roots);
-        let inside = |z: &Complex| z.norm() < 3.0 * size;
-        let farthest = branches.iter().zip(&moved).map(|(b, z)| (b, (z - b[b.len() - 1]).norm()));
+        let inside = |z: &Complex| complex::norm(*z) < 3.0 * size;
+        let farthest = branches.iter().zip(&moved).map(|(b, z)| (b, complex::norm(z - b[b.len() - 1])));
         let farthest = farthest.filter(|(b, _)| inside(&b[b.len() - 1])).map(|(_, d)| d).fold(0.0, f64::max);
         if farthest > 0.02 * size && step > 1e-12 * (k + 1e-9) {
             step *= 0.5;
@@ -87,7 +88,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     }
     let limit = 2.0 * size;
     // The picture is wider than high: what lies beside the others is not left out if there is room for it.
-    let beside = if poles.iter().chain(&zeros).any(|z| z.norm() > size) { 3.0 * limit } else { limit };
+    let beside = if poles.iter().chain(&zeros).any(|z| complex::norm(*z) > size) { 3.0 * limit } else { limit };
     let point =
         |z: &Complex| if z.re.abs() <= beside && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
     let marks = |name: &str, of: &[Complex], style, ink| Curve {
@@ -141,7 +142,7 @@ fn matched(branches: &[Vec<Complex>], roots: Vec<Complex>) -> Vec<Complex> {
     let n = branches.len();
     let end = |i: usize| branches[i][branches[i].len() - 1];
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
-    pairs.sort_by(|a, b| (end(a.0) - roots[a.1]).norm().total_cmp(&(end(b.0) - roots[b.1]).norm()));
+    pairs.sort_by(|a, b| complex::norm(end(a.0) - roots[a.1]).total_cmp(&complex::norm(end(b.0) - roots[b.1])));
     let (mut of_branch, mut used) = (vec![None; n], vec![false; n]);
     for (i, j) in pairs {
         if of_branch[i].is_none() && !used[j] {

@@ -1,5 +1,7 @@
 //! A curve in a line of text.
 
+use mops_core::math;
+
 /// Heights of a letter, from low to high.
 const BLOCKS: [char; 8] =
     ['\u{2581}', '\u{2582}', '\u{2583}', '\u{2584}', '\u{2585}', '\u{2586}', '\u{2587}', '\u{2588}'];
@@ -11,7 +13,7 @@ pub(super) fn sparkline(points: &[(usize, f64)], evaluations: usize, width: usiz
     let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
     let log = low > 0.0 && high > 10.0 * low;
     let height = |value: f64| {
-        let [value, low, high] = [value, low, high].map(|v| if log { v.ln() } else { v });
+        let [value, low, high] = [value, low, high].map(|v| if log { math::ln(v) } else { v });
         if high > low { (value - low) / (high - low) } else { 0.0 }
     };
     let letter = |column: usize| {

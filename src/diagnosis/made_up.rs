@@ -1,6 +1,7 @@
 //! Diagnoses by hand, for tests of what is made of them.
 
 use mops_core::Role;
+use mops_core::math;
 use mops_discrepancy::{
     Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove, Prediction, Ranked, Rival,
     Stability, Step, StrengthValue, Unexplained, Verdict,
@@ -8,7 +9,7 @@ use mops_discrepancy::{
 
 /// A value between -1 and 1 that looks like chance.
 fn chance(i: usize) -> f64 {
-    let x = (i as f64 * 12.9898).sin() * 43_758.547;
+    let x = math::sin(i as f64 * 12.9898) * 43_758.547;
     2.0 * (x - x.floor()) - 1.0
 }
 
@@ -25,7 +26,7 @@ fn strength(name: &str, value: f64, unit: &str) -> StrengthValue {
 /// A channel whose model swings too long before, and rightly after.
 fn prediction(experiment: &str, role: Role, signal: &str, phase: f64) -> Prediction {
     let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
-    let swing = |t: f64, decay: f64| (-decay * t).exp() * (7.0 * t + phase).cos();
+    let swing = |t: f64, decay: f64| math::exp(-decay * t) * math::cos(7.0 * t + phase);
     let noise = 0.003;
     Prediction {
         experiment: experiment.into(),
@@ -34,7 +35,7 @@ fn prediction(experiment: &str, role: Role, signal: &str, phase: f64) -> Predict
         unit: "rad".into(),
         noise,
         measured: times.iter().enumerate().map(|(i, &t)| swing(t, 0.5) + 1.7 * noise * chance(i)).collect(),
-        before: times.iter().map(|&t| swing(t, 0.5) + 0.012 * t * (7.0 * t + phase).sin()).collect(),
+        before: times.iter().map(|&t| swing(t, 0.5) + 0.012 * t * math::sin(7.0 * t + phase)).collect(),
         after: times.iter().map(|&t| swing(t, 0.5)).collect(),
         times,
     }
@@ -53,14 +54,14 @@ fn error(name: &str, role: Role, [phi, theta, normalised]: [f64; 3]) -> Experime
 /// A force over time, over the speed and over the position, that is Coulomb friction of 0.0124 N m where `true_place`.
 fn evidence(place: &str, evidence: f64, share: f64, true_place: bool) -> Evidence {
     let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
-    let speed: Vec<f64> = times.iter().map(|&t| -7.0 * (-0.5 * t).exp() * (7.0 * t).sin()).collect();
+    let speed: Vec<f64> = times.iter().map(|&t| -7.0 * math::exp(-0.5 * t) * math::sin(7.0 * t)).collect();
     let force: Vec<f64> = speed
         .iter()
         .enumerate()
-        .map(|(i, v)| if true_place { -0.0124 * (4.0 * v).tanh() } else { 0.004 * chance(i) } + 0.0012 * chance(i + 7))
+        .map(|(i, v)| if true_place { -0.0124 * math::tanh(4.0 * v) } else { 0.004 * chance(i) } + 0.0012 * chance(i + 7))
         .collect();
     let formula = speed.iter().map(|v| -0.0124 * v.signum()).collect();
-    let position = times.iter().map(|t| (7.0 * t).cos()).collect();
+    let position = times.iter().map(|t| math::cos(7.0 * t)).collect();
     let found: Vec<f64> = if true_place { formula } else { Vec::new() };
     let curve = |x: Vec<f64>| Curve { x, estimated: force.clone(), found: found.clone() };
     Evidence {
@@ -195,7 +196,7 @@ pub(crate) fn nothing() -> Diagnosis {
 /// Something in a process that no effect explains.
 pub(crate) fn unexplained() -> Diagnosis {
     let diagnosis = coulomb();
-    let table = (0..9).map(|i| [f64::from(i), (0.7 * f64::from(i)).sin()]).collect();
+    let table = (0..9).map(|i| [f64::from(i), math::sin(0.7 * f64::from(i))]).collect();
     let unexplained = Unexplained { place: "process:x".into(), share: 0.8, over: "position".into(), table };
     Diagnosis {
         verdict: Verdict::Unexplained,

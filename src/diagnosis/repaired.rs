@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{AnalysisKind, Effect, Scope, Strength, Study};
 use mops_discrepancy::{Diagnosis, Found, StrengthValue};
 
@@ -193,7 +194,7 @@ fn tuner(strength: &StrengthValue, known: Option<&Strength>, own: &[(String, f64
 fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     let size = if value.is_finite() && value != 0.0 { REACH * value.abs() } else { 1.0 };
     // Up to the next round number.
-    let decade = 10f64.powf(size.log10().floor());
+    let decade = math::powf(10.0, math::log10(size).floor());
     let reach = (size / decade - 1e-9).ceil() * decade;
     // By way of a text: 3 * 0.1 is not 0.3.
     let reach: f64 = format!("{reach:.0e}").parse().unwrap_or(reach);
@@ -236,8 +237,8 @@ free     = [\"phi\", \"theta\"]
     impl Files for Memory {
         fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
             assert_eq!(path, "../data/swing.csv");
-            let rows =
-                (0..20).map(|i| format!("{},{},{}\n", f64::from(i) * 0.01, f64::from(i).sin(), f64::from(i).cos()));
+            let rows = (0..20)
+                .map(|i| format!("{},{},{}\n", f64::from(i) * 0.01, math::sin(f64::from(i)), math::cos(f64::from(i))));
             Ok(format!("t,phi,theta\n{}", rows.collect::<String>()).into_bytes())
         }
 

@@ -1,6 +1,7 @@
 //! Axes: round ticks within a range, and their labels.
 
 use super::range::drawable;
+use mops_core::math;
 
 /// An axis that is ready to be drawn.
 #[derive(Debug, Clone)]
@@ -35,11 +36,11 @@ impl Axis {
 
     fn linear(range: [f64; 2], step: f64, count: f64) -> Self {
         let [low, high] = range;
-        let power = low.abs().max(high.abs()).log10().floor();
+        let power = math::log10(low.abs().max(high.abs())).floor();
         // Powers that engineers have a prefix for, and only where the plain number is hard to read.
         let power = if (-3.0..5.0).contains(&power) { 0.0 } else { (power / 3.0).floor() * 3.0 };
-        let factor = 10f64.powf(power);
-        let decimals = (-(step / factor).log10().floor()).clamp(0.0, 12.0) as usize;
+        let factor = math::powf(10.0, power);
+        let decimals = (-math::log10(step / factor).floor()).clamp(0.0, 12.0) as usize;
         let ticks = (0..=(2.0 * count) as usize)
             .map(|i| ((low / step - 1e-9).ceil() + i as f64) * step)
             .filter(|&value| value <= high + 1e-9 * step)
@@ -59,7 +60,7 @@ impl Axis {
 
 /// The next of 1, 2, 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
+    let power = math::powf(10.0, math::log10(step).floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|f| step <= f * power * (1.0 + 1e-9)).unwrap_or(10.0);
     factor * power
 }
@@ -77,10 +78,10 @@ fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
             continue;
         }
         for step in steps {
-            let at = f64::from(power) + step.log10();
+            let at = f64::from(power) + math::log10(*step);
             if at >= low - 1e-9 && at <= high + 1e-9 {
                 let label = match power {
-                    -3..=3 => super::numbers::significant(step * 10f64.powi(power), 1),
+                    -3..=3 => super::numbers::significant(step * math::powi(10.0, power), 1),
                     _ if *step == 1.0 => format!("10{}", superscript(power)),
                     _ => format!("{step}\u{b7}10{}", superscript(power)),
                 };
@@ -93,12 +94,12 @@ fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
 
 /// Ticks where no power of ten may lie in the range: round values.
 fn close(low: f64, high: f64) -> Vec<(f64, String)> {
-    let [from, to] = [low, high].map(|end| 10f64.powf(end));
+    let [from, to] = [low, high].map(|end| math::powf(10.0, end));
     let step = round_step((to - from) / 5.0);
     (0..=12)
         .map(|i| ((from / step - 1e-9).ceil() + f64::from(i)) * step)
         .filter(|&value| value <= to * (1.0 + 1e-9))
-        .map(|value| ((value.log10() - low) / (high - low), super::numbers::significant(value, 4)))
+        .map(|value| ((math::log10(value) - low) / (high - low), super::numbers::significant(value, 4)))
         .collect()
 }
 

@@ -1,6 +1,7 @@
 //! Frequency responses of linear systems: magnitude and phase over the logarithm of the frequency.
 
 use mops_core::linear::{Complex, zeros};
+use mops_core::math::{self, complex};
 use mops_core::{Analysis, Failure, StateSpace};
 
 use super::plot::{Curve, CurveStyle, Ink, Plot};
@@ -21,18 +22,18 @@ pub(crate) struct Sweep<'a> {
 /// Angular frequencies around everything that happens, two decades to both sides; dense around sharp resonances.
 pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     let corners = [system.poles()?, zeros(system)?].concat();
-    let largest = corners.iter().map(|z| z.norm()).fold(0.0, f64::max);
-    let sizes = corners.iter().map(|z| z.norm()).filter(|size| *size > 1e-9 * largest);
+    let largest = corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
+    let sizes = corners.iter().map(|z| complex::norm(*z)).filter(|size| *size > 1e-9 * largest);
     let sizes = || sizes.clone().chain((system.delay > 0.0).then(|| 1.0 / system.delay));
     let (low, high) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
     let (low, mut high) = if low.is_finite() { (1e-2 * low, 1e2 * high) } else { (1e-2, 1e2) };
     if system.delay > 0.0 {
         // Later the phase only turns and turns.
-        high = high.min((3.0 * corners.iter().map(|z| z.norm()).fold(0.0, f64::max)).max(6.0 / system.delay));
+        high = high.min((3.0 * corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max)).max(6.0 / system.delay));
     }
     const COUNT: usize = 1200;
-    let step = (high / low).ln() / COUNT as f64;
-    let mut omegas: Vec<f64> = (0..=COUNT).map(|i| low * (step * i as f64).exp()).collect();
+    let step = math::ln(high / low) / COUNT as f64;
+    let mut omegas: Vec<f64> = (0..=COUNT).map(|i| low * math::exp(step * i as f64)).collect();
     for resonance in corners.iter().filter(|z| z.im > 0.0) {
         let width = resonance.re.abs().max(1e-6 * resonance.im);
         omegas.extend((-60..=60).map(|i| resonance.im + 0.1 * f64::from(i) * width));
@@ -63,16 +64,16 @@ pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2
         degrees: title == "phase",
         ..Plot::default()
     };
-    let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * g.norm().log10()).collect();
+    let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * math::log10(complex::norm(*g))).collect();
     [of("magnitude", "magnitude (dB)", &decibel), of("phase", "phase (deg)", &followed)]
 }
 
 /// The phase, deg, followed from frequency to frequency: it does not jump by a turn.
 fn followed(values: &[Complex]) -> Vec<f64> {
-    let mut last = values.first().map_or(0.0, |g| g.arg());
+    let mut last = values.first().map_or(0.0, |g| complex::arg(*g));
     let mut phase = Vec::with_capacity(values.len());
     for (i, value) in values.iter().enumerate() {
-        last += if i == 0 { 0.0 } else { (value / values[i - 1]).arg() };
+        last += if i == 0 { 0.0 } else { complex::arg(value / values[i - 1]) };
         phase.push(last.to_degrees());
     }
     phase
@@ -130,7 +131,7 @@ mod tests {
         let needle = TransferFunction::new(vec![1.0], vec![1.0, 1e-4, 100.0]).state_space().unwrap();
         let omegas = frequencies(&needle).unwrap();
         let response = needle.response().unwrap();
-        let highest = omegas.iter().map(|&omega| response.scalar(omega).norm()).fold(0.0, f64::max);
+        let highest = omegas.iter().map(|&omega| complex::norm(response.scalar(omega))).fold(0.0, f64::max);
         assert!((highest * 1e-3 - 1.0).abs() < 1e-3, "{highest}");
         assert!(omegas.windows(2).all(|pair| pair[0] <= pair[1]));
     }

@@ -1,5 +1,7 @@
 //! Curves on paper: cut at the frame, without the points that nobody can see.
 
+use mops_core::math;
+
 /// A point of the drawing: x to the right, y down.
 pub(super) type Point = [f64; 2];
 
@@ -82,7 +84,7 @@ pub(super) fn distance(p: Point, a: Point, b: Point) -> f64 {
     let (d, e) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let length = d[0] * d[0] + d[1] * d[1];
     let s = if length > 0.0 { ((d[0] * e[0] + d[1] * e[1]) / length).clamp(0.0, 1.0) } else { 0.0 };
-    (e[0] - s * d[0]).hypot(e[1] - s * d[1])
+    math::hypot(e[0] - s * d[0], e[1] - s * d[1])
 }
 
 #[cfg(test)]

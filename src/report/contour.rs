@@ -43,15 +43,16 @@ fn cut(corners: [f64; 4], [x, y]: [f64; 2], level: f64, segments: &mut Vec<[[f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mops_core::math;
 
     #[test]
     fn the_contour_of_a_cone_is_a_circle_of_the_right_length() {
         let grid: Vec<Vec<f64>> =
-            (0..41).map(|r| (0..41).map(|c| f64::hypot(f64::from(c) - 20.0, f64::from(r) - 20.0)).collect()).collect();
+            (0..41).map(|r| (0..41).map(|c| math::hypot(f64::from(c) - 20.0, f64::from(r) - 20.0)).collect()).collect();
         let segments = contour(&grid, 12.3);
-        let length: f64 = segments.iter().map(|[a, b]| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
+        let length: f64 = segments.iter().map(|[a, b]| math::hypot(a[0] - b[0], a[1] - b[1])).sum();
         assert!((length / (std::f64::consts::TAU * 12.3) - 1.0).abs() < 2e-3, "{length}");
-        assert!(segments.iter().flatten().all(|p| ((p[0] - 20.0).hypot(p[1] - 20.0) - 12.3).abs() < 0.02));
+        assert!(segments.iter().flatten().all(|p| (math::hypot(p[0] - 20.0, p[1] - 20.0) - 12.3).abs() < 0.02));
     }
 
     #[test]

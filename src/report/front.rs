@@ -1,6 +1,7 @@
 //! The front: its points over every pair of criteria, the tuners along it, and a table of all of them.
 
 use maud::{Markup, html};
+use mops_core::math;
 use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
 
 use super::Report;
@@ -139,7 +140,7 @@ fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Pl
     let all: Vec<&Quantity> = criteria.iter().chain(tuners.iter().take(MOST_TUNERS)).collect();
     let ends: Vec<[f64; 2]> = all.iter().map(|quantity| quantity.ends()).collect();
     let height = |quantity: &Quantity, [low, high]: [f64; 2], i: usize| {
-        let drawn = |value: f64| if quantity.log { value.ln() } else { value };
+        let drawn = |value: f64| if quantity.log { math::ln(value) } else { value };
         let [low, high] = [low, high].map(drawn);
         if high > low { (drawn(quantity.values[i]) - low) / (high - low) } else { 0.5 }
     };

@@ -13,6 +13,7 @@ use super::plot::Ink;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
 use crate::files;
+use mops_core::math;
 
 /// Pixels per unit of the scene.
 const SCALE: f64 = 2.0;
@@ -124,7 +125,7 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
     let (mut drawing, mut left) = (true, on);
     for pair in points.windows(2) {
         let (a, b) = (pair[0], pair[1]);
-        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let length = math::hypot(b[0] - a[0], b[1] - a[1]);
         let mut at = 0.0;
         while length - at > left {
             at += left;

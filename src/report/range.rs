@@ -1,10 +1,11 @@
 //! Ranges of values: what of a plot is shown.
 
 use super::plot::Plot;
+use mops_core::math;
 
 /// A value, or its logarithm, if it is one that can be drawn.
 pub(super) fn drawable(value: f64, log: bool) -> Option<f64> {
-    let value = if log { value.log10() } else { value };
+    let value = if log { math::log10(value) } else { value };
     // Beyond this, differences of two values would overflow.
     (value.abs() < 1e150).then_some(value)
 }

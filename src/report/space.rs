@@ -5,6 +5,7 @@ use super::clip::Point;
 use super::plot::{Ink, Plot};
 use super::range::{drawable, range_of};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
+use mops_core::math;
 
 /// A place in the box, whose sides reach from -1 to 1: along x, along y, upwards.
 pub(super) type Place = [f64; 3];
@@ -29,8 +30,9 @@ impl View {
 
     /// Where a place lies on the drawing.
     pub(super) fn project(&self, [x, y, z]: Place) -> Point {
-        let (across, depth) = (x * self.turn.cos() - y * self.turn.sin(), x * self.turn.sin() + y * self.turn.cos());
-        let up = z * self.height.cos() + depth * self.height.sin();
+        let (across, depth) =
+            (x * math::cos(self.turn) - y * math::sin(self.turn), x * math::sin(self.turn) + y * math::cos(self.turn));
+        let up = z * math::cos(self.height) + depth * math::sin(self.height);
         [self.middle[0] + self.scale * across, self.middle[1] - self.scale * up]
     }
 }

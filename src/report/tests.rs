@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{
     Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
     CriterionSlopes, CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model,
@@ -39,7 +40,7 @@ impl Model for Lag {
         let mut trace = Trace::starting_at(0.0, 50);
         let h = job.horizon / 50.0;
         for i in 0..50 {
-            trace.push(f64::from(i + 1) * h, Trace::NODES.map(|s| 1.0 - (-(f64::from(i) + s) * h / lag).exp()));
+            trace.push(f64::from(i + 1) * h, Trace::NODES.map(|s| 1.0 - math::exp(-(f64::from(i) + s) * h / lag)));
         }
         Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
     }
@@ -72,7 +73,7 @@ impl Criterion for End {
 /// A study with a case and an experiment, and the outcome that a run would write.
 fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome, Vec<Record>) {
     let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
-    let values = times.iter().map(|t| 1.0 - (-t / 1.3f64).exp() + 0.01 * (40.0 * t).sin()).collect();
+    let values = times.iter().map(|t| 1.0 - math::exp(-t / 1.3f64) + 0.01 * math::sin(40.0 * t)).collect();
     let channel =
         ChannelDraft { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelDraft::default() };
     let measured = Measured { channels: vec![channel], role: Role::Calibration, ..Measured::default() };

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use mops_core::math;
 use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
 use mops_solvers::certificate;
 
@@ -113,7 +114,7 @@ fn price(found: &TradeOffs, i: usize) -> String {
     let (Some(weights), [first, second]) = (&found.points[i].weights, found.criteria.as_slice()) else {
         return String::new();
     };
-    let step = 10f64.powf((0.2 * (first.worst - first.best).abs()).log10().floor());
+    let step = math::powf(10.0, math::log10(0.2 * (first.worst - first.best).abs()).floor());
     if !step.is_normal() {
         return String::new();
     }

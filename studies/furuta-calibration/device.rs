@@ -10,8 +10,8 @@
 
 use std::fmt::Write;
 
+use mops_core::math;
 use rand::SeedableRng;
-use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// A pendulum on an arm.
@@ -41,14 +41,13 @@ const GRAVITY: f64 = 9.81;
 /// Three seconds at 100 Hz, both angles with white noise, as a CSV text; the torque is a column where `torque` says so.
 pub fn recording(device: &Device, start: State, noise: f64, seed: u64, torque: bool) -> String {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let noise = Normal::new(0.0, noise).expect("the deviation is positive");
     let mut text =
         String::from(if torque { "t[s],u[N m],phi[rad],theta[rad]\n" } else { "t[s],phi[rad],theta[rad]\n" });
     let mut state = start;
     for sample in 0..=300_u32 {
         let time = f64::from(sample) * 0.01;
-        let phi = state[0][0] + noise.sample(&mut random);
-        let theta = state[0][1] + noise.sample(&mut random);
+        let phi = state[0][0] + noise * math::normal(&mut random);
+        let theta = state[0][1] + noise * math::normal(&mut random);
         let line = if torque {
             writeln!(text, "{time:.2},{:.6},{phi:.6},{theta:.6}", (device.torque)(time))
         } else {
@@ -106,7 +105,7 @@ impl Device {
 
     /// Mass matrix and torques without friction.
     fn mass_and_force(&self, q: Vector, w: Vector) -> ([Vector; 3], Vector) {
-        let [[sf, cf], [st, ct], [sp, cp]] = q.map(|angle| [angle.sin(), angle.cos()]);
+        let [[sf, cf], [st, ct], [sp, cp]] = q.map(|angle| [math::sin(angle), math::cos(angle)]);
         let about_vertical = |[x, y, z]: Vector| [x * cf + z * sf, y, z * cf - x * sf];
         let axes = [[0.0, 1.0, 0.0], [cf, 0.0, -sf], about_vertical([0.0, -st, ct])];
         let rod = about_vertical([-sp, cp * ct, cp * st]);

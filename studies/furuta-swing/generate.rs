@@ -8,8 +8,8 @@
 
 use std::fmt::Write;
 
+use mops_core::math;
 use rand::SeedableRng;
-use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Inertia of the pendulum, of the arm, coupling (kg m2) and gravity torque (N m) of the device.
@@ -33,10 +33,9 @@ const NOISE: f64 = 0.003;
 /// The recording as a CSV text.
 pub fn recording(seed: u64, start: [f64; 4]) -> String {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let noise = Normal::new(0.0, NOISE).expect("the deviation is positive");
     let mut measure = |angle: f64, lines: f64| {
         let resolution = std::f64::consts::TAU / lines;
-        ((angle + noise.sample(&mut random)) / resolution).round() * resolution
+        ((angle + NOISE * math::normal(&mut random)) / resolution).round() * resolution
     };
     let mut text = String::from("t[s],phi[rad],theta[rad]\n");
     let mut state = start;
@@ -58,7 +57,7 @@ fn advance([phi, v, theta, w]: [f64; 4]) -> [f64; 4] {
     let [a, b, c, d] = LUMPED;
     let half = 0.5 * STEP;
     let angle = theta + half * w;
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = math::sin_cos(angle);
     // Mass matrix in the order arm, pendulum, and its inverse.
     let (m11, m12, m22) = (b + a * sin * sin, c * cos, a);
     let determinant = m11 * m22 - m12 * m12;

@@ -4,6 +4,7 @@
 mod device;
 
 use device::Device;
+use mops_core::math;
 
 /// A pendulum that does not tilt, with viscous friction; its inertias are what the study looks for.
 const DEVICE: Device = Device {
@@ -20,7 +21,7 @@ const DEVICE: Device = Device {
 type Torque = fn(f64) -> f64;
 
 /// Name of the file, seed of its noise, torque on the arm (N m).
-pub const RECORDINGS: [(&str, u64, Torque); 2] = [("step.csv", 1, |_| 0.02), ("sine.csv", 2, |t| 0.02 * t.sin())];
+pub const RECORDINGS: [(&str, u64, Torque); 2] = [("step.csv", 1, |_| 0.02), ("sine.csv", 2, |t| 0.02 * math::sin(t))];
 
 /// The recording as a CSV text: from hanging at rest, noise of 0.01 rad.
 pub fn recording(seed: u64, torque: Torque) -> String {

@@ -4,6 +4,7 @@ use mops::{Chosen, CriterionDraft, TunerDraft, UncertaintyTask};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
+use mops_core::math;
 
 /// Samples of one record as the estimator counts them: slopes along the parameters, weights of squared deviations, and the
 /// standard deviation of their noise.
@@ -21,7 +22,7 @@ pub fn scatter(records: &[Samples]) -> Vec<f64> {
         for (slopes, weight) in record.slopes.iter().zip(&record.weights) {
             let x = DVector::from_column_slice(slopes);
             a += *weight * &x * x.transpose();
-            b += (weight * record.noise).powi(2) * &x * x.transpose();
+            b += math::powi(weight * record.noise, 2) * &x * x.transpose();
         }
     }
     let inverse = a.try_inverse().unwrap();
@@ -61,7 +62,7 @@ fn neighbours() -> Vec<Lines> {
     let normal: fn() -> Vec<(&'static str, CriterionDraft)> = || vec![("y", normalised("y")), ("z", normalised("z"))];
     let fits: fn() -> Vec<(&'static str, CriterionDraft)> = || vec![("y", fit("y")), ("z", fit("z"))];
     let uneven = |signal| {
-        let times: Vec<f64> = (0..60).map(|i| 2.0 * (f64::from(i) / 59.0).powi(2)).collect();
+        let times: Vec<f64> = (0..60).map(|i| 2.0 * math::powi(f64::from(i) / 59.0, 2)).collect();
         Channel { times, ..channel(signal, 60, 0.02) }
     };
     vec![
@@ -167,7 +168,7 @@ fn standard_errors_are_the_scatter_of_the_estimator_whatever_counts_and_weights(
         for seed in 0..SETS {
             let outcome = of.calibration.run(u64::from(seed));
             for (square, parameter) in squares.iter_mut().zip(parameters(&outcome)) {
-                *square += parameter.std_error.powi(2) / f64::from(SETS);
+                *square += math::powi(parameter.std_error, 2) / f64::from(SETS);
             }
         }
         for (square, exact) in squares.iter().zip(exact) {
@@ -196,12 +197,12 @@ fn profiles_of_linear_models_are_their_intervals_whatever_counts_and_weights() {
 }
 
 fn decays(count: [u32; 2], shared: bool, uncertainty: Option<UncertaintyTask>) -> Calibration {
-    let short = if shared { |t: f64| (-t).exp() } else { |t: f64| (-0.5 * t).exp() };
+    let short = if shared { |t: f64| math::exp(-t) } else { |t: f64| math::exp(-0.5 * t) };
     Calibration {
-        model: Box::new(|| Curve::new(&["k"], |p, t| (-p[0] * t).exp()).into()),
+        model: Box::new(|| Curve::new(&["k"], |p, t| math::exp(-p[0] * t)).into()),
         tuners: vec![("k", TunerDraft { per_case: !shared, ..TunerDraft::new(2.0, 0.1, 10.0).log() })],
         channels: vec![
-            Channel::new("long", "y", count[0], 3.0, |t| (-t).exp(), 0.01).declared(),
+            Channel::new("long", "y", count[0], 3.0, |t| math::exp(-t), 0.01).declared(),
             Channel::new("short", "y", count[1], 2.7, short, 0.01).declared(),
         ],
         criteria: Box::new(|| vec![("y", normalised("y"))]),
@@ -214,7 +215,7 @@ fn decays(count: [u32; 2], shared: bool, uncertainty: Option<UncertaintyTask>) -
 fn a_rate_of_a_short_record_has_the_error_of_its_own_samples() {
     let outcome = decays([1000, 10], false, None).run(0);
     let exact = |channel: &Channel, k: f64| {
-        0.01 / channel.times.iter().map(|t| (t * (-k * t).exp()).powi(2)).sum::<f64>().sqrt()
+        0.01 / channel.times.iter().map(|t| math::powi(t * math::exp(-k * t), 2)).sum::<f64>().sqrt()
     };
     let channels = decays([1000, 10], false, None).channels;
     for (parameter, channel) in parameters(&outcome).iter().zip(&channels) {

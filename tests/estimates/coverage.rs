@@ -4,6 +4,7 @@ use mops::statistics::share_interval;
 use mops::{CriterionDraft, TunerDraft};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
+use mops_core::math;
 
 /// Simulated calibrations of each kind.
 const CALIBRATIONS: u32 = 2000;
@@ -41,11 +42,11 @@ fn assert_covers(calibration: &Calibration, truth: &[(&str, f64)]) {
 
 /// A gain in both records, and a rate in each: 1000 samples and 10.
 fn unequal_lengths(declared: bool) -> Calibration {
-    let long = Channel::new("long", "y", 1000, 3.0, |t| (-t).exp(), 0.01);
-    let short = Channel::new("short", "y", 10, 3.0, |t| (-0.5 * t).exp(), 0.01);
+    let long = Channel::new("long", "y", 1000, 3.0, |t| math::exp(-t), 0.01);
+    let short = Channel::new("short", "y", 10, 3.0, |t| math::exp(-0.5 * t), 0.01);
     let channels = vec![long, short];
     Calibration {
-        model: Box::new(|| Curve::new(&["g", "k"], |p, t| p[0] * (-p[1] * t).exp()).into()),
+        model: Box::new(|| Curve::new(&["g", "k"], |p, t| p[0] * math::exp(-p[1] * t)).into()),
         tuners: vec![
             ("g", TunerDraft::new(2.0, 0.1, 10.0)),
             ("k", TunerDraft { per_case: true, ..TunerDraft::new(2.0, 0.1, 10.0).log() }),

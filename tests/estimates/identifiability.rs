@@ -4,6 +4,7 @@ use mops::{Chosen, Outcome, TunerDraft, UncertaintyTask};
 
 use super::closed_forms::{Samples, scatter};
 use super::models::{Calibration, Channel, Polynomials, normalised, parameters, words};
+use mops_core::math;
 
 /// `y = stiff (a + b) t + soft (a - b)`, with the noise 0.01 and 101 samples up to 1 s; `a = b = 0.5`.
 fn sum_and_difference(stiff: f64, soft: f64) -> Calibration {
@@ -30,7 +31,7 @@ fn rank(outcome: &Outcome) -> usize {
 #[test]
 fn a_direction_above_the_noise_is_determined_beside_any_stiff_one() {
     for power in 0..=6 {
-        let stiff = 10f64.powi(power);
+        let stiff = math::powi(10.0, power);
         let outcome = sum_and_difference(stiff, 1.0).run(0);
         assert_eq!(rank(&outcome), 2, "{stiff}: {}", words(&outcome));
         assert!(words(&outcome).contains("locally identifiable"), "{}", words(&outcome));

@@ -3,18 +3,19 @@
 use mops::{CriterionDraft, Outcome, Role, TunerDraft, Usage};
 
 use super::models::{Calibration, Channel, Curve, fit, normalised};
+use mops_core::math;
 
 /// `y = exp(-k t) + 0.3 exp(-s t)`; `k` is 0.5 in the calibration record `a`, 1.5 in `b`.
 fn records(role: Role, start: f64, criterion: fn(&str) -> CriterionDraft) -> Calibration {
     let of = |name, truth| Channel::new(name, "y", 41, 4.0, truth, 0.01).declared();
-    let b = of("b", |t| (-1.5 * t).exp() + 0.3 * (-0.2 * t).exp());
+    let b = of("b", |t| math::exp(-1.5 * t) + 0.3 * math::exp(-0.2 * t));
     Calibration {
-        model: Box::new(|| Curve::new(&["k", "s"], |p, t| (-p[0] * t).exp() + 0.3 * (-p[1] * t).exp()).into()),
+        model: Box::new(|| Curve::new(&["k", "s"], |p, t| math::exp(-p[0] * t) + 0.3 * math::exp(-p[1] * t)).into()),
         tuners: vec![
             ("k", TunerDraft { per_case: true, ..TunerDraft::new(start, 0.1, 10.0).log() }),
             ("s", TunerDraft::new(0.5, 0.01, 10.0).log()),
         ],
-        channels: vec![of("a", |t| (-0.5 * t).exp() + 0.3 * (-0.2 * t).exp()), Channel { role, ..b }],
+        channels: vec![of("a", |t| math::exp(-0.5 * t) + 0.3 * math::exp(-0.2 * t)), Channel { role, ..b }],
         criteria: Box::new(move || vec![("y", criterion("y"))]),
         uncertainty: None,
     }

@@ -7,6 +7,7 @@ use mops::{
     Options, Outcome, Parameter, ParameterReport, Response, Role, Task, TasksDraft, Trace, TunerDraft, UncertaintyTask,
     Variable, WithTangents, stream,
 };
+use mops_core::math;
 use rand::Rng;
 
 /// The normalised error of a signal, as a criterion.
@@ -44,7 +45,7 @@ impl Polynomials {
             let mut trace = Trace::starting_at(0.0, 1);
             let coefficient = |power: usize| {
                 let sum: f64 = self.terms[i].iter().zip(parameters).map(|(term, p)| p * term[power]).sum();
-                sum * job.horizon.powi(i32::try_from(power).unwrap())
+                sum * math::powi(job.horizon, i32::try_from(power).unwrap())
             };
             trace.push_polynomial(job.horizon, [0, 1, 2, 3, 4].map(coefficient));
             (self.interface.signals[i].name.clone(), trace)
@@ -171,12 +172,12 @@ impl Channel {
         // G. E. P. Box, M. E. Muller, Annals of Mathematical Statistics 29 (1958) 610-611.
         let mut normal = || {
             let [u, v]: [f64; 2] = [random.random(), random.random()];
-            (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+            (-2.0 * math::ln(1.0 - u)).sqrt() * math::cos(std::f64::consts::TAU * v)
         };
         let mut error = normal();
         let mut next = || {
             let now = error;
-            error = self.correlation * error + (1.0 - self.correlation.powi(2)).sqrt() * normal();
+            error = self.correlation * error + (1.0 - math::powi(self.correlation, 2)).sqrt() * normal();
             self.noise * now
         };
         let sample = |(i, &t): (usize, &f64)| {

@@ -5,6 +5,7 @@ use mops::{Chosen, Outcome, ProfileReport, TunerDraft, UncertaintyTask};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, normalised, words};
+use mops_core::math;
 
 /// Number of samples, at times where the curve is exact.
 const SAMPLES: u32 = 161;
@@ -31,10 +32,10 @@ fn profile(outcome: &Outcome) -> &ProfileReport {
 /// The values within the limit on a grid, given the least sum of squares for each.
 fn grid(least: impl Fn(f64) -> f64, between: [f64; 2], freedom: f64) -> [f64; 2] {
     let values: Vec<f64> =
-        (0..=4000).map(|i| between[0] * (between[1] / between[0]).powf(f64::from(i) / 4000.0)).collect();
+        (0..=4000).map(|i| between[0] * math::powf(between[1] / between[0], f64::from(i) / 4000.0)).collect();
     let sums: Vec<f64> = values.iter().map(|&v| least(v)).collect();
     let smallest = sums.iter().copied().fold(f64::INFINITY, f64::min);
-    let limit = t_quantile(0.975, freedom).powi(2) * smallest / freedom;
+    let limit = math::powi(t_quantile(0.975, freedom), 2) * smallest / freedom;
     let within = || values.iter().zip(&sums).filter(|(_, sum)| **sum - smallest <= limit).map(|(v, _)| *v);
     [within().next().unwrap(), within().next_back().unwrap()]
 }
@@ -72,9 +73,9 @@ fn joints() -> Vec<Joint> {
     let log = |start: f64, max: f64| TunerDraft::new(start, 0.1, max).log();
     let usual = Joint {
         what: "a bound at 1e9",
-        f: |p, t| p[0] * (p[3] * fast(t)).tanh() + p[1] * fast(t) + p[2],
+        f: |p, t| p[0] * math::tanh(p[3] * fast(t)) + p[1] * fast(t) + p[2],
         speed: fast,
-        truth: |t| 0.5 * (20.0 * fast(t)).tanh() + 0.5 * fast(t),
+        truth: |t| 0.5 * math::tanh(20.0 * fast(t)) + 0.5 * fast(t),
         noise: 0.02,
         tuner: log(10.0, 1e9),
         scale: 1.0,
@@ -90,18 +91,18 @@ fn joints() -> Vec<Joint> {
         Joint { what: "a tenth of the noise", noise: 0.002, ..joint(&usual) },
         Joint {
             what: "small units",
-            f: |p, t| 1e-3 * (p[0] * (p[3] * fast(t)).tanh() + p[1] * fast(t) + p[2]),
-            truth: |t| 1e-3 * (0.5 * (20.0 * fast(t)).tanh() + 0.5 * fast(t)),
+            f: |p, t| 1e-3 * (p[0] * math::tanh(p[3] * fast(t)) + p[1] * fast(t) + p[2]),
+            truth: |t| 1e-3 * (0.5 * math::tanh(20.0 * fast(t)) + 0.5 * fast(t)),
             noise: 2e-5,
             scale: 1e-3,
             ..joint(&usual)
         },
-        Joint { what: "a falling curve", truth: |t| 0.5 * fast(t) - 0.5 * (20.0 * fast(t)).tanh(), ..joint(&usual) },
+        Joint { what: "a falling curve", truth: |t| 0.5 * fast(t) - 0.5 * math::tanh(20.0 * fast(t)), ..joint(&usual) },
         Joint {
             what: "low speeds, which show the slope",
-            f: |p, t| p[0] * (p[3] * slow(t)).tanh() + p[1] * slow(t) + p[2],
+            f: |p, t| p[0] * math::tanh(p[3] * slow(t)) + p[1] * slow(t) + p[2],
             speed: slow,
-            truth: |t| 0.5 * (7.0 * slow(t)).tanh() + 0.5 * slow(t),
+            truth: |t| 0.5 * math::tanh(7.0 * slow(t)) + 0.5 * slow(t),
             noise: 0.01,
             tuner: log(3.0, 1e6),
             scale: 1.0,
@@ -133,7 +134,7 @@ fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
         let of = |k: f64| {
             let speeds: Vec<f64> = calibration.channels[0].times.iter().map(|&t| (joint.speed)(t)).collect();
             let column = |f: &dyn Fn(f64) -> f64| -> Vec<f64> { speeds.iter().map(|&w| joint.scale * f(w)).collect() };
-            least(&[column(&|w| (k * w).tanh()), column(&|w| w), column(&|_| 1.0)], &values)
+            least(&[column(&|w| math::tanh(k * w)), column(&|w| w), column(&|_| 1.0)], &values)
         };
         let undetermined = found.linear_interval[0].is_nan();
         let freedom = f64::from(SAMPLES) - if undetermined { 3.0 } else { 4.0 };
@@ -151,14 +152,14 @@ fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
 #[test]
 fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
     for (bounds, start) in [([0.01, 100.0], 1.0), ([0.1, 10.0], 3.0), ([1e-4, 1e4], 0.5), ([0.5, 2.0], 1.0)] {
-        let channel = Channel::new("e", "y", SAMPLES, 2.0, |t| (-1.1 * t).exp(), 0.01);
+        let channel = Channel::new("e", "y", SAMPLES, 2.0, |t| math::exp(-1.1 * t), 0.01);
         let tuner = || TunerDraft::new(start, bounds[0], bounds[1]).log();
         let values = channel.values(1);
         let times = channel.times.clone();
-        let model = Curve2(&["a", "b"], |p, t| (-p[0] / p[1] * t).exp());
+        let model = Curve2(&["a", "b"], |p, t| math::exp(-p[0] / p[1] * t));
         let outcome = calibration(model, channel, vec![("a", tuner()), ("b", tuner())], "a").run(1);
         let found = profile(&outcome);
-        let of = |r: f64| times.iter().zip(&values).map(|(t, y)| ((-r * t).exp() - y).powi(2)).sum::<f64>();
+        let of = |r: f64| times.iter().zip(&values).map(|(t, y)| math::powi(math::exp(-r * t) - y, 2)).sum::<f64>();
         let [low, _] = grid(of, [0.9, 1.3], f64::from(SAMPLES) - 1.0);
         let exact = low * bounds[0];
         assert!((found.interval[0] / exact - 1.0).abs() < 0.01, "{found:?} {exact}");
@@ -171,13 +172,13 @@ fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
 #[test]
 fn a_stop_that_is_not_reached_is_bounded_from_below_alone() {
     for (max, start) in [(100.0, 5.0), (1e6, 5.0), (100.0, 80.0), (3.0, 1.5)] {
-        let channel = Channel::new("e", "y", SAMPLES, 3.0, |t| 0.9 * t.sin(), 0.01);
+        let channel = Channel::new("e", "y", SAMPLES, 3.0, |t| 0.9 * math::sin(t), 0.01);
         let tuners = vec![("stop", TunerDraft::new(start, 0.5, max).log()), ("g", TunerDraft::new(1.0, 0.5, 2.0))];
         let (values, times) = (channel.values(2), channel.times.clone());
-        let model = Curve2(&["stop", "g"], |p, t| p[1] * t.sin().min(p[0]));
+        let model = Curve2(&["stop", "g"], |p, t| p[1] * math::sin(t).min(p[0]));
         let outcome = calibration(model, channel, tuners, "stop").run(2);
         let found = profile(&outcome);
-        let of = |stop: f64| least(&[times.iter().map(|t| t.sin().min(stop)).collect()], &values);
+        let of = |stop: f64| least(&[times.iter().map(|t| math::sin(*t).min(stop)).collect()], &values);
         let [low, _] = grid(of, [0.5, 2.0], f64::from(SAMPLES) - 1.0);
         assert!((found.interval[0] / low - 1.0).abs() < 5e-3, "{found:?} {low}");
         assert_eq!((found.interval[1], found.ends), (max, ["data", "bound"]));

@@ -33,10 +33,11 @@ pub fn part(trace: &Trace, knots: &[f64], map: impl Fn(f64, f64) -> f64) -> Trac
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, sampled};
+    use mops_core::math;
 
     #[test]
     fn a_part_has_the_values_and_the_extrema_of_the_whole() {
-        let whole = sampled(10.0, 40, f64::sin);
+        let whole = sampled(10.0, 40, math::sin);
         let part = part(&whole, &[1.0, 1.3, 8.0], |_, y| y);
         assert_eq!((part.start(), part.end()), (1.0, 8.0));
         for i in 0..=70 {

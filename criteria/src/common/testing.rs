@@ -1,6 +1,7 @@
 //! Closed forms as simulations, for the tests of all criteria.
 
 use mops_core::linear::TransferFunction;
+use mops_core::math;
 use mops_core::{
     Analysis, AnalysisKind, Case, Channel, Criterion, CriterionSpec, Experiment, Interface, Quantity, Response, Role,
     Trace, Value, Variable,
@@ -62,8 +63,8 @@ pub fn simulated(end: f64, f: impl Fn(f64) -> f64) -> Analysis {
 pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
     let frequency = (1.0 - damping * damping).sqrt();
     move |t| {
-        let (sin, cos) = (frequency * t).sin_cos();
-        1.0 - (-damping * t).exp() * (cos + damping / frequency * sin)
+        let (sin, cos) = math::sin_cos(frequency * t);
+        1.0 - math::exp(-damping * t) * (cos + damping / frequency * sin)
     }
 }
 

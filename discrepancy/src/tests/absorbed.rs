@@ -1,6 +1,7 @@
 //! Parameters absorb what is missing: the fit is fine, the forecast is not.
 
 use mops_core::Role;
+use mops_core::math;
 use mops_models::effects::effects;
 
 use crate::base;
@@ -24,7 +25,7 @@ const NOISE: f64 = 0.08;
 fn drop(label: &str, height: f64, duration: f64) -> Record {
     let count = 100_u32;
     let times: Vec<f64> = (0..count).map(|i| duration * f64::from(i) / f64::from(count - 1)).collect();
-    let fallen = |t: &f64| ((GRAVITY * DRAG).sqrt() * t).cosh().ln() / DRAG;
+    let fallen = |t: &f64| math::ln(math::cosh((GRAVITY * DRAG).sqrt() * t)) / DRAG;
     let noise = white(label, NOISE, times.len());
     let values = times.iter().zip(noise).map(|(t, e)| height - fallen(t) + e).collect();
     Record { inputs: Vec::new(), times, signals: vec![("h", values, NOISE)] }

@@ -9,6 +9,7 @@ use crate::search::{Limits, Search};
 use crate::subject::Subject;
 use crate::testing::{Record, fitted, subject, white};
 use crate::weigh::{Dispersion, by_chance, criterion};
+use mops_core::math;
 
 /// An oscillator whose stiffness, damping and start absorb most of what moves it near its frequency.
 const OSCILLATOR: &str = r#"
@@ -23,7 +24,7 @@ const STEP: f64 = 0.04;
 /// Two records of `x'' + d x' + k x = 0`.
 fn records() -> Vec<Record> {
     let record = |amplitude: f64| {
-        let swing = |t: f64| [amplitude * (-0.05 * t).exp() * (4.0 * t).cos(), 0.0];
+        let swing = |t: f64| [amplitude * math::exp(-0.05 * t) * math::cos(4.0 * t), 0.0];
         let states: Vec<[f64; 2]> = (0..SAMPLES).map(|i| swing(STEP * f64::from(i))).collect();
         Record::of_first("x", &states, STEP, NOISE, &amplitude.to_string())
     };
@@ -66,7 +67,7 @@ fn a_phase_of_every_experiment_is_paid_for_with_its_samples() {
     let trial = search.trial(&[added], &subject.start(), vec![vec![1.0, 0.0]; 2], 1, 1).expect("it simulates");
     let rarity = f64::from(trial.added[0].candidate.effect.rarity());
     // Amplitude and frequency in two records of 80 samples together, a phase in each.
-    let paid = 2.0 * 160.0_f64.ln() + 2.0 * 80.0_f64.ln() + 2.0 * rarity;
+    let paid = 2.0 * math::ln(160.0) + 2.0 * math::ln(80.0) + 2.0 * rarity;
     let told = criterion(&trial, &Dispersion::WHITE) - trial.fitted.chi2;
     assert!((told - paid).abs() < 1e-6 * trial.fitted.chi2, "{told} {paid}");
 }

@@ -8,6 +8,7 @@ use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::weigh::{Dispersion, criterion};
 use crate::{Options, Verdict, diagnose};
+use mops_core::math;
 
 const CREEP: &str = r#"
 states     = { x = "m" }
@@ -36,7 +37,7 @@ fn errors(r: f64, label: &str, count: usize) -> Vec<f64> {
 fn decay(r: f64, label: &str) -> Subject {
     let times: Vec<f64> = (0..4000_u32).map(|k| 0.005 * f64::from(k)).collect();
     let errors = errors(r, label, times.len());
-    let values = times.iter().zip(errors).map(|(t, e)| 50.0 * (-0.3 * t).exp() + e).collect();
+    let values = times.iter().zip(errors).map(|(t, e)| 50.0 * math::exp(-0.3 * t) + e).collect();
     subject(CREEP, &[0.3, 50.0], 1, vec![Record { inputs: Vec::new(), times, signals: vec![("x", values, 1.0)] }])
 }
 
@@ -98,7 +99,7 @@ fn noise_that_is_correlated_is_not_taken_for_an_effect() {
 fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
     const STEP: f64 = 0.01;
     const NOISE: f64 = 0.01;
-    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.8 * (x[1] / 1e-3).tanh()];
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - 0.8 * math::tanh(x[1] / 1e-3)];
     let some = catalogue(&["coulomb-friction", "asymmetric-friction", "stribeck-friction"]);
     for label in ["one", "two", "three", "four"] {
         let states = integrated(rates, [1.2, 0.0], STEP, 600);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
@@ -22,12 +23,13 @@ const NOISE: f64 = 2e-3;
 const RUNS: usize = 9;
 
 fn command(t: f64) -> f64 {
-    2.0 * (1.7 * t).sin() + (4.1 * t).cos()
+    2.0 * math::sin(1.7 * t) + math::cos(4.1 * t)
 }
 
 /// Positions of a cart with a spring that stiffens.
 fn record(run: usize) -> Record {
-    let rates = |t: f64, x: &[f64; 2]| [x[1], (command(t) - 12.0 * x[0] - 0.5 * x[1] - 2.0 * x[0].powi(3)) / 1.5];
+    let rates =
+        |t: f64, x: &[f64; 2]| [x[1], (command(t) - 12.0 * x[0] - 0.5 * x[1] - 2.0 * math::powi(x[0], 3)) / 1.5];
     let states = integrated(rates, [0.3, 0.0], STEP, COUNT as usize);
     let times: Vec<f64> = (0..COUNT).map(|k| f64::from(k) * STEP).collect();
     let noise = white(&format!("run {run}"), NOISE, states.len());

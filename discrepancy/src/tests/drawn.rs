@@ -3,6 +3,7 @@
 use crate::diagnosis::{Curve, Evidence};
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
+use mops_core::math;
 
 /// A block on a spring: `v' = -k x - d v`.
 const BLOCK: &str = r#"
@@ -32,7 +33,7 @@ fn rms(curve: &Curve, of: impl Fn(f64, f64, f64) -> Option<f64>) -> f64 {
 fn dry_friction_is_drawn_over_the_speed_and_the_estimate_follows_it() {
     const FRICTION: f64 = 0.4;
     let slid = |label: &str, start: f64| {
-        let rates = |_: f64, x: &[f64; 2]| [x[1], -9.0 * x[0] - 0.1 * x[1] - FRICTION * (x[1] / 1e-3).tanh()];
+        let rates = |_: f64, x: &[f64; 2]| [x[1], -9.0 * x[0] - 0.1 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];
         Record::of_first("x", &integrated(rates, [start, 0.0], 0.02, 150), 0.02, NOISE, label)
     };
     let evidence = at_the_effect("coulomb-friction", vec![slid("one", 1.0), slid("other", -1.5)]);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
@@ -25,12 +26,13 @@ const NOISE: f64 = 1e-4;
 /// Up to half of the highest frequency that the samples can show.
 fn command(t: f64) -> f64 {
     let sines = (1..=25).map(|k| f64::from(k) * std::f64::consts::PI * 0.5 / (25.0 * STEP));
-    sines.enumerate().map(|(i, w)| 2.0 * (w * t + (i * i) as f64).sin()).sum()
+    sines.enumerate().map(|(i, w)| 2.0 * math::sin(w * t + (i * i) as f64)).sum()
 }
 
 /// Positions of an oscillator with a spring that stiffens, driven by a command without steps.
 fn record(hold: Hold) -> Record {
-    let rates = |t: f64, x: &[f64; 2]| [x[1], (command(t) - 30.0 * x[0] - 0.6 * x[1] - 3.0 * x[0].powi(3)) / 1.2];
+    let rates =
+        |t: f64, x: &[f64; 2]| [x[1], (command(t) - 30.0 * x[0] - 0.6 * x[1] - 3.0 * math::powi(x[0], 3)) / 1.2];
     let states = integrated(rates, [0.0, 0.0], STEP / FINE as f64, COUNT * FINE);
     let times: Vec<f64> = (0..COUNT).map(|k| k as f64 * STEP).collect();
     let noise = white("hold", NOISE, COUNT);

@@ -3,6 +3,7 @@
 use crate::meter::Meter;
 use crate::profile::interval95;
 use crate::testing::{Record, fitted, subject, white};
+use mops_core::math;
 
 /// A decay.
 const DECAY: &str = r#"
@@ -19,13 +20,13 @@ const RISE: f64 = 3.841_459;
 #[test]
 fn an_interval_ends_where_the_profile_of_the_sum_of_squares_does() {
     let times: Vec<f64> = (0..12).map(|k| 0.2 * f64::from(k)).collect();
-    let values: Vec<f64> = times.iter().zip(white("decay", NOISE, 12)).map(|(t, e)| (-2.0 * t).exp() + e).collect();
+    let values: Vec<f64> = times.iter().zip(white("decay", NOISE, 12)).map(|(t, e)| math::exp(-2.0 * t) + e).collect();
     // For any decay the best start value is that of a linear regression.
     let least = |k: f64| {
-        let e: Vec<f64> = times.iter().map(|t| (-k * t).exp()).collect();
+        let e: Vec<f64> = times.iter().map(|t| math::exp(-k * t)).collect();
         let sum = |f: &dyn Fn(usize) -> f64| (0..e.len()).map(f).sum::<f64>();
         let start = sum(&|i| e[i] * values[i]) / sum(&|i| e[i] * e[i]);
-        sum(&|i| ((start * e[i] - values[i]) / NOISE).powi(2))
+        sum(&|i| math::powi((start * e[i] - values[i]) / NOISE, 2))
     };
     let record = Record { inputs: Vec::new(), times: times.clone(), signals: vec![("x", values.clone(), NOISE)] };
     let subject = subject(DECAY, &[2.0, 1.0], 1, vec![record]);

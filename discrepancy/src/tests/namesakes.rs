@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
+use mops_core::math;
 
 /// A block on a spring, of which the data have gusts: `v' = -k x - d v + g(t)`.
 const BLOCK: &str = r#"
@@ -15,7 +16,8 @@ const NOISE: f64 = 0.005;
 
 /// A force that swells and fades in 0.8 s, as that of CS-25, section 25.341.
 fn blown(label: &str, at: f64, force: f64) -> Record {
-    let gust = |t: f64| if t > at && t < at + 0.8 { 0.5 * force * (1.0 - (TAU * (t - at) / 0.8).cos()) } else { 0.0 };
+    let gust =
+        |t: f64| if t > at && t < at + 0.8 { 0.5 * force * (1.0 - math::cos(TAU * (t - at) / 0.8)) } else { 0.0 };
     let states = integrated(|t, x: &[f64; 2]| [x[1], -9.0 * x[0] - 0.4 * x[1] + gust(t)], [1.0, 0.0], 0.02, 250);
     Record::of_first("x", &states, 0.02, NOISE, label)
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Role, Study};
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
@@ -22,7 +23,7 @@ fn swing(label: &str, start: f64) -> Record {
     const STEP: f64 = 0.02;
     const COUNT: usize = 400;
     // The motion ends before the friction holds the pendulum for good.
-    let rates = |_: f64, x: &[f64; 2]| [x[1], -K * x[0].sin() - DRY * x[1].signum() - AIR * x[1] * x[1].abs()];
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -K * math::sin(x[0]) - DRY * x[1].signum() - AIR * x[1] * x[1].abs()];
     let states = integrated(rates, [start, 0.0], STEP, COUNT);
     Record::of_first("q", &states, STEP, NOISE, label)
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Hold, Input, Role};
 
 use crate::base;
@@ -35,7 +36,7 @@ fn slide(label: &str, speed: f64, duration: f64) -> Record {
 /// Slow slides to calibrate with; a fast one with a role of its own, and one to validate with that is moved by `shift`.
 fn block(fast: Role, shift: f64) -> Subject {
     let mut last = slide("last", 3.0, 2.0);
-    last.signals[0].1.iter_mut().enumerate().for_each(|(k, x)| *x += shift * (0.1 * k as f64).sin());
+    last.signals[0].1.iter_mut().enumerate().for_each(|(k, x)| *x += shift * math::sin(0.1 * k as f64));
     let mut subject =
         subject(BLOCK, &[-0.01, 0.0, 2.0], 2, vec![slide("slow", 1.5, 2.0), slide("fast", 6.0, 4.0), last]);
     subject.measurements[1].role = fast;
@@ -96,7 +97,7 @@ der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
 
 /// Swings with dry friction, and with a bias of the sensor in each session: two to calibrate with, then one to select with.
 fn sessions(biases: [f64; 3]) -> Subject {
-    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.5 * (x[1] / 1e-3).tanh()];
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - 0.5 * math::tanh(x[1] / 1e-3)];
     let record = |(k, bias): (usize, f64)| {
         let states = integrated(rates, [0.8 + 0.1 * k as f64, 0.0], 0.01, 300);
         let mut record = Record::of_first("th", &states, 0.01, NOISE, &format!("session {k}"));

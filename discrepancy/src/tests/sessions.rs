@@ -1,6 +1,7 @@
 //! Sessions drift: a long record runs out of phase where a parameter has moved a little, and a few periods do not.
 
 use mops_core::Role;
+use mops_core::math;
 
 use crate::testing::{Record, integrated, study, subject};
 use crate::{Options, diagnose};
@@ -15,7 +16,7 @@ const NOISE: f64 = 2e-3;
 fn swing(label: &str, k: f64, b: f64) -> Record {
     const STEP: f64 = 0.02;
     const COUNT: usize = 800;
-    let states = integrated(|_, x: &[f64; 2]| [x[1], -k * x[0].sin() - b * x[1]], [1.0, 0.0], STEP, COUNT);
+    let states = integrated(|_, x: &[f64; 2]| [x[1], -k * math::sin(x[0]) - b * x[1]], [1.0, 0.0], STEP, COUNT);
     Record::of_first("q", &states, STEP, NOISE, label)
 }
 

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use mops_core::Input;
+use mops_core::math;
 
 use crate::diagnosis::StrengthValue;
 use crate::testing::{Record, catalogue, integrated, study, subject};
@@ -20,7 +21,7 @@ const RADIATED: f64 = 6e-11;
 /// The strengths of the radiation found in a body that cools from these temperatures.
 fn radiation(noise: f64, from: &[f64]) -> Vec<StrengthValue> {
     let cooled = |&start: &f64| {
-        let fourth = |t: f64| (t + 273.15).powi(4);
+        let fourth = |t: f64| math::powi(t + 273.15, 4);
         let rates = |_: f64, x: &[f64; 2]| [-0.01 * (x[0] - 20.0) - RADIATED * (fourth(x[0]) - fourth(20.0)), 0.0];
         Record::of_first("T", &integrated(rates, [start, 0.0], 1.0, 200), 1.0, noise, &format!("{start}"))
     };
@@ -56,7 +57,7 @@ fn a_rail_is_worn_at_distances_of_its_own() {
     "#;
     const WAVES: f64 = 11.5;
     let slid = |start: f64| {
-        let friction = |x: &[f64; 2]| 0.5 * (1.0 + 0.7 * (WAVES * x[0] + 0.4).cos()) * (x[1] / 1e-3).tanh();
+        let friction = |x: &[f64; 2]| 0.5 * (1.0 + 0.7 * math::cos(WAVES * x[0] + 0.4)) * math::tanh(x[1] / 1e-3);
         let rates = |_: f64, x: &[f64; 2]| [x[1], -30.0 * x[0] - 0.2 * x[1] - friction(x)];
         Record::of_first("x", &integrated(rates, [start, 0.0], 0.01, 300), 0.01, 1e-3, &format!("{start}"))
     };
@@ -83,8 +84,8 @@ fn waves_of_a_linear_motor_are_looked_for_along_its_rail_whatever_the_unit_of_th
     "#;
     const WAVES: f64 = 60.0;
     let driven = |frequency: f64| {
-        let command = move |t: f64| 5.0 * (TAU * frequency * t).sin();
-        let ripple = |x: &[f64; 2]| 1.0 + 0.2 * (WAVES * x[0] + 0.7).sin();
+        let command = move |t: f64| 5.0 * math::sin(TAU * frequency * t);
+        let ripple = |x: &[f64; 2]| 1.0 + 0.2 * math::sin(WAVES * x[0] + 0.7);
         let rates = |t: f64, x: &[f64; 2]| [x[1], 0.6 * command(t) * ripple(x) - 40.0 * x[0] - 2.0 * x[1]];
         let mut record =
             Record::of_first("x", &integrated(rates, [0.0, 0.0], 0.01, 400), 0.01, 1e-4, &frequency.to_string());

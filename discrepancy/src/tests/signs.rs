@@ -1,5 +1,6 @@
 //! The sign: friction takes energy, whatever the data would like.
 
+use mops_core::math;
 use mops_core::{EffectClass, Hold, Input};
 use mops_models::effects::effects;
 
@@ -17,7 +18,7 @@ der        = { x = "v", v = "m*v' = u - k*x" }
 fn an_oscillation_that_is_driven_by_its_speed_is_never_put_down_to_negative_friction() {
     const STEP: f64 = 0.02;
     const COUNT: u32 = 400;
-    let input = |t: f64| (1.3 * t).sin();
+    let input = |t: f64| math::sin(1.3 * t);
     let states = integrated(
         |t, x: &[f64; 2]| [x[1], (input(t) - 8.0 * x[0] + 0.15 * x[1]) / 2.0],
         [0.2, 0.0],

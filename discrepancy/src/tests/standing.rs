@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Hold, Input};
 
 use crate::base;
@@ -21,7 +22,7 @@ der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
 const NOISE: f64 = 0.01;
 
 fn swing() -> Record {
-    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - 0.5 * (x[1] / 1e-3).tanh()];
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - 0.5 * math::tanh(x[1] / 1e-3)];
     Record::of_first("th", &integrated(rates, [0.9, 0.0], 0.01, 400), 0.01, NOISE, "swing")
 }
 
@@ -106,8 +107,9 @@ der        = { x = "x' = u - a*sqrt(max(x, 0))" }
 
 #[test]
 fn what_the_linear_view_has_as_near_is_held_against_an_effect_although_no_short_fit_tried_it() {
-    let step = |t: f64| 1.0 + 0.6 * (0.3 * t).sin();
-    let states = integrated(|t, x: &[f64; 2]| [step(t) - 0.4 * x[0].max(0.0).powf(0.7), 0.0], [2.0, 0.0], 0.2, 300);
+    let step = |t: f64| 1.0 + 0.6 * math::sin(0.3 * t);
+    let states =
+        integrated(|t, x: &[f64; 2]| [step(t) - 0.4 * math::powf(x[0].max(0.0), 0.7), 0.0], [2.0, 0.0], 0.2, 300);
     let mut record = Record::of_first("x", &states, 0.2, 0.01, "tank");
     let values = record.times.iter().map(|&t| step(t)).collect();
     record.inputs = vec![("u", Input::Sampled { times: record.times.clone(), values, hold: Hold::First })];

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Effect, Hold, Input};
 use mops_models::effects::effects;
 
@@ -20,7 +21,7 @@ const COUNT: usize = 400;
 const NOISE: f64 = 2e-3;
 
 fn command(t: f64) -> f64 {
-    3.0 * (0.7 * t).sin() + 1.1 * (2.3 * t + 1.0).sin()
+    3.0 * math::sin(0.7 * t) + 1.1 * math::sin(2.3 * t + 1.0)
 }
 
 fn stairs(value: f64, size: f64) -> f64 {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Hold, Input, Job, Model, Trials};
 use mops_models::effects::effects;
 
@@ -24,7 +25,7 @@ const COUNT: u32 = 300;
 
 fn record() -> Record {
     let times: Vec<f64> = (0..COUNT).map(|k| f64::from(k) * 0.02).collect();
-    let values = times.iter().map(|t| 6.0 * (3.0 * t).sin()).collect();
+    let values = times.iter().map(|t| 6.0 * math::sin(3.0 * t)).collect();
     let input = Input::Sampled { times: times.clone(), values, hold: Hold::First };
     let signals = ["x", "v"].map(|name| (name, vec![0.0; COUNT as usize], 0.5)).to_vec();
     Record { inputs: vec![("u", input)], times, signals }

@@ -1,5 +1,6 @@
 //! Strengths that the data tell nothing of.
 
+use mops_core::math;
 use mops_core::{Hold, Input};
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
@@ -16,7 +17,8 @@ const FRICTION: f64 = 0.8;
 
 /// The pendulum let go at an angle, with dry friction of the same size at rest as in motion, for so many samples.
 fn let_go(samples: usize) -> Diagnosis {
-    let rates = |_: f64, x: &[f64; 2]| [x[1], -17.7 * x[0].sin() - 0.15 * x[1] - FRICTION * (x[1] / 1e-3).tanh()];
+    let rates =
+        |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];
     let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, samples), 0.01, NOISE, "let go");
     let subject = subject(PENDULUM, &[23.3, 0.24, -1.0, 0.0], 2, vec![record]);
     let some = catalogue(&["coulomb-friction", "stiction", "stribeck-friction"]);
@@ -34,8 +36,8 @@ der        = { x = "v", v = "v' = k*u - b*v" }
 
 /// The cart with dry friction of the same size at rest as in motion, pushed to and fro from rest.
 fn pushed() -> Diagnosis {
-    let push = |t: f64| 2.0 * (0.9 * t).sin();
-    let rates = |t: f64, x: &[f64; 2]| [x[1], push(t) - 0.5 * x[1] - FRICTION * (x[1] / 1e-3).tanh()];
+    let push = |t: f64| 2.0 * math::sin(0.9 * t);
+    let rates = |t: f64, x: &[f64; 2]| [x[1], push(t) - 0.5 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];
     let mut record = Record::of_first("x", &integrated(rates, [0.0, 0.0], 0.02, 900), 0.02, NOISE, "pushed");
     let times: Vec<f64> = (0..9000_i32).map(|i| 0.002 * f64::from(i)).collect();
     let values = times.iter().map(|&t| push(t)).collect();

@@ -4,6 +4,7 @@ mod simulated;
 
 use std::collections::BTreeSet;
 
+use mops_core::math;
 use mops_core::{Acting, Along, At, Effect, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::effects;
@@ -186,7 +187,7 @@ fn friction_with_states_takes_energy_over_a_cycle() {
         for step in 0..(6.0 * std::f64::consts::PI / h) as usize {
             let t = step as f64 * h;
             let mut seen = [0.0; 11];
-            (seen[1], seen[2]) = (t.sin(), t.cos());
+            (seen[1], seen[2]) = (math::sin(t), math::cos(t));
             let at = at(&seen);
             acting.rates(&at, &z, &mut dz);
             if t > 4.0 * std::f64::consts::PI {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use mops_core::expression::{Comparison, Function, functions};
+use mops_core::math;
 
 /// A node of the graph; nodes come after those they are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -300,7 +301,7 @@ impl Graph {
 
     /// Angle of the point (second, first).
     pub fn atan2(&mut self, a: Id, b: Id) -> Id {
-        self.fold(a, b, f64::atan2).unwrap_or_else(|| self.add_op(Op::Atan2(a, b)))
+        self.fold(a, b, math::atan2).unwrap_or_else(|| self.add_op(Op::Atan2(a, b)))
     }
 
     /// 1 where the comparison holds, else 0.

@@ -2,6 +2,7 @@
 
 use mops_core::band_limited::{piece, polynomial};
 use mops_core::enclosure::Enclosure;
+use mops_core::math;
 use mops_core::{Hold, Input, Scalar};
 
 /// An input with its present value and slope.
@@ -36,7 +37,7 @@ impl Curve {
     #[inline(never)]
     fn at(&self, t: f64) -> f64 {
         match self {
-            Self::Sine { amplitude, angular, phase } => amplitude * (angular * t + phase).sin(),
+            Self::Sine { amplitude, angular, phase } => amplitude * math::sin(angular * t + phase),
             Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).0,
         }
     }
@@ -57,7 +58,7 @@ impl Curve {
 
     fn slope(&self, t: f64) -> f64 {
         match self {
-            Self::Sine { amplitude, angular, phase } => amplitude * angular * (angular * t + phase).cos(),
+            Self::Sine { amplitude, angular, phase } => amplitude * angular * math::cos(angular * t + phase),
             Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).1 / step,
         }
     }
@@ -203,13 +204,13 @@ mod tests {
     #[test]
     fn slopes_are_those_of_the_curve() {
         let times: Vec<f64> = (0..100).map(|i| 0.1 * f64::from(i)).collect();
-        let values = times.iter().map(|t| (3.0 * t).sin()).collect();
+        let values = times.iter().map(|t| math::sin(3.0 * t)).collect();
         let sine = Input::Sine { amplitude: 1.0, frequency: 3.0 / std::f64::consts::TAU, phase: 0.0, offset: 0.0 };
         for input in [sine, Input::Sampled { times, values, hold: Hold::BandLimited }] {
             let mut drive: Drive<'_> = Drive::new(Some(&input));
             drive.pass_break(5.0);
-            assert!((drive.at(5.05) - 15.15_f64.sin()).abs() < 1e-6, "{input:?}");
-            assert!((drive.slope(5.05) - 3.0 * 15.15_f64.cos()).abs() < 1e-4, "{input:?}");
+            assert!((drive.at(5.05) - math::sin(15.15)).abs() < 1e-6, "{input:?}");
+            assert!((drive.slope(5.05) - 3.0 * math::cos(15.15)).abs() < 1e-4, "{input:?}");
         }
     }
 }

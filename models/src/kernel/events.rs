@@ -30,6 +30,7 @@
 //! J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
 
 use mops_core::enclosure::Enclosure;
+use mops_core::math;
 use mops_core::{Failure, Scalar};
 
 use super::step::Step;
@@ -312,7 +313,7 @@ fn rise_before([a, b]: Bracket, value: &mut impl FnMut(f64) -> f64) -> Bracket {
     }
     let mut end = b;
     for k in 1..=40 {
-        let theta = a.0 + (b.0 - a.0) * 0.5_f64.powi(k);
+        let theta = a.0 + (b.0 - a.0) * math::powi(0.5, k);
         let look = (theta, value(theta));
         if look.1 > 0.0 {
             return [look, end];

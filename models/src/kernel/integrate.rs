@@ -4,6 +4,7 @@
 //! II.4 (step size, initial step); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
 //! section IV.2 (PI control).
 
+use mops_core::math;
 use mops_core::{Failure, Scalar, Work};
 
 use super::dormand_prince::DormandPrince;
@@ -113,7 +114,8 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
                 return Err(Failure::Diverged(t));
             }
             // Hairer's factors: 0.9 as safety, at most a fifth at once.
-            proposed = h * if error.is_finite() { (0.9 * error.powf(-1.0 / M::ERROR_ORDER)).max(0.2) } else { 0.1 };
+            proposed =
+                h * if error.is_finite() { (0.9 * math::powf(error, -1.0 / M::ERROR_ORDER)).max(0.2) } else { 0.1 };
             work.rejected += 1;
             rejected += 1;
             continue;
@@ -175,8 +177,8 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
 
 /// PI step-size control with beta = 0.04, as in the authors' DOPRI5: `0.9 error^-(1/q - 0.75 beta) last_error^beta`.
 fn step_factor<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(error: f64, last: &mut f64, was_rejected: bool) -> f64 {
-    let log_error = error.max(1e-10).ln();
-    let factor = 0.9 * (0.04 * *last - (1.0 / M::ERROR_ORDER - 0.04 * 0.75) * log_error).exp();
+    let log_error = math::ln(error.max(1e-10));
+    let factor = 0.9 * math::exp(0.04 * *last - (1.0 / M::ERROR_ORDER - 0.04 * 0.75) * log_error);
     *last = log_error.max(LOG_SMALL_ERROR);
     factor.clamp(0.2, if was_rejected { 1.0 } else { 10.0 })
 }
@@ -223,7 +225,7 @@ fn initial_step<S: Scalar, D: Dynamics<S>>(
     }
     let d2 = span * scaled(stage.as_ref()) / h0;
     let largest = d1.max(d2);
-    let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { (0.01 / largest).powf(1.0 / order) };
+    let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { math::powf(0.01 / largest, 1.0 / order) };
     let h = (100.0 * h0).min(h1).min(1.0) * span;
     if h.is_finite() && h > 0.0 { h } else { 1e-6 * span }
 }
@@ -257,7 +259,7 @@ mod tests {
         let x0 = [Dual::<1>::variable(1.0, 0), Dual::from(0.5)];
         let (dual, _) = integrate(&mut Oscillator, 0.0, 3.0, x0, &TIGHT, &mut ()).unwrap();
         assert_eq!((dual[0].value, dual[1].value), (plain[0], plain[1]));
-        assert!((dual[0].tangent[0] - 3f64.cos()).abs() < 1e-9);
+        assert!((dual[0].tangent[0] - math::cos(3.0)).abs() < 1e-9);
     }
 
     /// `x' = x^2`, which is infinite at `t = 1` from `x = 1`.

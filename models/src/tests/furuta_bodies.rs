@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use mops_core::math;
 use mops_core::{Case, Model, ModelOptions, Response, Trace};
 
 use super::{check_tangents_by, respond};
@@ -126,7 +127,7 @@ fn times(factor: f64, a: Vector) -> Vector {
 
 /// `a` turned by `angle` about `axis` (Rodrigues' formula).
 fn turned(a: Vector, axis: Vector, angle: f64) -> Vector {
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = math::sin_cos(angle);
     plus(plus(times(cos, a), times(sin, cross(axis, a))), times((1.0 - cos) * dot(axis, a), axis))
 }
 
@@ -199,7 +200,7 @@ fn energy(rods: Rods, spring: f64, response: &Response, t: f64) -> f64 {
     let [inertia, arm, m, l, r, g] = rods;
     let weightless = [inertia, arm, m, l, r, 0.0];
     0.5 * dot(w, newton_euler(weightless, q, [0.0; 3], w))
-        + m * g * l * q[1].cos() * q[2].cos()
+        + m * g * l * math::cos(q[1]) * math::cos(q[2])
         + 0.5 * spring * q[2] * q[2]
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{
     Case, Failure, Hold, Input, Instant, Interface, Job, Model, ModelOptions, OperatingPoint, Parameter, Placement,
     Plant, Port, Scalar, Variable,
@@ -72,7 +73,7 @@ fn an_equation_written_the_other_way_round_has_the_same_friction() {
     let end = run(&model, &[2.0, 0.0, 3.0, 4.0, 0.0], Vec::new(), 5.0);
     assert!((end[0] - 2.25).abs() < 1e-8 && end[1] == 0.0, "{end:?}");
     let end = run(&model, &[2.0, 0.0, 3.0, 0.0, 1.0], Vec::new(), 2.0);
-    assert!((end[1] - 3.0 * (-1.0_f64).exp()).abs() < 1e-8, "{end:?}");
+    assert!((end[1] - 3.0 * math::exp(-1.0)).abs() < 1e-8, "{end:?}");
 }
 
 #[test]
@@ -80,7 +81,7 @@ fn neutral_effects_change_no_bit() {
     let plain = equations(BLOCK);
     let model = with(&plain, &[("coulomb-friction", "joint:x"), ("viscous-friction", "joint:x")]);
     let times: Vec<f64> = (0..50).map(|k| f64::from(k) * 0.1).collect();
-    let values = times.iter().map(|t| (3.0 * t).sin()).collect();
+    let values = times.iter().map(|t| math::sin(3.0 * t)).collect();
     let inputs = vec![("u".to_owned(), Input::Sampled { times, values, hold: Hold::Zero })];
     let a = run(plain.as_ref(), &[2.0, 0.3, 0.7], inputs.clone(), 4.9);
     let b = run(&model, &[2.0, 0.3, 0.7, 0.0, 0.0], inputs, 4.9);
@@ -130,8 +131,8 @@ fn stops_that_have_crossed_are_one_spring_about_their_middle() {
     let (m, k): (f64, f64) = (2.0, 50.0);
     let [x, v] = run(&model, &[m, 0.3, 0.0, k, 0.5, -0.3, 0.0], Vec::new(), 4.0);
     let omega = (k / m).sqrt();
-    assert!((x - 0.1 - 0.2 * (4.0 * omega).cos()).abs() < 1e-5, "{x}");
-    assert!((v + 0.2 * omega * (4.0 * omega).sin()).abs() < 1e-5, "{v}");
+    assert!((x - 0.1 - 0.2 * math::cos(4.0 * omega)).abs() < 1e-5, "{x}");
+    assert!((v + 0.2 * omega * math::sin(4.0 * omega)).abs() < 1e-5, "{v}");
 }
 
 /// A catch 20 mm behind the stop throws the block back, 0.2 m before it.
@@ -181,7 +182,7 @@ fn a_lag_at_rest_has_tangents_that_decay() {
 fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_remembers_or_is_late() {
     const BEGINS: f64 = 1.03;
     let times: Vec<f64> = (0..20).map(|k| f64::from(k) * 0.1).collect();
-    let values: Vec<f64> = (0..20).map(|k| (f64::from(k) * 1.7).sin()).collect();
+    let values: Vec<f64> = (0..20).map(|k| math::sin(f64::from(k) * 1.7)).collect();
     let block = equations(BLOCK);
     for (effect, strength) in [("input-rate-limit", 1.9), ("backlash", 0.8), ("input-delay", 0.17)] {
         let model = with(&block, &[(effect, "actuator:u")]);
@@ -238,7 +239,7 @@ fn pushed(
     let times: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.1).collect();
     let push = |&t: &f64| {
         if t < 2.0 {
-            0.06 * (4.0 * t).sin()
+            0.06 * math::sin(4.0 * t)
         } else if t < 4.0 {
             0.008
         } else {
@@ -388,13 +389,13 @@ fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_tex
 
     let at = OperatingPoint { parameters: &[4.0, 0.0, 0.0], states: &[0.3, 0.0], inputs: &[0.0], at_rest: true };
     let local = own.local(&at).expect("it has equations").expect("it is defined");
-    assert!((local.slopes[(1, 0)] + 4.0 * 0.3_f64.cos()).abs() < 1e-14 && local.slopes[(1, 2)] == 1.0);
+    assert!((local.slopes[(1, 0)] + 4.0 * math::cos(0.3)).abs() < 1e-14 && local.slopes[(1, 2)] == 1.0);
     assert_eq!(own.start_values(at.parameters), Some(vec![0.0, 0.0]));
 
     let case = Case::default();
     let job = Job { case: &case, parameters: &[4.0, 0.01, 0.0], signals: &[0], horizon: 2.0 };
     let (analysis, tangents) = own.tangents(&job, &[vec![0.0, 1.0, 0.0]]).expect("it has them").expect("it simulates");
     // A small swing is 0.01 cos(2 t), and so is its slope by the start value but for 1e-4 of it.
-    assert!((analysis.trace("theta").at(2.0) - 0.01 * 4.0_f64.cos()).abs() < 1e-6);
-    assert!((tangents[0].trace("theta").at(2.0) - 4.0_f64.cos()).abs() < 1e-3);
+    assert!((analysis.trace("theta").at(2.0) - 0.01 * math::cos(4.0)).abs() < 1e-6);
+    assert!((tangents[0].trace("theta").at(2.0) - math::cos(4.0)).abs() < 1e-3);
 }

@@ -397,6 +397,7 @@ fn cell(name: &str, cells: &[Vec<u8>]) -> Vec<u8> {
 
 mod mat5 {
     use super::*;
+    use crate::math;
 
     #[test]
     fn plain_and_compressed_and_both_byte_orders_give_the_same_columns() {
@@ -421,8 +422,8 @@ mod mat5 {
             (6, 13, bytes(&4_000_000_000_u32.to_le_bytes()), 4e9),
             (7, 7, bytes(&0.5_f32.to_le_bytes()), 0.5),
             (9, DOUBLE, le(&[0.1]), 0.1),
-            (12, 14, bytes(&(-1_i64 << 40).to_le_bytes()), -2_f64.powi(40)),
-            (13, 15, bytes(&(1_u64 << 63).to_le_bytes()), 2_f64.powi(63)),
+            (12, 14, bytes(&(-1_i64 << 40).to_le_bytes()), -math::powi(2.0, 40)),
+            (13, 15, bytes(&(1_u64 << 63).to_le_bytes()), math::powi(2.0, 63)),
             // MATLAB stores doubles as the smallest integers that hold them; a logical is a flagged uint8.
             (2, DOUBLE, bytes(&[42]), 42.0),
             (2, 0x0200 + 9, bytes(&[1]), 1.0),

@@ -1,5 +1,6 @@
 //! Intervals: sets of numbers between two bounds, with the operations of expressions.
 
+use crate::math;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -97,7 +98,7 @@ impl Interval {
         }
         // Multiples of 2 pi are maxima, odd multiples of pi minima.
         let reaches = |phase: f64| ((self.high - phase) / TAU).floor() >= ((self.low - phase) / TAU).ceil();
-        let ends = self.monotone(f64::cos);
+        let ends = self.monotone(math::cos);
         Self { low: if reaches(PI) { -1.0 } else { ends.low }, high: if reaches(0.0) { 1.0 } else { ends.high } }
     }
 
@@ -108,7 +109,7 @@ impl Interval {
         if !self.low.is_finite() || !self.high.is_finite() || self.high - self.low >= TAU {
             return Self { low: -1.0, high: 1.0 };
         }
-        let ends = self.monotone(f64::sin);
+        let ends = self.monotone(math::sin);
         Self {
             low: if reaches(-FRAC_PI_2) { -1.0 } else { ends.low },
             high: if reaches(FRAC_PI_2) { 1.0 } else { ends.high },
@@ -121,7 +122,7 @@ impl Interval {
         if exponent == 0.0 {
             return Self::point(1.0);
         }
-        let power = |x: f64| x.powf(exponent);
+        let power = |x: f64| math::powf(x, exponent);
         if exponent < 0.0 {
             return self.power(-exponent).reciprocal();
         }

@@ -5,6 +5,7 @@ mod interval;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::expression::{Comparison, Function};
+use crate::math;
 pub use interval::Interval;
 
 /// Bounds of a quantity `x(t)` over an interval of time, and of its derivative `dx/dt`.
@@ -95,27 +96,27 @@ impl Enclosure {
                 let x = x.clamp(-1.0, 1.0);
                 let slope = ((one - x.square()).clamp(0.0, 1.0)).monotone(|d| d.sqrt().recip());
                 match function {
-                    Function::Asin => self.chain(x.monotone(f64::asin), slope),
-                    _ => self.chain(x.monotone(f64::acos), -slope),
+                    Function::Asin => self.chain(x.monotone(math::asin), slope),
+                    _ => self.chain(x.monotone(math::acos), -slope),
                 }
             }
-            Function::Atan => self.chain(x.monotone(f64::atan), (one + x.square()).reciprocal()),
-            Function::Sinh => self.chain(x.monotone(f64::sinh), even(x, f64::cosh)),
-            Function::Cosh => self.chain(even(x, f64::cosh), x.monotone(f64::sinh)),
+            Function::Atan => self.chain(x.monotone(math::atan), (one + x.square()).reciprocal()),
+            Function::Sinh => self.chain(x.monotone(math::sinh), even(x, math::cosh)),
+            Function::Cosh => self.chain(even(x, math::cosh), x.monotone(math::sinh)),
             Function::Tanh => {
-                let t = x.monotone(f64::tanh);
+                let t = x.monotone(math::tanh);
                 self.chain(t, one - t.square())
             }
             Function::Exp => {
-                let e = x.monotone(f64::exp);
+                let e = x.monotone(math::exp);
                 self.chain(e, e)
             }
             Function::Ln | Function::Log10 => {
                 let x = x.clamp(0.0, f64::INFINITY);
                 let slope = x.monotone(f64::recip);
                 match function {
-                    Function::Ln => self.chain(x.monotone(f64::ln), slope),
-                    _ => self.chain(x.monotone(f64::log10), slope * Interval::point(std::f64::consts::LOG10_E)),
+                    Function::Ln => self.chain(x.monotone(math::ln), slope),
+                    _ => self.chain(x.monotone(math::log10), slope * Interval::point(std::f64::consts::LOG10_E)),
                 }
             }
             Function::Sqrt => {
@@ -148,7 +149,7 @@ impl Enclosure {
         if self.value.contains(0.0) && x.value.low <= 0.0 {
             return Self::UNKNOWN;
         }
-        let corner = |y: f64, x: f64| Interval::point(y.atan2(x));
+        let corner = |y: f64, x: f64| Interval::point(math::atan2(y, x));
         let value = corner(self.value.low, x.value.low)
             .hull(corner(self.value.low, x.value.high))
             .hull(corner(self.value.high, x.value.low))

@@ -1,5 +1,6 @@
 //! The functions of expressions, with their derivatives.
 
+use crate::math;
 use crate::scalar::Scalar;
 
 /// A function that expressions know.
@@ -91,15 +92,15 @@ impl Function {
             Self::Sin => x.sin(),
             Self::Cos => x.cos(),
             Self::Tan => x.sin() / x.cos(),
-            Self::Asin => x.chain(v.asin(), tangent(1.0 / (1.0 - v * v).sqrt())),
-            Self::Acos => x.chain(v.acos(), tangent(-1.0 / (1.0 - v * v).sqrt())),
-            Self::Atan => x.chain(v.atan(), 1.0 / (1.0 + v * v)),
-            Self::Sinh => x.chain(v.sinh(), v.cosh()),
-            Self::Cosh => x.chain(v.cosh(), v.sinh()),
+            Self::Asin => x.chain(math::asin(v), tangent(1.0 / (1.0 - v * v).sqrt())),
+            Self::Acos => x.chain(math::acos(v), tangent(-1.0 / (1.0 - v * v).sqrt())),
+            Self::Atan => x.chain(math::atan(v), 1.0 / (1.0 + v * v)),
+            Self::Sinh => x.chain(math::sinh(v), math::cosh(v)),
+            Self::Cosh => x.chain(math::cosh(v), math::sinh(v)),
             Self::Tanh => x.tanh(),
             Self::Exp => x.exp(),
             Self::Ln => x.ln(),
-            Self::Log10 => x.chain(v.log10(), std::f64::consts::LOG10_E / v),
+            Self::Log10 => x.chain(math::log10(v), std::f64::consts::LOG10_E / v),
             Self::Sqrt => sqrt(x),
             _ => return None,
         })
@@ -124,16 +125,19 @@ pub fn sqrt<S: Scalar>(x: S) -> S {
 pub fn atan2<S: Scalar>(y: S, x: S) -> S {
     let (a, b) = (y.value(), x.value());
     let square = a * a + b * b;
-    (y * (b / square) - x * (a / square)).chain(a.atan2(b), 1.0)
+    (y * (b / square) - x * (a / square)).chain(math::atan2(a, b), 1.0)
 }
 
 /// `base^exponent`; a negative base needs a whole exponent that does not vary. An infinite derivative at base 0 counts as 0,
 /// as that of a square root.
 pub fn power<S: Scalar>(base: S, exponent: S) -> S {
     let (a, b) = (base.value(), exponent.value());
-    let value = a.powf(b);
-    let by_base = if b == 0.0 { 0.0 } else { tangent(b * a.powf(b - 1.0)) };
-    let by_exponent = if a > 0.0 { value * a.ln() } else { 0.0 };
+    let value = math::powf(a, b);
+    if S::DIRECTIONS == 0 {
+        return S::from(value);
+    }
+    let by_base = if b == 0.0 { 0.0 } else { tangent(b * math::powf(a, b - 1.0)) };
+    let by_exponent = if a > 0.0 { value * math::ln(a) } else { 0.0 };
     (base * by_base + exponent * by_exponent).chain(value, 1.0)
 }
 

@@ -17,6 +17,7 @@ use std::rc::Rc;
 
 use super::functions::Function;
 use super::tree::{Form, Node, Operator};
+use crate::math;
 use crate::unit::{Dimension, Unit};
 
 /// A dimension, as far as it is known: a known one times powers of unknown ones.
@@ -109,7 +110,7 @@ impl Measure {
     #[must_use]
     pub fn times(&self, other: &Self, exponent: f64) -> Self {
         let dimension = self.dimension.clone().times(&other.dimension, exponent);
-        let power = |factor: f64| if exponent == 1.0 { factor } else { factor.powf(exponent) };
+        let power = |factor: f64| if exponent == 1.0 { factor } else { math::powf(factor, exponent) };
         let bare = match (self.bare, other.bare) {
             (Bare::No, _) | (_, Bare::No) => Bare::No,
             (Bare::Zero, _) => Bare::Zero,

@@ -7,6 +7,7 @@ use super::tree::Node;
 use crate::data::DataFile;
 use crate::diagnostic::Diagnostic;
 use crate::experiment::ResponseData;
+use crate::math;
 use crate::study::{CaseDraft, Measured};
 use crate::unit::Unit;
 
@@ -133,8 +134,8 @@ fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Va
                     .with_help("take another column, or correct the unit in the header of the file")
             })?;
             let polar = |(&size, &angle): (&f64, &f64)| {
-                let size = if decibel { 10f64.powf(size / 20.0) } else { size };
-                let (sin, cos) = (angle * factor).sin_cos();
+                let size = if decibel { math::powf(10.0, size / 20.0) } else { size };
+                let (sin, cos) = math::sin_cos(angle * factor);
                 [size * cos, size * sin]
             };
             Ok((size.values.iter().zip(angle.values).map(polar).collect(), in_unit))

@@ -3,6 +3,8 @@
 //! Objectives are minimised and stand in one array, `m` per point. A point dominates another if it is worse in no objective
 //! and better in one.
 
+use crate::math;
+
 mod divide;
 mod hypervolume;
 mod read_outs;
@@ -45,7 +47,7 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
         let Some(next) = best.next().or(farthest).filter(|&i| distance[i] > 0.0) else { break };
         taken.push(next);
         for (i, distance) in distance.iter_mut().enumerate() {
-            let square = |k: usize| ((objectives[i * m + k] - objectives[next * m + k]) / ranges[k]).powi(2);
+            let square = |k: usize| math::powi((objectives[i * m + k] - objectives[next * m + k]) / ranges[k], 2);
             *distance = distance.min((0..m).map(square).sum());
         }
     }
@@ -59,7 +61,7 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
 #[allow(clippy::cast_precision_loss)]
 pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &[Vec<f64>]) -> f64 {
     let nearest = |at: &Vec<f64>| {
-        let square = |point: &[f64]| point.iter().zip(at).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let square = |point: &[f64]| point.iter().zip(at).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>();
         objectives.chunks_exact(m).map(square).fold(f64::INFINITY, f64::min).sqrt()
     };
     reference.iter().map(nearest).sum::<f64>() / reference.len() as f64

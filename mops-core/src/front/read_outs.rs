@@ -31,19 +31,20 @@ pub fn knee(objectives: &[f64], m: usize) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math;
 
     #[test]
     fn the_knee_of_a_hyperbola_is_its_corner() {
         // y = 1/x from 1/8 to 8, in units that differ by a thousand.
         let points: Vec<f64> =
-            (-30..=30).map(|i| 2_f64.powf(f64::from(i) / 10.0)).flat_map(|x| [x, 1000.0 / x]).collect();
+            (-30..=30).map(|i| math::powf(2.0, f64::from(i) / 10.0)).flat_map(|x| [x, 1000.0 / x]).collect();
         let knee = knee(&points, 2).unwrap();
         assert_eq!(points[2 * knee], 1.0);
     }
 
     #[test]
     fn a_front_that_bulges_away_has_no_knee() {
-        let arc = |i: u32| (f64::from(i) / 20.0 * std::f64::consts::FRAC_PI_2).sin_cos();
+        let arc = |i: u32| math::sin_cos(f64::from(i) / 20.0 * std::f64::consts::FRAC_PI_2);
         let points: Vec<f64> = (0..=20).map(arc).flat_map(|(s, c)| [s, c]).collect();
         assert_eq!(knee(&points, 2), None);
         assert_eq!(knee(&[], 2), None);

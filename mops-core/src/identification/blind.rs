@@ -162,6 +162,7 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use crate::math;
     use nalgebra::DVector;
 
     use super::super::sensitivity::{Sensitivity, TANGENTS};
@@ -180,7 +181,7 @@ mod tests {
             })
             .collect();
         let signals =
-            DMatrix::from_fn(200, gradients.len(), |t, i| (0.01 * (1.0 + i as f64) * t as f64 + i as f64).sin());
+            DMatrix::from_fn(200, gradients.len(), |t, i| math::sin(0.01 * (1.0 + i as f64) * t as f64 + i as f64));
         let slopes = DMatrix::from_columns(&gradients.iter().map(|g| DVector::from_vec(g.clone())).collect::<Vec<_>>());
         Sensitivity::of(&(signals * slopes.transpose()), coordinates, TANGENTS)
     }
@@ -222,7 +223,7 @@ mod tests {
     fn two_blind_directions_are_told_apart_and_other_ones_are_said_in_percent() {
         // Seen: a b and c d^3.
         let (a, b, c, d) = (2.0, 5.0, 1.0, 0.3);
-        let gradients = [vec![b, a, 0.0, 0.0], vec![0.0, 0.0, f64::powi(d, 3), 3.0 * c * d * d]];
+        let gradients = [vec![b, a, 0.0, 0.0], vec![0.0, 0.0, math::powi(d, 3), 3.0 * c * d * d]];
         let mut both = words(&[("a", a), ("b", b), ("c", c), ("d", d)], &gradients);
         both.sort();
         assert_eq!(both, ["only `d`^3 `c` can be estimated", "only the product `a` `b` can be estimated"]);

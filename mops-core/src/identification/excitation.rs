@@ -199,6 +199,7 @@ fn smallest(parts: &[DMatrix<f64>], n: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use crate::math;
     use rand::Rng;
 
     use super::*;
@@ -242,13 +243,13 @@ mod tests {
     #[test]
     fn a_sinusoid_has_order_two_also_where_it_is_sampled_finely() {
         for w in [0.01, 0.1, 1.0, 2.5] {
-            let found = excitation(&signal(3000, |t| (w * f64::from(t)).sin()), None);
+            let found = excitation(&signal(3000, |t| math::sin(w * f64::from(t))), None);
             assert_eq!(found.order, 2, "{w}");
             // C_2 = 1/2 (1, cos w; cos w, 1): the smaller eigenvalue is 1/2 (1 - |cos w|), of a power of 1/2.
-            let exact = 1.0 - f64::cos(w).abs();
+            let exact = 1.0 - math::cos(w).abs();
             assert!((found.eigenvalue / exact - 1.0).abs() < 0.5, "{w}: {} {exact}", found.eigenvalue);
         }
-        let two = |t: u32| (0.3 * f64::from(t)).sin() + 0.2 * (1.1 * f64::from(t)).cos();
+        let two = |t: u32| math::sin(0.3 * f64::from(t)) + 0.2 * math::cos(1.1 * f64::from(t));
         assert_eq!(order(&signal(1000, two)), 4);
         assert_eq!(order(&signal(1000, |t| 3.0 + two(t))), 5);
     }
@@ -270,13 +271,13 @@ mod tests {
         let noise: Vec<f64> = (0..1000).map(|_| random.random::<f64>() - 0.5).collect();
         let white = excitation(&noise, None);
         assert!(white.is_at_least() && white.order == 200, "{white:?}");
-        let noisy: Vec<f64> = (0..1000).map(|t| (0.3 * f64::from(t)).sin() + 0.01 * noise[t as usize]).collect();
+        let noisy: Vec<f64> = (0..1000).map(|t| math::sin(0.3 * f64::from(t)) + 0.01 * noise[t as usize]).collect();
         assert_eq!((order(&noisy), excitation(&noisy, Some(0.01 / 12f64.sqrt())).order), (2, 2));
     }
 
     #[test]
     fn the_unit_of_a_signal_changes_nothing_and_short_or_empty_records_have_order_zero() {
-        let wave = signal(500, |t| 1e-9 * (0.3 * f64::from(t)).sin());
+        let wave = signal(500, |t| 1e-9 * math::sin(0.3 * f64::from(t)));
         assert_eq!(order(&wave), 2);
         assert_eq!((order(&[]), order(&[1.0]), order(&[0.0; 100]), order(&[1.0; 23])), (0, 0, 0, 0));
         assert_eq!(order(&[1.0; 24]), 1);
@@ -284,7 +285,7 @@ mod tests {
 
     #[test]
     fn shifted_sums_are_the_covariances() {
-        let u = signal(40, |t| (0.9 * f64::from(t)).sin() + 0.1 * f64::from(t));
+        let u = signal(40, |t| math::sin(0.9 * f64::from(t)) + 0.1 * f64::from(t));
         let windows = DMatrix::from_fn(36, 5, |t, i| u[t + 4 - i]);
         assert!((covariances(&u, 5) - windows.tr_mul(&windows) / 36.0).abs().max() < 1e-12);
     }

@@ -7,6 +7,7 @@ use super::local::{Local, Point, counting, local};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
 use super::sensitivity::{Coordinate, Eigen};
 use super::sentences::sentences;
+use crate::math;
 use crate::problem::{Evaluation, Problem};
 
 /// Share of the value up to which an estimate counts as determined.
@@ -106,7 +107,7 @@ fn remaining(problem: &Problem, at: &[f64], blind: &BlindDirection, coordinates:
         for &(k, share) in changes {
             let (i, step) = (problem.active()[k], 0.1 * share);
             let straight = blind.straight || tuners[i] == 0.0;
-            tuners[i] = if straight { tuners[i] + step * coordinates[k].scale() } else { tuners[i] * step.exp() };
+            tuners[i] = if straight { tuners[i] + step * coordinates[k].scale() } else { tuners[i] * math::exp(step) };
         }
         study.apply_ties(&mut tuners);
         vector(problem.evaluate_at(&tuners))
@@ -114,7 +115,7 @@ fn remaining(problem: &Problem, at: &[f64], blind: &BlindDirection, coordinates:
     let Some(here) = vector(problem.evaluate_at(at)) else { return f64::NAN };
     let change = |changes: &[(usize, f64)]| -> f64 {
         let Some(there) = moved(changes) else { return f64::NAN };
-        there.iter().zip(&here).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+        there.iter().zip(&here).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>().sqrt()
     };
     let one_by_one = blind.changes.iter().map(|&one| change(&[one])).fold(0.0, f64::max);
     let together = change(&blind.changes);

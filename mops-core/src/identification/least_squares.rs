@@ -1,5 +1,6 @@
 //! Linear least squares.
 
+use crate::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest are zero, for columns of unit length: what rounding leaves.
@@ -53,8 +54,8 @@ pub fn least_squares(regressors: &DMatrix<f64>, y: &DVector<f64>) -> Estimate {
         let s = svd.singular_values[i];
         solution += v_t.row(i).transpose() * (u.column(i).dot(&target) / s);
         for k in 0..n {
-            variances[k] += (v_t[(i, k)] / s).powi(2);
-            covered[k] += v_t[(i, k)].powi(2);
+            variances[k] += math::powi(v_t[(i, k)] / s, 2);
+            covered[k] += math::powi(v_t[(i, k)], 2);
         }
     }
     let rank = kept.len();

@@ -6,6 +6,7 @@ use super::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
 use super::records::Record;
 use super::whiteness::whiteness;
 use super::words::coefficient;
+use crate::math;
 use crate::study::Study;
 
 /// Largest leverage of a sample whose residual still shows its noise. A sample beyond is fitted by a parameter of its own, and
@@ -337,9 +338,9 @@ fn bandwidth(deviations: &[f64]) -> usize {
     const MOST: f64 = 0.97;
     let n = deviations.len() as f64;
     let rho = whiteness(deviations).map_or(0.0, |found| found.lag1.clamp(-MOST, MOST));
-    let alpha = 4.0 * rho * rho / ((1.0 - rho).powi(2) * (1.0 + rho).powi(2));
-    let andrews = 1.1447 * (alpha * n).cbrt();
-    let usual = 1.0 + 4.0 * (n / 100.0).powf(2.0 / 9.0);
+    let alpha = 4.0 * rho * rho / (math::powi(1.0 - rho, 2) * math::powi(1.0 + rho, 2));
+    let andrews = 1.1447 * math::cbrt(alpha * n);
+    let usual = 1.0 + 4.0 * math::powf(n / 100.0, 2.0 / 9.0);
     (andrews.max(usual).round() as usize).clamp(1, (deviations.len() / 3).max(1))
 }
 
@@ -349,7 +350,7 @@ mod tests {
 
     #[test]
     fn sums_over_windows_have_the_squares_of_newey_and_west() {
-        let scores = DMatrix::from_fn(50, 2, |s, k| ((s * s) as f64 * 0.7 + k as f64).sin());
+        let scores = DMatrix::from_fn(50, 2, |s, k| math::sin((s * s) as f64 * 0.7 + k as f64));
         for bandwidth in [1, 2, 7, 49] {
             let sums = window_sums(&scores, bandwidth);
             let found = sums.tr_mul(&sums);

@@ -1,9 +1,10 @@
 //! Which records share a variance, and these variances by restricted maximum likelihood.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::records::Record;
+use crate::math;
+use crate::statistics::f_cdf;
 
 /// Probability below which a record contradicts the noise declared for it and for the others.
 const CONTRADICTED: f64 = 0.01;
@@ -90,7 +91,7 @@ impl Sharing {
 
     /// Variance of a record.
     pub fn variance(&self, pools: &[Pool], record: usize) -> f64 {
-        pools[self.of_record[record]].variance * self.relative[record].powi(2)
+        pools[self.of_record[record]].variance * math::powi(self.relative[record], 2)
     }
 
     /// Variances of restricted maximum likelihood: of every pool, the sum of squares in the fit that weighs samples by their
@@ -102,7 +103,7 @@ impl Sharing {
         let mean = |of: &Fitted| of.squares / of.count();
         let members = |pool: usize| (0..fitted.len()).filter(move |&i| self.of_record[i] == pool);
         let begin = |pool: usize| {
-            let sum: f64 = members(pool).map(|i| fitted[i].squares / self.relative[i].powi(2)).sum();
+            let sum: f64 = members(pool).map(|i| fitted[i].squares / math::powi(self.relative[i], 2)).sum();
             Pool { variance: sum / members(pool).map(|i| fitted[i].count()).sum::<f64>(), freedom: 0.0 }
         };
         let least = ROUNDING * fitted.iter().map(mean).fold(0.0, f64::max);
@@ -153,7 +154,7 @@ impl Sharing {
             let covariance = inverse.view((0, 0), (n, n)) * (one * one)
                 + (inverse.view((0, n), (n, n)) + inverse.view((n, 0), (n, n))) * (one * ratio)
                 + inverse.view((n, n), (n, n)) * (ratio * ratio);
-            squares[self.of_record[i]] += of.squares_at(&step) / self.relative[i].powi(2);
+            squares[self.of_record[i]] += of.squares_at(&step) / math::powi(self.relative[i], 2);
             freedom[self.of_record[i]] += of.count() - of.matrix.dot(&covariance) / variances[i];
         }
         for (pool, (squares, freedom)) in pools.iter_mut().zip(squares.into_iter().zip(freedom)) {
@@ -179,7 +180,7 @@ impl Sharing {
         let (mut squares, mut freedom) = (vec![0.0; self.count], vec![0.0; self.count]);
         for (i, of) in fitted.iter().enumerate() {
             let pool = self.of_record[i];
-            squares[pool] += of.squares_at(&found.step) / self.relative[i].powi(2);
+            squares[pool] += of.squares_at(&found.step) / math::powi(self.relative[i], 2);
             freedom[pool] += of.count() - weights[i] * of.matrix.dot(&found.covariance);
         }
         let mut change = 0.0f64;
@@ -246,7 +247,7 @@ pub(super) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Shari
 /// Splits records with a declared noise into those whose residuals agree and those that contradict the rest, the worst first.
 fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usize>, Vec<usize>) {
     let mut disputed = Vec::new();
-    let ratio = |i: usize| own[i].variance / fitted[i].record.noise.unwrap_or(1.0).powi(2);
+    let ratio = |i: usize| own[i].variance / math::powi(fitted[i].record.noise.unwrap_or(1.0), 2);
     loop {
         // Probability of a variance as far from that of the others, either way, by the F test.
         let chance = |i: usize| -> f64 {
@@ -254,16 +255,16 @@ fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usi
             let freedom: f64 = others().map(|&j| own[j].freedom).sum();
             let usual = others().map(|&j| ratio(j) * own[j].freedom).sum::<f64>() / freedom;
             let known = own[i].freedom >= SHOWN && freedom >= SHOWN && usual > 0.0;
-            let distribution = FisherSnedecor::new(own[i].freedom, freedom).ok().filter(|_| known);
-            distribution.map_or(1.0, |distribution| {
-                let below = distribution.cdf(ratio(i) / usual);
-                2.0 * below.min(1.0 - below)
-            })
+            if !known {
+                return 1.0;
+            }
+            let below = f_cdf(ratio(i) / usual, own[i].freedom, freedom);
+            2.0 * below.min(1.0 - below)
         };
         let least = kept.iter().map(|&i| (i, chance(i))).min_by(|a, b| a.1.total_cmp(&b.1));
         // Of two, which contradict each other, it is the one farther from its own.
         let least = match (kept.as_slice(), least) {
-            ([a, b], Some((_, chance))) if ratio(*a).ln().abs() > ratio(*b).ln().abs() => Some((*a, chance)),
+            ([a, b], Some((_, chance))) if math::ln(ratio(*a)).abs() > math::ln(ratio(*b)).abs() => Some((*a, chance)),
             ([_, b], Some((_, chance))) => Some((*b, chance)),
             (_, least) => least,
         };
@@ -289,14 +290,14 @@ mod tests {
     }
 
     fn chirp(n: i32, size: f64) -> Vec<f64> {
-        (0..n).map(|i| size * f64::from(i * i).sin()).collect()
+        (0..n).map(|i| size * math::sin(f64::from(i * i))).collect()
     }
 
     #[test]
     fn the_variance_of_one_record_is_that_about_its_mean() {
         let values = chirp(30, 1.0);
         let mean = values.iter().sum::<f64>() / 30.0;
-        let exact = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 29.0;
+        let exact = values.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / 29.0;
         let found = Sharing::none(1).variances(&[constant("y", None, 0, &values)]);
         assert!((found.pools[0].variance / exact - 1.0).abs() < 1e-9 && (found.pools[0].freedom - 29.0).abs() < 1e-9);
         assert!((found.step[0] + mean).abs() < 1e-12);
@@ -310,7 +311,7 @@ mod tests {
         assert!((found.pools[0].freedom - 99.0).abs() < 1e-6 && (found.pools[1].freedom - 9.0).abs() < 1e-6);
         let values = chirp(10, 1.0);
         let mean = values.iter().sum::<f64>() / 10.0;
-        let exact = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 9.0;
+        let exact = values.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / 9.0;
         assert!((found.pools[1].variance / exact - 1.0).abs() < 1e-6);
     }
 

@@ -58,6 +58,7 @@ impl Recursive {
 
 #[cfg(test)]
 mod tests {
+    use crate::math;
     use rand::Rng;
 
     use super::super::least_squares;
@@ -95,7 +96,7 @@ mod tests {
     #[test]
     fn with_forgetting_it_is_weighted_least_squares_and_follows_a_change() {
         let (regressors, mut y) = data(200);
-        let weights = DVector::from_fn(200, |t, _| 0.95f64.powi(199 - i32::try_from(t).unwrap()).sqrt());
+        let weights = DVector::from_fn(200, |t, _| math::powi(0.95, 199 - i32::try_from(t).unwrap()).sqrt());
         let weighted = DMatrix::from_fn(200, 3, |t, k| regressors[(t, k)] * weights[t]);
         let batch = least_squares(&weighted, &y.component_mul(&weights));
         let found = recursive(&regressors, &y, 0.95, 1e8);

@@ -228,6 +228,7 @@ fn eigen(matrix: &DMatrix<f64>) -> Eigen {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math;
 
     pub(super) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
         let of = |(name, value): &(&str, f64)| Coordinate {
@@ -270,7 +271,7 @@ mod tests {
 
     #[test]
     fn the_rank_does_not_depend_on_units() {
-        let jacobian = DMatrix::from_fn(20, 3, |t, k| ((k + 1) as f64 * t as f64 * 0.1).sin() * [1e-9, 1.0, 1e9][k]);
+        let jacobian = DMatrix::from_fn(20, 3, |t, k| math::sin((k + 1) as f64 * t as f64 * 0.1) * [1e-9, 1.0, 1e9][k]);
         let mut some = coordinates(&[("a", 1e9), ("b", 1.0), ("c", 1e-9)]);
         for (coordinate, range) in some.iter_mut().zip([1e9, 1.0, 1e-9]) {
             coordinate.range = range;

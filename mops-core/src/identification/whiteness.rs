@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::words::{coefficient, percent};
+use crate::math;
 
 /// Probability below which residuals do not count as white.
 const UNLIKELY: f64 = 0.01;
@@ -39,7 +40,7 @@ pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
     // An even number: then the tail of chi-squared is a finite sum.
     let lags = (n / 10 * 2).min(10);
     let correlation = |k: usize| about.iter().zip(&about[k..]).map(|(a, b)| a * b).sum::<f64>() / power;
-    let sum: f64 = (1..=lags).map(|k| correlation(k).powi(2) / (n - k) as f64).sum();
+    let sum: f64 = (1..=lags).map(|k| math::powi(correlation(k), 2) / (n - k) as f64).sum();
     let ljung_box = n as f64 * (n as f64 + 2.0) * sum;
     Some(Whiteness { lag1: correlation(1), ljung_box, lags, probability: tail(ljung_box, lags) })
 }
@@ -54,7 +55,7 @@ fn tail(q: f64, freedom: usize) -> f64 {
         let next = 0.5 * q / k as f64;
         term *= next;
     }
-    sum * (-0.5 * q).exp()
+    sum * math::exp(-0.5 * q)
 }
 
 impl Whiteness {
@@ -94,7 +95,7 @@ mod tests {
 
     /// `n` values without a pattern.
     fn chirp(n: i32) -> Vec<f64> {
-        (0..n).map(|i| f64::from(i * i).sin()).collect()
+        (0..n).map(|i| math::sin(f64::from(i * i))).collect()
     }
 
     fn close(a: f64, b: f64) {
@@ -115,7 +116,7 @@ mod tests {
         close(white.ljung_box, 8.027_409_057);
         close(white.probability, 0.626_159_546);
         assert!(white.is_white());
-        let slow: Vec<f64> = (0..60).map(|i| (0.2 * f64::from(i)).sin()).collect();
+        let slow: Vec<f64> = (0..60).map(|i| math::sin(0.2 * f64::from(i))).collect();
         let slow = whiteness(&slow).unwrap();
         assert!(slow.lag1 > 0.9 && !slow.is_white());
         assert!(slow.words("y", "swing").contains("not white"));

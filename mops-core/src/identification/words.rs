@@ -1,5 +1,7 @@
 //! Numbers and lists inside sentences.
 
+use crate::math;
+
 /// A number to three significant digits: `0.0150`, `4.00`, `1230`, `3.20e-7`.
 pub(super) fn coefficient(value: f64) -> String {
     digits(value, 3)
@@ -22,7 +24,7 @@ fn digits(value: f64, count: usize) -> String {
 /// An estimate and its standard error, to two digits of the error: `0.9989 +- 0.0011`.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub(super) fn estimate(value: f64, error: f64) -> String {
-    let more = (value.abs() / error).log10().floor().clamp(-1.0, 13.0);
+    let more = math::log10(value.abs() / error).floor().clamp(-1.0, 13.0);
     let count = if more.is_finite() { (more + 2.0) as usize } else { 3 };
     format!("{} +- {}", digits(value, count.max(1)), digits(error, 2))
 }

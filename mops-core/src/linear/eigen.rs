@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::Complex;
 use super::components::{block, strong_components};
 use super::qr_steps::hessenberg_eigenvalues;
+use crate::math;
 
 /// The eigenvalues of a square matrix, complex ones as exact conjugate pairs, the one above the real axis first.
 ///
@@ -72,7 +73,7 @@ fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
     let blocks = strong_components(a).into_iter().map(|indices| {
         let mut matrix = block(a, &indices);
         // A power of two, so that nothing is rounded; squares of entries then stay within the range of numbers.
-        let scale = matrix.amax().log2().floor().exp2();
+        let scale = math::exp2(math::log2(matrix.amax()).floor());
         let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
         matrix.unscale_mut(scale);
         balance(&mut matrix);

@@ -1,6 +1,7 @@
 //! Bounds of a response over ranges of frequencies: what no grid can miss.
 
 use super::{Complex, FrequencyResponse, StateSpace, zeros};
+use crate::math::{self, complex};
 
 /// Gain below which a response counts as nothing: -200 dB.
 const FAINT: f64 = 1e-10;
@@ -36,7 +37,7 @@ impl Enclosure {
         let zeros = zeros(system)?.into_iter().map(|z| (z, 1.0));
         let roots: Vec<(Complex, f64)> = zeros.chain(system.poles()?.into_iter().map(|p| (p, -1.0))).collect();
         let delay = system.delay;
-        let sizes = roots.iter().map(|(root, _)| root.norm()).chain((delay > 0.0).then(|| 1.0 / delay));
+        let sizes = roots.iter().map(|(root, _)| complex::norm(*root)).chain((delay > 0.0).then(|| 1.0 / delay));
         let sizes: Vec<f64> = sizes.filter(|size| *size > 0.0 && size.is_finite()).collect();
         let (low, high) =
             (sizes.iter().copied().fold(f64::INFINITY, f64::min), sizes.iter().copied().fold(0.0, f64::max));
@@ -64,14 +65,14 @@ impl Enclosure {
     /// Ranges that together are all frequencies at which the response matters: from 0 to where it only falls any more, and
     /// is faint, or is as good as that of infinite frequency.
     pub fn spans(&self) -> Vec<Span> {
-        let decade = |power: i32| 10f64.powi(power);
+        let decade = |power: i32| math::powi(10.0, power);
         let start = self.corners[0] * decade(-BEYOND);
         let mut spans = vec![self.over(0.0, start)];
         let end = self.corners[1] * decade(BEYOND);
         let mut low = start;
         let mut last = f64::INFINITY;
         loop {
-            let gain = self.at(low).norm();
+            let gain = complex::norm(self.at(low));
             let settled = low >= end && (gain <= FAINT || gain >= 0.99 * last);
             if settled || !gain.is_finite() && low >= end || low > f64::MAX.sqrt() {
                 return spans;
@@ -90,20 +91,20 @@ impl Enclosure {
         let mut turned = 0.0;
         for &(root, sign) in &self.roots {
             let distance = Complex::new(-root.re, center - root.im);
-            let x = half / distance.norm();
+            let x = half / complex::norm(distance);
             if x <= 0.5 {
                 // ln(1 + u) = u + r with |r| <= |u|^2/(2 (1 - |u|)), of which the imaginary part is small where u is nearly
                 // real: |Im u^k| <= k |sin arg u| |u|^k.
                 slope += Complex::new(0.0, sign * half) / distance;
                 let curved = x * x / (1.0 - x);
                 rest += 0.5 * curved;
-                turned += curved * (root.re.abs() / distance.norm()).min(0.5);
+                turned += curved * (root.re.abs() / complex::norm(distance)).min(0.5);
             } else {
                 let (change, angle) = whole_change(root, [low, center, high]);
                 let change = if sign > 0.0 { change } else { [-change[1], -change[0]] };
                 gain = [gain[0] + change[0], gain[1] + change[1]];
                 turn += angle;
-                far += change[0].abs().max(change[1].abs()).hypot(angle);
+                far += math::hypot(change[0].abs().max(change[1].abs()), angle);
             }
         }
         let near = slope.re.abs() + rest;
@@ -122,19 +123,19 @@ impl Enclosure {
     fn check(&self) -> Result<(), String> {
         let [low, high] = self.corners;
         let mut before: Option<f64> = None;
-        let steps = (high / low).log10().ceil().max(1.0);
+        let steps = math::log10(high / low).ceil().max(1.0);
         for i in 0..=(2.0 * steps) as i32 {
             // Between the corners, off those that are round numbers.
-            let omega = 1.07 * low * 10f64.powf(0.5 * f64::from(i));
+            let omega = 1.07 * low * math::powf(10.0, 0.5 * f64::from(i));
             let s = Complex::new(0.0, omega);
-            let rational: f64 = self.roots.iter().map(|(root, sign)| sign * (s - root).norm().ln()).sum();
-            let gain = self.at(omega).norm();
+            let rational: f64 = self.roots.iter().map(|(root, sign)| sign * math::ln(complex::norm(s - root))).sum();
+            let gain = complex::norm(self.at(omega));
             // Where the response is what rounding leaves of a sum it says nothing.
             let lost = gain <= LOST * self.response.terms(s);
             if lost || !(gain > FAINT && gain.is_finite() && rational.is_finite()) {
                 continue;
             }
-            let expected = rational - gain.ln();
+            let expected = rational - math::ln(gain);
             if let Some(last) = before
                 && (expected - last).abs() > INACCURATE
             {
@@ -151,13 +152,13 @@ impl Enclosure {
 fn whole_change(root: Complex, [low, center, high]: [f64; 3]) -> ([f64; 2], f64) {
     let from = |omega: f64| Complex::new(-root.re, omega - root.im);
     let middle = from(center);
-    let (first, last) = (from(low).norm(), from(high).norm());
+    let (first, last) = (complex::norm(from(low)), complex::norm(from(high)));
     let least = if (low..=high).contains(&root.im) { root.re.abs() } else { first.min(last) };
     let angle = |omega: f64| {
         let other = from(omega);
-        if other.norm() == 0.0 { 0.0 } else { (other * middle.conj()).arg().abs() }
+        if complex::norm(other) == 0.0 { 0.0 } else { complex::arg(other * middle.conj()).abs() }
     };
-    let change = [least, first.max(last)].map(|distance| (distance / middle.norm()).ln());
+    let change = [least, first.max(last)].map(|distance| math::ln(distance / complex::norm(middle)));
     (change, angle(low).max(angle(high)))
 }
 
@@ -196,8 +197,8 @@ impl Closed {
             // Where L is infinite.
             Self::Sensitivity if !l.is_finite() => 0.0,
             Self::Complementary if !l.is_finite() => 1.0,
-            Self::Sensitivity => (l + 1.0).inv().norm(),
-            Self::Complementary => (l / (l + 1.0)).norm(),
+            Self::Sensitivity => complex::norm((l + 1.0).inv()),
+            Self::Complementary => complex::norm(l / (l + 1.0)),
         }
     }
 }
@@ -220,14 +221,14 @@ impl Span {
 
     /// Bounds of `ln |L|`.
     pub fn gain(&self) -> [f64; 2] {
-        let here = self.response.norm().ln();
+        let here = math::ln(complex::norm(self.response));
         [here + self.gain[0], here + self.gain[1]]
     }
 
     /// Bounds of the angle from -1 to L, rad, 0 where L is real and negative; from -pi to pi where it may be any.
     pub fn angle(&self) -> [f64; 2] {
         use std::f64::consts::PI;
-        let here = (-self.response).arg();
+        let here = complex::arg(-self.response);
         if self.turn < PI { [here - self.turn, here + self.turn] } else { [-PI, PI] }
     }
 
@@ -240,40 +241,42 @@ impl Span {
     /// Bounds of the closed loop by those of the gain and the angle of L.
     fn by_sector(&self, of: Closed) -> [f64; 2] {
         use std::f64::consts::PI;
-        let [low, high] = self.gain().map(f64::exp);
+        let [low, high] = self.gain().map(math::exp);
         // |T| = 1/|1 + 1/L|, and 1/L has the opposite angle.
         let [low, high] = if of == Closed::Sensitivity { [low, high] } else { [1.0 / high, 1.0 / low] };
         if !(low >= 0.0 && high >= low) {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
-        let angle = (-self.response).arg().abs();
+        let angle = complex::arg(-self.response).abs();
         let (least, most) = ((angle - self.turn).max(0.0), (angle + self.turn).min(PI));
         let distance = |size: f64, angle: f64| {
-            let sine = (0.5 * angle).sin();
-            if size.is_finite() { ((size - 1.0).powi(2) + 4.0 * size * sine * sine).sqrt() } else { f64::INFINITY }
+            let sine = math::sin(0.5 * angle);
+            if size.is_finite() { (math::powi(size - 1.0, 2) + 4.0 * size * sine * sine).sqrt() } else { f64::INFINITY }
         };
-        let nearest = distance(least.cos().clamp(low, high), least);
+        let nearest = distance(math::cos(least).clamp(low, high), least);
         let farthest = distance(low, most).max(distance(high, most));
-        [-farthest.ln(), -nearest.ln()]
+        [-math::ln(farthest), -math::ln(nearest)]
     }
 
     /// Bounds of the closed loop by its own linear part, with those of the rest.
     fn by_slope(&self, of: Closed) -> [f64; 2] {
         let l = self.response;
         let t = l / (l + 1.0);
-        let size = self.slope.norm() + self.rest;
-        let growth = size.exp_m1();
-        let u = t.norm() * growth;
+        let size = complex::norm(self.slope) + self.rest;
+        let growth = math::exp_m1(size);
+        let u = complex::norm(t) * growth;
         if u.is_nan() || u > 0.9 {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
         // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) where ln L changes by e.
-        let curved = t.norm() * (growth - size) + 0.5 * u * u / (1.0 - u);
+        let curved = complex::norm(t) * (growth - size) + 0.5 * u * u / (1.0 - u);
         let (linear, rest) = match of {
-            Closed::Sensitivity => ((t * self.slope).re, self.rest * t.norm()),
-            Closed::Complementary => (((Complex::new(1.0, 0.0) - t) * self.slope).re, self.rest * (1.0 + t.norm())),
+            Closed::Sensitivity => ((t * self.slope).re, self.rest * complex::norm(t)),
+            Closed::Complementary => {
+                (((Complex::new(1.0, 0.0) - t) * self.slope).re, self.rest * (1.0 + complex::norm(t)))
+            }
         };
-        let (here, change) = (of.gain(l).ln(), linear.abs() + rest + curved);
+        let (here, change) = (math::ln(of.gain(l)), linear.abs() + rest + curved);
         [here - change, here + change]
     }
 }

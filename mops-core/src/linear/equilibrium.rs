@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
+use crate::math;
 use crate::random::stream;
 
 /// What must vanish, with its slopes.
@@ -114,7 +115,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
 
     /// The distance of a point from the origin, in sizes of coordinates.
     fn distance(&self, x: &[f64]) -> f64 {
-        x.iter().zip(self.origin).map(|(a, b)| ((a - b) / size(*b)).powi(2)).sum::<f64>().sqrt()
+        x.iter().zip(self.origin).map(|(a, b)| math::powi((a - b) / size(*b), 2)).sum::<f64>().sqrt()
     }
 
     /// Points at a distance from the origin: every free coordinate up and down, and all of them at once in a few ways.
@@ -151,7 +152,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
             })
             .collect();
         let distance = |at: &Balance| {
-            at.rates.iter().zip(&weights).map(|(rate, weight)| (rate * weight).powi(2)).sum::<f64>().sqrt()
+            at.rates.iter().zip(&weights).map(|(rate, weight)| math::powi(rate * weight, 2)).sum::<f64>().sqrt()
         };
         for _ in 0..200 {
             let far = distance(&here);
@@ -231,8 +232,8 @@ mod tests {
     /// A pendulum with torque: x = (angle, speed), u = torque; `9.81 sin(angle) + torque = 0` at rest.
     fn pendulum(z: &[f64]) -> Result<Balance, String> {
         Ok(Balance {
-            rates: vec![z[1], 9.81 * z[0].sin() - 0.1 * z[1] + z[2]],
-            slopes: DMatrix::from_row_slice(2, 3, &[0.0, 1.0, 0.0, 9.81 * z[0].cos(), -0.1, 1.0]),
+            rates: vec![z[1], 9.81 * math::sin(z[0]) - 0.1 * z[1] + z[2]],
+            slopes: DMatrix::from_row_slice(2, 3, &[0.0, 1.0, 0.0, 9.81 * math::cos(z[0]), -0.1, 1.0]),
         })
     }
 
@@ -246,7 +247,7 @@ mod tests {
     #[test]
     fn with_the_state_held_the_input_that_keeps_it_is_found() {
         let x = equilibrium(pendulum, &[0.5, 0.0, 0.0], &[false, true, true]).unwrap();
-        assert_near(x[2], -9.81 * 0.5f64.sin(), 1e-12);
+        assert_near(x[2], -9.81 * math::sin(0.5), 1e-12);
         assert_eq!(x[0], 0.5);
     }
 
@@ -268,15 +269,15 @@ mod tests {
             assert_near(x[0], expected, 1e-8 * (1.0 + expected.abs()));
         };
         // u - 2 x^3, from the flat place; of tiny and of large inputs.
-        let cubic = scalar(|x, u| [u - 2.0 * x.powi(3), -6.0 * x * x, 1.0]);
+        let cubic = scalar(|x, u| [u - 2.0 * math::powi(x, 3), -6.0 * x * x, 1.0]);
         for u in [54.0, -54.0, 1e-6, 2e-15, 2e9] {
-            near(&cubic, u, 0.0, (0.5 * u).cbrt());
+            near(&cubic, u, 0.0, math::cbrt(0.5 * u));
         }
         // A tank, u - 3 sqrt(x): the slope at 0 counts as 0, or is infinite.
         for slope in [0.0, f64::NEG_INFINITY] {
             let tank = scalar(move |x, u| [u - 3.0 * x.sqrt(), if x == 0.0 { slope } else { -1.5 / x.sqrt() }, 1.0]);
             for u in [0.9, 3.0, 60.0, 1e-4] {
-                near(&tank, u, 0.0, (u / 3.0f64).powi(2));
+                near(&tank, u, 0.0, math::powi(u / 3.0, 2));
             }
             near(&tank, 0.9, -1e-3, 0.09);
         }
@@ -285,15 +286,16 @@ mod tests {
         near(&dead, 0.25, 0.0, 1.25);
         let saturated = scalar(|x, u| [u - x.clamp(-1.0, 1.0), if x.abs() < 1.0 { -1.0 } else { 0.0 }, 1.0]);
         near(&saturated, 0.5, 3.0, 0.5);
-        let top = scalar(|x, u| [u + x.cos(), -x.sin(), 1.0]);
+        let top = scalar(|x, u| [u + math::cos(x), -math::sin(x), 1.0]);
         near(&top, 0.5, 0.0, 2.0 * PI / 3.0);
         // ln x, not defined at the start.
-        near(&scalar(|x, u| [u + x.ln(), 1.0 / x, 1.0]), 2.0, 0.0, (-2f64).exp());
+        near(&scalar(|x, u| [u + math::ln(x), 1.0 / x, 1.0]), 2.0, 0.0, math::exp(-2.0));
     }
 
     #[test]
     fn a_multiple_root_is_followed_to_its_end_and_what_is_zero_but_for_rounding_is_zero() {
-        let flat = equilibrium(scalar(|x, _| [-x.powi(3), -3.0 * x * x, 0.0]), &[1.0, 0.0], &[true, false]).unwrap();
+        let flat =
+            equilibrium(scalar(|x, _| [-math::powi(x, 3), -3.0 * x * x, 0.0]), &[1.0, 0.0], &[true, false]).unwrap();
         assert!(flat[0].abs() < 1e-8, "{flat:?}");
         let empty = scalar(|x, u| [u - x.sqrt(), if x == 0.0 { 0.0 } else { -0.5 / x.sqrt() }, 1.0]);
         assert_eq!(equilibrium(empty, &[0.37, 0.0], &[true, false]).unwrap()[0], 0.0);

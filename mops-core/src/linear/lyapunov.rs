@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::norms::check_stable;
 use super::{Complex, Schur, StateSpace};
+use crate::math::complex;
 
 /// The symmetric solution `X` of `A X + X A^T + Q = 0` for a symmetric `Q`.
 ///
@@ -26,7 +27,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Stri
         for i in (0..n).rev() {
             let sum = (i + 1..n).fold(right[i], |sum, k| sum - t[(i, k)] * y[(k, j)]);
             let divisor = t[(i, i)] + t[(j, j)].conj();
-            if divisor.norm() <= f64::EPSILON * (t[(i, i)].norm() + t[(j, j)].norm()) {
+            if complex::norm(divisor) <= f64::EPSILON * (complex::norm(t[(i, i)]) + complex::norm(t[(j, j)])) {
                 return Err("the Lyapunov equation has no unique solution: two poles sum to zero".to_owned());
             }
             y[(i, j)] = sum / divisor;

@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use super::enclosure::{Enclosure, Span};
 use super::search::passes;
 use super::{Complex, StateSpace};
+use crate::math::{self, complex};
 
 /// Gain of a loop from which on nothing is looked for: 200 dB.
 pub(super) const STRONG: f64 = 1e10;
@@ -68,12 +69,12 @@ impl Loop {
 
     /// Where `|L|` is `level`, by rising frequency.
     pub(super) fn level(&self, level: f64) -> Result<Vec<Crossing>, String> {
-        let level = level.ln();
+        let level = math::ln(level);
         let mut found = Vec::new();
         let bounds = |span: &Span| span.gain().map(|gain| gain - level);
         passes(
             &self.response,
-            |l| l.norm().ln() - level,
+            |l| math::ln(complex::norm(l)) - level,
             bounds,
             |frequency, rises| {
                 found.push(Crossing { frequency, response: self.at(frequency), rises });
@@ -96,7 +97,7 @@ impl Loop {
         }
         passes(
             &self.response,
-            |l| (-l).arg(),
+            |l| complex::arg(-l),
             bounds,
             |frequency, rises| {
                 found(Crossing { frequency, response: self.at(frequency), rises });
@@ -129,7 +130,7 @@ impl Loop {
             // As the delay grows from 0, a pair of poles crosses here whenever it has turned L to -1: into the right half
             // plane where |L| falls with frequency, out of it where it rises.
             let turned = crossing.frequency * delay;
-            let first = angle_to_minus_one(crossing.response * Complex::from_polar(1.0, turned));
+            let first = angle_to_minus_one(crossing.response * complex::from_polar(1.0, turned));
             let turns = ((turned - first) / TAU).floor() + 1.0;
             unstable += if crossing.rises { -2.0 } else { 2.0 } * turns.max(0.0);
         }
@@ -143,7 +144,7 @@ impl Loop {
     /// An unstable loop that no turn makes stable.
     pub fn phase_margin(&self) -> Result<f64, String> {
         if self.is_stable() {
-            let turns = self.gain_crossovers.iter().map(|c| (-c.response).arg().abs());
+            let turns = self.gain_crossovers.iter().map(|c| complex::arg(-c.response).abs());
             return Ok(turns.fold(f64::INFINITY, f64::min));
         }
         let turn = self.stabilising_turn(|_| 1.0);
@@ -158,17 +159,17 @@ impl Loop {
     /// # Errors
     /// An unstable loop that no gain makes stable.
     pub fn gain_margin(&self, both: bool) -> Result<f64, String> {
-        let decibel = |factor: f64| 20.0 * factor.log10().abs();
+        let decibel = |factor: f64| 20.0 * math::log10(factor).abs();
         if !self.is_stable() {
             return self.stabilising_gain().map(|factor| -decibel(factor));
         }
         // The largest response below 1, and the smallest above.
         let (below, above) = (Cell::new(0.0f64), Cell::new(f64::INFINITY));
         let window = |span: &Span| {
-            let [low, high] = span.gain().map(f64::exp);
+            let [low, high] = span.gain().map(math::exp);
             (low <= 1.0 && high > below.get()) || (both && high > 1.0 && low < above.get().min(STRONG))
         };
-        self.phase_crossovers_in(window, |crossing| match crossing.response.norm() {
+        self.phase_crossovers_in(window, |crossing| match complex::norm(crossing.response) {
             size if size <= 1.0 => below.set(below.get().max(size)),
             size => above.set(above.get().min(size)),
         })?;
@@ -194,7 +195,7 @@ impl Loop {
 
 /// The lag, from 0 to 2 pi, that turns a response to the negative real axis.
 pub(super) fn angle_to_minus_one(response: Complex) -> f64 {
-    (response.arg() + PI).rem_euclid(TAU)
+    (complex::arg(response) + PI).rem_euclid(TAU)
 }
 
 #[cfg(test)]

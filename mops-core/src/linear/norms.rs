@@ -6,6 +6,7 @@ use super::enclosure::{Enclosure, Span};
 use super::search::{highest, maximise};
 use super::system::{above, beside};
 use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, undecided, zeros};
+use crate::math::complex;
 
 /// A largest gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,12 +64,13 @@ pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
     let system = StateSpace { delay: 0.0, ..system.clone() };
     let end = Peak { gain: largest_singular_value(&system.d.map(|d| Complex::new(d, 0.0))), frequency: f64::INFINITY };
     if system.b.ncols() == 1 && system.c.nrows() == 1 {
-        let (gain, frequency) = highest(&Enclosure::new(&system)?, |g| g.norm(), Span::gain)?;
+        let (gain, frequency) = highest(&Enclosure::new(&system)?, complex::norm, Span::gain)?;
         return Ok(if end.gain > gain { end } else { Peak { gain, frequency } });
     }
     let response = system.response()?;
     let mut best = end;
-    let resonances = poles.iter().flat_map(|p| [p.norm(), p.im.abs(), (p.im * p.im - p.re * p.re).max(0.0).sqrt()]);
+    let resonances =
+        poles.iter().flat_map(|p| [complex::norm(*p), p.im.abs(), (p.im * p.im - p.re * p.re).max(0.0).sqrt()]);
     for frequency in resonances.chain([0.0]) {
         best = better(best, &response, frequency);
     }
@@ -110,7 +112,7 @@ fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
 /// The largest singular value.
 fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
     if m.len() == 1 {
-        return m[(0, 0)].norm();
+        return complex::norm(m[(0, 0)]);
     }
     if m.iter().any(|z| !z.is_finite()) {
         return f64::INFINITY;
@@ -123,7 +125,7 @@ fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
 fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     let (n, m) = (a.nrows(), b.ncols());
-    let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * z.norm();
+    let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * complex::norm(*z);
     let rest = DMatrix::identity(m, m) * (level * level) - d.transpose() * d;
     let Some(r) = rest.clone().try_inverse() else {
         // A level that the gain tends to for high frequencies: the zeros of `G(-s)' G(s) - level^2`.
@@ -152,6 +154,7 @@ fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String
 
 #[cfg(test)]
 mod tests {
+    use crate::math;
     use proptest::prelude::*;
 
     use super::*;
@@ -210,7 +213,7 @@ mod tests {
             // Poles as near to the axis as 1e-4; twice the same output makes a system of two outputs.
             let a = random(n, n, seed);
             let right = eigenvalues(&a).unwrap().iter().map(|z| z.re).fold(f64::NEG_INFINITY, f64::max);
-            let a = &a - DMatrix::identity(n, n) * (right + 10f64.powf(damping));
+            let a = &a - DMatrix::identity(n, n) * (right + math::powf(10.0, damping));
             let d = random(1, 1, seed + 3) * f64::from(u8::from(direct));
             let (b, c) = (random(n, 1, seed + 1), random(1, n, seed + 2));
             let one = hinf_norm(&StateSpace::new(a.clone(), b.clone(), c.clone(), d.clone())).unwrap();

@@ -3,6 +3,7 @@
 use super::enclosure::{Closed, Enclosure, Span};
 use super::search::{highest, passes};
 use super::{Complex, Loop, StateSpace};
+use crate::math::{self, complex};
 
 impl Loop {
     /// The largest sensitivity, `Ms = max |1/(1 + L)|`, over all frequencies from 0 to infinity.
@@ -43,7 +44,7 @@ impl Loop {
         }
         let gain = |l: Complex| Closed::Complementary.gain(l);
         let level = three_decibels_below(gain(self.at(0.0)))?;
-        first_below(&self.response, level, |l| gain(l).ln(), |span| span.closed(Closed::Complementary))
+        first_below(&self.response, level, |l| math::ln(gain(l)), |span| span.closed(Closed::Complementary))
     }
 }
 
@@ -55,14 +56,14 @@ impl Loop {
 pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
     // A delay changes no gain.
     let response = Enclosure::new(&StateSpace { delay: 0.0, ..system.clone() })?;
-    let level = three_decibels_below(response.at(0.0).norm())?;
-    first_below(&response, level, |l| l.norm().ln(), Span::gain)
+    let level = three_decibels_below(complex::norm(response.at(0.0)))?;
+    first_below(&response, level, |l| math::ln(complex::norm(l)), Span::gain)
 }
 
 /// The logarithm of a gain that is 3 dB below that at frequency 0.
 fn three_decibels_below(start: f64) -> Result<f64, String> {
     if start > 0.0 && start.is_finite() {
-        Ok(start.ln() - 0.5 * std::f64::consts::LN_2)
+        Ok(math::ln(start) - 0.5 * std::f64::consts::LN_2)
     } else {
         Err(format!("the gain at frequency 0 is {start}: there is no bandwidth"))
     }

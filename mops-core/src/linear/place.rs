@@ -8,6 +8,7 @@ use rand::Rng;
 
 use super::controllability::{Scaled, Staircase};
 use super::{Complex, eigenvalues};
+use crate::math::complex;
 use crate::random::stream;
 
 /// Largest distance of a closed-loop pole from the one asked for, relative to it, with which a feedback is returned. A pole
@@ -149,7 +150,7 @@ impl Inputs {
 /// for later rounds.
 fn orders(poles: &[Complex]) -> Vec<Vec<Complex>> {
     let mut rising: Vec<Complex> = poles.iter().copied().filter(|p| p.im >= 0.0).collect();
-    rising.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    rising.sort_by(|a, b| complex::norm(*a).total_cmp(&complex::norm(*b)));
     let falling: Vec<Complex> = rising.iter().rev().copied().collect();
     let dealt = |order: &[Complex]| {
         let round = |i: usize| order[..i].iter().filter(|p| **p == order[i]).count();
@@ -204,14 +205,14 @@ fn moved(
 
 /// The size that distances from a pole are compared with.
 fn size(pole: Complex, all: &[Complex]) -> f64 {
-    let largest = all.iter().map(|p| p.norm()).fold(0.0, f64::max);
-    if largest > 0.0 { pole.norm().max(SMALL * largest) } else { 1.0 }
+    let largest = all.iter().map(|p| complex::norm(*p)).fold(0.0, f64::max);
+    if largest > 0.0 { complex::norm(pole).max(SMALL * largest) } else { 1.0 }
 }
 
 /// The largest distance between poles found and those asked for, each times a weight, nearest pairs first.
 fn distance(found: &[Complex], poles: &[Complex], weight: impl Fn(Complex) -> f64) -> f64 {
     let n = poles.len();
-    let far = |i: usize, j: usize| (found[i] - poles[j]).norm() * weight(poles[j]);
+    let far = |i: usize, j: usize| complex::norm(found[i] - poles[j]) * weight(poles[j]);
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
     pairs.sort_by(|a, b| far(a.0, a.1).total_cmp(&far(b.0, b.1)));
     let (mut of_found, mut of_poles, mut largest) = (vec![false; n], vec![false; n], 0.0);
@@ -228,7 +229,7 @@ fn paired(poles: &[Complex]) -> Result<Vec<Complex>, String> {
     let mut sorted: Vec<Complex> = poles.iter().copied().filter(|p| p.im == 0.0).collect();
     let mut lower: Vec<Complex> = poles.iter().copied().filter(|p| p.im < 0.0).collect();
     for upper in poles.iter().filter(|p| p.im > 0.0) {
-        let place = lower.iter().position(|p| (p.conj() - upper).norm() <= 1e-9 * upper.norm());
+        let place = lower.iter().position(|p| complex::norm(p.conj() - upper) <= 1e-9 * complex::norm(*upper));
         match place {
             Some(place) => lower.swap_remove(place),
             None => return Err(format!("the pole at {upper} has no conjugate among the others")),

@@ -3,6 +3,7 @@
 use nalgebra::{ComplexField, DMatrix};
 
 use super::Complex;
+use crate::math;
 
 /// Steps without a new eigenvalue after which the shift is replaced by an exceptional one. Source: LAPACK, `dlahqr`.
 pub(super) const EXCEPTIONAL: usize = 10;
@@ -171,13 +172,13 @@ fn double_step(h: &mut DMatrix<f64>, lo: usize, hi: usize, (m, column): (usize, 
 /// Makes `x` the vector `v`, with a first entry of 1, of the reflection `1 - factor v v^T` that turns `x` into `(beta, 0,
 /// 0)`; returns `beta` and `factor`.
 fn reflection(x: &mut [f64; 3]) -> (f64, f64) {
-    let rest = x[1].hypot(x[2]);
+    let rest = math::hypot(x[1], x[2]);
     if rest == 0.0 {
         let beta = x[0];
         *x = [1.0, 0.0, 0.0];
         return (beta, 0.0);
     }
-    let beta = -x[0].hypot(rest).copysign(x[0]);
+    let beta = -math::hypot(x[0], rest).copysign(x[0]);
     let (factor, divisor) = ((beta - x[0]) / beta, x[0] - beta);
     *x = [1.0, x[1] / divisor, x[2] / divisor];
     (beta, factor)

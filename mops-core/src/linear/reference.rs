@@ -5,6 +5,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use nalgebra::DMatrix;
 
 use super::Complex;
+use crate::math::{self, complex};
 
 /// A number as the sum of two, the second at most half a unit in the last place of the first.
 ///
@@ -57,7 +58,7 @@ impl Mul for Double {
     type Output = Self;
     fn mul(self, o: Self) -> Self {
         let p = self.0 * o.0;
-        let e = self.0.mul_add(o.0, -p);
+        let e = math::mul_add(self.0, o.0, -p);
         quick_sum(p, e + (self.0 * o.1 + self.1 * o.0))
     }
 }
@@ -137,9 +138,9 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
     let n = coefficients.len() - 1;
     let leading = coefficients[n];
     let monic: Vec<Double> = coefficients.iter().map(|&c| c / leading).collect();
-    let radius = (0..n).map(|i| monic[i].0.abs().powf(1.0 / (n - i) as f64)).fold(0.0, f64::max);
+    let radius = (0..n).map(|i| math::powf(monic[i].0.abs(), 1.0 / (n - i) as f64)).fold(0.0, f64::max);
     let mut z: Vec<Exact> = (0..n)
-        .map(|i| complex(Complex::from_polar(radius, 0.4 + std::f64::consts::TAU * i as f64 / n as f64)))
+        .map(|i| complex(complex::from_polar(radius, 0.4 + std::f64::consts::TAU * i as f64 / n as f64)))
         .collect();
     let zero = complex(Complex::new(0.0, 0.0));
     for _ in 0..2000 {
@@ -151,9 +152,9 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
                 value = sum(product(value, z[i]), Exact { re: c, im: 0.0.into() });
             }
             // Where the value is rounding nothing is left to improve.
-            let size = z[i].re.0.hypot(z[i].im.0);
+            let size = math::hypot(z[i].re.0, z[i].im.0);
             let largest = monic.iter().rev().fold(0.0, |sum, c| sum * size + c.0.abs());
-            if value.re.0.hypot(value.im.0) <= 1e-31 * largest {
+            if math::hypot(value.re.0, value.im.0) <= 1e-31 * largest {
                 continue;
             }
             let newton = product(slope, inverse(value));
@@ -163,7 +164,7 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
             let divisor = Exact { re: newton.re - others.re, im: newton.im - others.im };
             let step = inverse(divisor);
             z[i] = Exact { re: z[i].re - step.re, im: z[i].im - step.im };
-            moved = moved.max(step.re.0.hypot(step.im.0) / size);
+            moved = moved.max(math::hypot(step.re.0, step.im.0) / size);
         }
         if moved < 1e-30 {
             break;
@@ -194,5 +195,9 @@ fn the_reference_keeps_about_thirty_digits() {
         }
         all = next;
     }
-    assert!(roots(&all).iter().all(|z| (z - 1.0).norm() < 1e-8 || (z - 1.001).norm() < 1e-14), "{:?}", roots(&all));
+    assert!(
+        roots(&all).iter().all(|z| complex::norm(z - 1.0) < 1e-8 || complex::norm(z - 1.001) < 1e-14),
+        "{:?}",
+        roots(&all)
+    );
 }

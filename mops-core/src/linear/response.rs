@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Complex, StateSpace};
+use crate::math::complex;
 
 /// A system made ready to be evaluated at many frequencies: its states scaled to one size.
 ///
@@ -36,14 +37,14 @@ impl FrequencyResponse {
     /// `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole.
     pub fn at(&self, s: Complex) -> DMatrix<Complex> {
         let rational = self.c.map(|x| Complex::new(x, 0.0)) * self.states(s) + self.d.map(|x| Complex::new(x, 0.0));
-        if self.delay == 0.0 { rational } else { rational * (-s * self.delay).exp() }
+        if self.delay == 0.0 { rational } else { rational * complex::exp(-s * self.delay) }
     }
 
     /// The sizes of the terms that the response of the first input and output is the sum of, added up: `|L|` beside it tells
     /// how much is lost by cancellation.
     pub(super) fn terms(&self, s: Complex) -> f64 {
         let x = self.states(s);
-        (0..self.a.nrows()).fold(self.d[(0, 0)].abs(), |sum, i| sum + self.c[(0, i)].abs() * x[(i, 0)].norm())
+        (0..self.a.nrows()).fold(self.d[(0, 0)].abs(), |sum, i| sum + self.c[(0, i)].abs() * complex::norm(x[(i, 0)]))
     }
 
     /// `(s - A)^-1 B`, by Gaussian elimination with partial pivoting.
@@ -108,7 +109,7 @@ mod tests {
             let s = c(0.1, 1.7);
             let complex = |m: &DMatrix<f64>| m.map(|x| c(x, 0.0));
             let resolvent = (DMatrix::identity(n, n) * s - complex(&a)).try_inverse().unwrap();
-            let exact = (complex(&cc) * resolvent * complex(&b) + complex(&d)) * (-s * 0.3).exp();
+            let exact = (complex(&cc) * resolvent * complex(&b) + complex(&d)) * complex::exp(-s * 0.3);
             assert!((system.response().unwrap().at(s) - exact).norm() < 1e-12, "{n}");
         }
     }
@@ -119,7 +120,7 @@ mod tests {
         let chain =
             TransferFunction::new(vec![1.0], vec![1., 8., 28., 56., 70., 56., 28., 8., 1.]).state_space().unwrap();
         let exact = c(1.0, 1e3).powi(-8);
-        assert!((chain.response().unwrap().scalar(1e3) / exact - 1.0).norm() < 1e-13);
+        assert!(complex::norm(chain.response().unwrap().scalar(1e3) / exact - 1.0) < 1e-13);
     }
 
     #[test]
@@ -127,8 +128,8 @@ mod tests {
         let lag = TransferFunction::new(vec![2.0], vec![1.0, 1.0]).state_space().unwrap();
         let late = StateSpace { delay: 0.5, ..lag.clone() };
         let (g, h) = (lag.response().unwrap().scalar(3.0), late.response().unwrap().scalar(3.0));
-        assert!((g - c(2.0, 0.0) / c(1.0, 3.0)).norm() < 1e-15);
-        assert!((h / g - c(0.0, -1.5).exp()).norm() < 1e-15);
+        assert!(complex::norm(g - c(2.0, 0.0) / c(1.0, 3.0)) < 1e-15);
+        assert!(complex::norm(h / g - complex::exp(c(0.0, -1.5))) < 1e-15);
     }
 
     #[test]

@@ -130,6 +130,7 @@ pub fn lqr(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64
 
 #[cfg(test)]
 mod tests {
+    use crate::math;
     use proptest::prelude::*;
 
     use super::*;
@@ -224,7 +225,7 @@ mod tests {
             let (a, b) = (random(n, n, seed) * 3.0, random(n, inputs, seed + 1));
             let mut q = DMatrix::identity(n, n);
             (0..zeros.min(n - 1)).for_each(|i| q[(i, i)] = 0.0);
-            let r = DMatrix::identity(inputs, inputs) * 10f64.powf(decades);
+            let r = DMatrix::identity(inputs, inputs) * math::powf(10.0, decades);
             if let Ok(x) = riccati(&a, &b, &q, &r) {
                 prop_assert!(residual(&a, &b, &q, &r, &x) < 1e-6, "{}", residual(&a, &b, &q, &r, &x));
                 let closed = &a - &b * lqr(&a, &b, &q, &r).unwrap();

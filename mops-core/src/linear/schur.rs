@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::Complex;
 use super::qr_steps::{EXCEPTIONAL, LENIENT, MOST, decoupled};
+use crate::math::{self, complex};
 
 /// `A = Q T Q^H` with `Q` unitary and `T` upper triangular; the eigenvalues of `A` stand on the diagonal of `T`.
 ///
@@ -24,14 +25,14 @@ struct Rotation {
 
 impl Rotation {
     fn annihilating(x: Complex, y: Complex) -> Self {
-        let r = x.norm().hypot(y.norm());
+        let r = math::hypot(complex::norm(x), complex::norm(y));
         if r == 0.0 {
             return Self { cosine: 1.0, sine: Complex::new(0.0, 0.0) };
         }
-        if x.norm() == 0.0 {
-            return Self { cosine: 0.0, sine: y.conj() / y.norm() };
+        if complex::norm(x) == 0.0 {
+            return Self { cosine: 0.0, sine: y.conj() / complex::norm(y) };
         }
-        Self { cosine: x.norm() / r, sine: x / x.norm() * y.conj() / r }
+        Self { cosine: complex::norm(x) / r, sine: x / complex::norm(x) * y.conj() / r }
     }
 
     fn rows(&self, m: &mut DMatrix<Complex>, k: usize, columns: std::ops::Range<usize>) {
@@ -76,7 +77,8 @@ impl Schur {
             if iteration > MOST {
                 return Err("the Schur form was not found: the QR steps do not converge".to_owned());
             }
-            let shift = if iteration % EXCEPTIONAL == 0 { t[(hi, hi)] + t[(hi, hi - 1)].norm() } else { shift(&t, hi) };
+            let shift =
+                if iteration % EXCEPTIONAL == 0 { t[(hi, hi)] + complex::norm(t[(hi, hi - 1)]) } else { shift(&t, hi) };
             let (mut x, mut y) = (t[(lo, lo)] - shift, t[(lo + 1, lo)]);
             for k in lo..hi {
                 let rotation = Rotation::annihilating(x, y);
@@ -136,9 +138,9 @@ fn shift(t: &DMatrix<Complex>, hi: usize) -> Complex {
     let (a, d) = (t[(hi - 1, hi - 1)], t[(hi, hi)]);
     let half = (a - d) * 0.5;
     let product = t[(hi - 1, hi)] * t[(hi, hi - 1)];
-    let root = (half * half + product).sqrt();
-    let far = if (half + root).norm() > (half - root).norm() { half + root } else { half - root };
-    if far.norm() == 0.0 { d } else { d - product / far }
+    let root = complex::sqrt(half * half + product);
+    let far = if complex::norm(half + root) > complex::norm(half - root) { half + root } else { half - root };
+    if complex::norm(far) == 0.0 { d } else { d - product / far }
 }
 
 #[cfg(test)]

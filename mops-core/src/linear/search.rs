@@ -5,6 +5,7 @@
 
 use super::Complex;
 use super::enclosure::{Enclosure, Span};
+use crate::math;
 
 /// Ranges looked at until a search counts as hopeless: a delay that turns the response a hundred thousand times.
 const MOST: usize = 2_000_000;
@@ -93,7 +94,7 @@ pub(super) fn highest(
         open.iter().for_each(|span| better(&mut best, value(span.response), span.center()));
         let mut next = Vec::new();
         for span in open {
-            let most = bounds(&span)[1].exp();
+            let most = math::exp(bounds(&span)[1]);
             if most <= best.0 || span.high <= lowest {
                 continue;
             }

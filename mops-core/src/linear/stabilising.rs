@@ -3,9 +3,10 @@
 use std::cell::RefCell;
 use std::f64::consts::TAU;
 
+use super::Loop;
 use super::enclosure::Span;
 use super::margins::{Crossing, STRONG};
-use super::{Complex, Loop};
+use crate::math::{self, complex};
 
 /// Crossings of the negative real axis up to which a stabilising gain is looked for.
 const MOST: usize = 20_000;
@@ -23,10 +24,10 @@ impl Loop {
         let end = self.last_useful_crossing()?;
         let gains = RefCell::new(Vec::new());
         let window = |span: &Span| {
-            let [low, high] = span.gain().map(f64::exp);
+            let [low, high] = span.gain().map(math::exp);
             low < STRONG && high > 1.0 / STRONG && span.low < end && gains.borrow().len() <= MOST
         };
-        self.phase_crossovers_in(window, |crossing| gains.borrow_mut().push(1.0 / crossing.response.norm()))?;
+        self.phase_crossovers_in(window, |crossing| gains.borrow_mut().push(1.0 / complex::norm(crossing.response)))?;
         let gains = gains.into_inner();
         if gains.len() > MOST {
             return Err(
@@ -38,7 +39,7 @@ impl Loop {
         down.sort_by(|a, b| b.total_cmp(a));
         up.sort_by(f64::total_cmp);
         let found = [self.first_stable(&down, 0.5)?, self.first_stable(&up, 2.0)?].into_iter().flatten();
-        let nearest = found.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
+        let nearest = found.min_by(|a, b| math::ln(*a).abs().total_cmp(&math::ln(*b).abs()));
         nearest.ok_or_else(|| {
             "the closed loop is unstable, and no change of the gain by up to 200 dB makes it stable".to_owned()
         })
@@ -52,7 +53,7 @@ impl Loop {
             let next = gains.get(i + 1).copied().unwrap_or(gains[i] * beyond);
             let between = (gains[i] * next).sqrt();
             // Equal gains have nothing between them.
-            if (next / gains[i]).ln().abs() <= 1e-9 {
+            if math::ln(next / gains[i]).abs() <= 1e-9 {
                 i += 1;
                 continue;
             }
@@ -92,7 +93,7 @@ impl Loop {
             let mut events: Vec<(f64, i64)> = Vec::new();
             for crossing in &self.gain_crossovers {
                 // The lag to -1, or the lead.
-                let to = (-direction * Complex::arg(-crossing.response)).rem_euclid(TAU);
+                let to = (-direction * complex::arg(-crossing.response)).rem_euclid(TAU);
                 let change = if (direction > 0.0) == crossing.rises { 2 } else { -2 };
                 events.extend((0..=turns).map(|k| ((to + k as f64 * TAU) / rate(crossing), change)));
             }

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use rand::Rng;
 
 use super::Complex;
+use crate::math::complex;
 use crate::random::stream;
 
 /// A complex number.
@@ -23,9 +24,10 @@ pub fn assert_same_set(found: &[Complex], expected: &[Complex], tolerance: f64) 
     let mut rest = found.to_vec();
     assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
     for z in expected {
-        let nearest = (0..rest.len()).min_by(|&i, &j| (rest[i] - z).norm().total_cmp(&(rest[j] - z).norm())).unwrap();
+        let nearest =
+            (0..rest.len()).min_by(|&i, &j| complex::norm(rest[i] - z).total_cmp(&complex::norm(rest[j] - z))).unwrap();
         let found = rest.swap_remove(nearest);
-        assert!((found - z).norm() <= tolerance, "{found} is not {z}: {found:?}");
+        assert!(complex::norm(found - z) <= tolerance, "{found} is not {z}: {found:?}");
     }
 }
 

@@ -3,6 +3,7 @@
 use rand::Rng;
 use rand::seq::SliceRandom;
 
+use crate::math;
 use crate::random::Stream;
 
 /// Values that a coordinate takes, evenly spread over [0, 1].
@@ -65,7 +66,7 @@ pub fn elementary_effects(trajectories: &[Vec<Vec<f64>>], values: &[Vec<f64>]) -
         let mean = |f: &dyn Fn(f64) -> f64| of_input.iter().map(|&e| f(e)).sum::<f64>() / of_input.len() as f64;
         let centre = mean(&|e| e);
         let spare = (of_input.len() as f64 - 1.0).max(1.0) / of_input.len() as f64;
-        let deviation = (mean(&|e| (e - centre).powi(2)) / spare).sqrt();
+        let deviation = (mean(&|e| math::powi(e - centre, 2)) / spare).sqrt();
         ElementaryEffect { mean: centre, magnitude: mean(&f64::abs), deviation }
     };
     effects.iter().map(summary).collect()
@@ -93,7 +94,7 @@ mod tests {
     #[test]
     fn what_goes_both_ways_and_what_acts_together_shows_in_the_spread() {
         // (2 u - 1)^2: effects of +-4/3 along steps from 0 and from 1/3.
-        let of_square = found(2, |u| (2.0 * u[0] - 1.0).powi(2))[0];
+        let of_square = found(2, |u| math::powi(2.0 * u[0] - 1.0, 2))[0];
         assert!((of_square.magnitude - 4.0 / 3.0).abs() < 1e-12 && of_square.mean.abs() < 0.5, "{of_square:?}");
         // u1 u2: the effect of u1 is u2, whose levels have the variance 5/36.
         let of_product = found(2, |u| u[0] * u[1])[0];

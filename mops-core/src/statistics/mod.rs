@@ -2,6 +2,7 @@
 //! computation on numbers.
 
 mod blocks;
+mod distributions;
 mod elementary;
 mod sampling;
 mod share;
@@ -11,6 +12,7 @@ mod summary;
 mod variance;
 
 pub use blocks::moving_blocks;
+pub use distributions::{chi_squared_sf, f_cdf, normal_cdf, normal_quantile};
 pub use elementary::{ElementaryEffect, elementary_effects, trajectories};
 pub use sampling::{Sampling, draw};
 pub use share::share_interval;

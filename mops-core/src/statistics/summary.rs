@@ -1,6 +1,7 @@
 //! What a sample tells of the distribution it was drawn from.
 
 use super::share::at_most;
+use crate::math;
 
 /// Mean, spread and ends of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +22,7 @@ impl Summary {
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+        let squares: f64 = values.iter().map(|v| math::powi(v - mean, 2)).sum();
         let end = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or(f64::NAN);
         let deviation = if values.len() > 1 { (squares / (n - 1.0)).sqrt() } else { f64::NAN };
         Self { mean, deviation, min: end(f64::min), max: end(f64::max) }

@@ -4,6 +4,7 @@ use rand::Rng;
 
 use super::sampling::{Sampling, draw};
 use super::summary::quantile;
+use crate::math;
 use crate::random::Stream;
 
 /// Shares of the variance that one input accounts for.
@@ -85,14 +86,14 @@ fn shares(values: &[Vec<f64>], samples: &[usize]) -> Option<Vec<[f64; 2]>> {
     let n = samples.len() as f64;
     let of_both = || samples.iter().flat_map(|&s| [values[s][0], values[s][1]]);
     let mean = of_both().sum::<f64>() / (2.0 * n);
-    let variance = of_both().map(|f| (f - mean).powi(2)).sum::<f64>() / (2.0 * n);
+    let variance = of_both().map(|f| math::powi(f - mean, 2)).sum::<f64>() / (2.0 * n);
     if !(variance > 1e-24 * mean * mean && variance > 0.0) {
         return None;
     }
     let of_input = |i: usize| {
         let terms = samples.iter().map(|&s| {
             let (a, b, mixed) = (values[s][0], values[s][1], values[s][2 + i]);
-            [(b - mean) * (mixed - a), 0.5 * (a - mixed).powi(2)]
+            [(b - mean) * (mixed - a), 0.5 * math::powi(a - mixed, 2)]
         });
         terms.fold([0.0; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]).map(|sum| sum / (n * variance))
     };
@@ -119,11 +120,11 @@ mod tests {
         let (a, b) = (7.0, 0.1);
         let f = |u: &[f64]| {
             let x: Vec<f64> = u.iter().map(|u| PI * (2.0 * u - 1.0)).collect();
-            x[0].sin() + a * x[1].sin().powi(2) + b * x[2].powi(4) * x[0].sin()
+            math::sin(x[0]) + a * math::powi(math::sin(x[1]), 2) + b * math::powi(x[2], 4) * math::sin(x[0])
         };
-        let v1 = 0.5 * (1.0 + b * PI.powi(4) / 5.0).powi(2);
+        let v1 = 0.5 * math::powi(1.0 + b * math::powi(PI, 4) / 5.0, 2);
         let v2 = a * a / 8.0;
-        let v13 = b * b * PI.powi(8) * (1.0 / 18.0 - 1.0 / 50.0);
+        let v13 = b * b * math::powi(PI, 8) * (1.0 / 18.0 - 1.0 / 50.0);
         let v = v1 + v2 + v13;
         let exact = [[v1, v1 + v13], [v2, v2], [0.0, v13]].map(|pair| pair.map(|part| part / v));
         for (found, [first, total]) in found(4096, 3, f).iter().zip(exact) {

@@ -1,7 +1,7 @@
 //! What is known of an uncertain parameter: its range, and how its values are distributed.
 
-use statrs::distribution::{ContinuousCDF, Normal};
-
+use crate::math;
+use crate::statistics::{normal_cdf, normal_quantile};
 use crate::unit::Unit;
 
 /// A parameter of models, or a tuner, that is not known exactly.
@@ -50,24 +50,23 @@ pub enum Distribution {
 impl Distribution {
     /// Probability of a value up to `x`, nothing cut off but by `bounds` where the distribution needs them.
     pub(super) fn below(self, x: f64, [min, max]: [f64; 2]) -> f64 {
-        let standard = Normal::standard();
         match self {
             Self::Uniform => ((x - min) / (max - min)).clamp(0.0, 1.0),
-            Self::Normal { mean, deviation } => standard.cdf((x - mean) / deviation),
+            Self::Normal { mean, deviation } => normal_cdf((x - mean) / deviation),
             Self::LogNormal { .. } if x <= 0.0 => 0.0,
-            Self::LogNormal { median, deviation } => standard.cdf((x / median).ln() / deviation),
+            Self::LogNormal { median, deviation } => normal_cdf(math::ln(x / median) / deviation),
             Self::Triangular { mode } if x <= mode => {
                 if x <= min {
                     0.0
                 } else {
-                    (x - min).powi(2) / ((max - min) * (mode - min))
+                    math::powi(x - min, 2) / ((max - min) * (mode - min))
                 }
             }
             Self::Triangular { mode } => {
                 if x >= max {
                     1.0
                 } else {
-                    1.0 - (max - x).powi(2) / ((max - min) * (max - mode))
+                    1.0 - math::powi(max - x, 2) / ((max - min) * (max - mode))
                 }
             }
         }
@@ -75,11 +74,10 @@ impl Distribution {
 
     /// The value that a share `p` of the values does not exceed.
     fn quantile(self, p: f64, [min, max]: [f64; 2]) -> f64 {
-        let standard = |p: f64| Normal::standard().inverse_cdf(p);
         match self {
             Self::Uniform => min + p * (max - min),
-            Self::Normal { mean, deviation } => mean + deviation * standard(p),
-            Self::LogNormal { median, deviation } => median * (deviation * standard(p)).exp(),
+            Self::Normal { mean, deviation } => mean + deviation * normal_quantile(p),
+            Self::LogNormal { median, deviation } => median * math::exp(deviation * normal_quantile(p)),
             Self::Triangular { mode } => {
                 let (span, rise) = (max - min, mode - min);
                 if p * span <= rise {
@@ -136,7 +134,7 @@ mod tests {
         for (found, exact) in [
             (normal.quantile(0.841_344_746_068_542_9), 2.5),
             (normal.quantile(0.022_750_131_948_179_21), 1.0),
-            (log.quantile(0.841_344_746_068_542_9), 3.0 * 0.2_f64.exp()),
+            (log.quantile(0.841_344_746_068_542_9), 3.0 * math::exp(0.2)),
             (log.quantile(0.5), 3.0),
             (triangle.quantile(0.25), 1.0),
             (triangle.quantile(0.0625), 0.5),

@@ -4,6 +4,7 @@ use super::Study;
 use super::distribution::{Distribution, Uncertain};
 use super::draft::Mistake;
 use crate::diagnostic::suggestion;
+use crate::math;
 use crate::unit::Quantity;
 
 /// An uncertain parameter as it is written down.
@@ -171,7 +172,7 @@ fn distribution(
             "log-normal",
             ends(interval).and_then(|[a, b]| {
                 positive("interval", a, "the lower end of a log-normal interval")?;
-                Ok(Distribution::LogNormal { median: (a * b).sqrt(), deviation: 0.5 * (b / a).ln() / HALF95 })
+                Ok(Distribution::LogNormal { median: (a * b).sqrt(), deviation: 0.5 * math::ln(b / a) / HALF95 })
             }),
         ),
         Some(DistributionDraft::Triangular { mode }) => (

@@ -12,6 +12,7 @@ pub use quantity::Quantity;
 use symbols::{SYMBOLS, Turning};
 
 use crate::diagnostic::nearest;
+use crate::math;
 
 /// A unit of measure: a product of powers of SI units, prefixes allowed (`kg m2`, `N.m.s/rad`, `mm/s^2`, `V^0.5/s`).
 ///
@@ -286,7 +287,7 @@ fn raised(factor: f64, exponent: f64) -> f64 {
         return 1.0;
     }
     #[allow(clippy::cast_possible_truncation)]
-    if exponent.fract() == 0.0 { factor.powi(exponent as i32) } else { factor.powf(exponent) }
+    if exponent.fract() == 0.0 { math::powi(factor, exponent as i32) } else { math::powf(factor, exponent) }
 }
 
 fn symbol(text: &str) -> Option<Unit> {

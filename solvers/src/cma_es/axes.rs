@@ -141,6 +141,7 @@ impl Bracket {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mops_core::math;
 
     #[test]
     fn a_grid_is_looked_at_where_it_has_values() {
@@ -150,7 +151,7 @@ mod tests {
 
     #[test]
     fn a_bracket_closes_on_the_least_of_a_curve() {
-        let curve = |u: f64| (u - 0.3).powi(2) + 0.2 * (u - 0.3).powi(3) + (u - 0.3).powi(4);
+        let curve = |u: f64| math::powi(u - 0.3, 2) + 0.2 * math::powi(u - 0.3, 3) + math::powi(u - 0.3, 4);
         let merit = |u: f64| Merit { violation: 0.0, objective: curve(u) };
         let places = [0.1, 0.25, 0.6];
         let mut bracket = Bracket::new(places, places.map(merit));

@@ -1,6 +1,7 @@
 //! Restarts with two regimes of population: ever larger, and small with steps of every size.
 
 use mops_core::Stream;
+use mops_core::math;
 use rand::Rng;
 
 /// What the next run begins with.
@@ -58,8 +59,8 @@ impl Bipop {
         if self.doublings > 0 && self.spent_small < self.spent_large {
             let u: f64 = random.random();
             let ratio = 0.5 * (1usize << self.doublings) as f64;
-            let population = (self.population as f64 * ratio.powf(u * u)) as usize;
-            let sigma = self.sigma * 10f64.powf(-2.0 * random.random::<f64>());
+            let population = (self.population as f64 * math::powf(ratio, u * u)) as usize;
+            let sigma = self.sigma * math::powf(10.0, -2.0 * random.random::<f64>());
             return Some(Plan { population, sigma, evaluations: self.last_large / 2, large: false });
         }
         if self.doublings >= restarts {

@@ -1,9 +1,8 @@
 //! The normal distribution of CMA-ES, and how a ranked generation moves it.
 
 use mops_core::Stream;
+use mops_core::math;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rand::Rng;
-use rand_distr::StandardNormal;
 
 use super::strategy::Strategy;
 
@@ -52,7 +51,7 @@ impl Distribution {
 
     /// Steps `y = B D z` of a generation, one per column; a member is `mean + sigma y`.
     pub fn sample(&self, random: &mut Stream) -> DMatrix<f64> {
-        let mut z = DMatrix::from_fn(self.mean.len(), self.strategy.population, |_, _| random.sample(StandardNormal));
+        let mut z = DMatrix::from_fn(self.mean.len(), self.strategy.population, |_, _| math::normal(random));
         for mut column in z.column_iter_mut() {
             column.component_mul_assign(&self.lengths);
         }
@@ -78,10 +77,10 @@ impl Distribution {
         self.path_sigma *= 1.0 - c_sigma;
         self.path_sigma.axpy((c_sigma * (2.0 - c_sigma) * effective).sqrt(), &whitened, 1.0);
         let length = self.path_sigma.norm();
-        self.sigma *= ((c_sigma / d_sigma) * (length / chi - 1.0)).min(1.0).exp();
+        self.sigma *= math::exp(((c_sigma / d_sigma) * (length / chi - 1.0)).min(1.0));
         // Equations 45 to 47: the covariance.
         #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
-        let fading = 1.0 - (1.0 - c_sigma).powi(2 * (self.generation as i32 + 1));
+        let fading = 1.0 - math::powi(1.0 - c_sigma, 2 * (self.generation as i32 + 1));
         let moves = length / fading.sqrt() < (1.4 + 2.0 / (n + 1.0)) * chi;
         self.path_c *= 1.0 - c_c;
         if moves {
@@ -140,7 +139,7 @@ impl Distribution {
 
     /// Ratio of the largest to the smallest eigenvalue of the covariance.
     pub fn condition(&self) -> f64 {
-        (self.lengths.max() / self.lengths.min()).powi(2)
+        math::powi(self.lengths.max() / self.lengths.min(), 2)
     }
 
     /// The largest standard deviation of a coordinate, and length of a path, whichever is larger.

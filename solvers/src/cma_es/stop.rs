@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::distribution::Distribution;
+use mops_core::math;
 
 /// Objective values of the generations of a run.
 #[derive(Debug, Clone)]
@@ -71,7 +72,7 @@ impl History {
         if at.reach() < 1e-11 * self.first_sigma {
             return Some(End::Converged);
         }
-        let longest = 100.0 + 50.0 * (n + 3.0).powi(2) / population.sqrt();
+        let longest = 100.0 + 50.0 * math::powi(n + 3.0, 2) / population.sqrt();
         let degenerate = at.condition() > 1e14 || at.reach() > 1e4 * self.first_sigma || at.is_below_rounding();
         let over = degenerate || self.stagnates(n, population) || at.generation as f64 > longest;
         over.then_some(End::Stagnated)

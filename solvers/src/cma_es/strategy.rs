@@ -1,5 +1,7 @@
 //! Weights and learning rates of CMA-ES.
 
+use mops_core::math;
+
 /// Constants that follow from the dimension `n` and the size of the population.
 ///
 /// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772, equations 49 to 58 and Table 1.
@@ -34,7 +36,7 @@ impl Strategy {
     /// The usual number of members, `4 + 3 ln n`.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn usual_population(n: usize) -> usize {
-        4 + (3.0 * (n.max(1) as f64).ln()) as usize
+        4 + (3.0 * math::ln(n.max(1) as f64)) as usize
     }
 
     /// The constants.
@@ -43,11 +45,13 @@ impl Strategy {
         let population = population.max(Self::LEAST);
         let parents = population / 2;
         let nf = n as f64;
-        let raw: Vec<f64> = (1..=population).map(|i| (population as f64 / 2.0 + 0.5).ln() - (i as f64).ln()).collect();
-        let effective_of = |w: &[f64]| w.iter().sum::<f64>().powi(2) / w.iter().map(|w| w * w).sum::<f64>();
+        let raw: Vec<f64> =
+            (1..=population).map(|i| math::ln(population as f64 / 2.0 + 0.5) - math::ln(i as f64)).collect();
+        let effective_of = |w: &[f64]| math::powi(w.iter().sum::<f64>(), 2) / w.iter().map(|w| w * w).sum::<f64>();
         let (effective, effective_negative) = (effective_of(&raw[..parents]), effective_of(&raw[parents..]));
-        let c_1 = 2.0 / ((nf + 1.3).powi(2) + effective);
-        let c_mu = (1.0 - c_1).min(2.0 * (0.25 + effective + 1.0 / effective - 2.0) / ((nf + 2.0).powi(2) + effective));
+        let c_1 = 2.0 / (math::powi(nf + 1.3, 2) + effective);
+        let c_mu =
+            (1.0 - c_1).min(2.0 * (0.25 + effective + 1.0 / effective - 2.0) / (math::powi(nf + 2.0, 2) + effective));
         let negative = (1.0 + c_1 / c_mu)
             .min(1.0 + 2.0 * effective_negative / (effective + 2.0))
             .min((1.0 - c_1 - c_mu) / (nf * c_mu));

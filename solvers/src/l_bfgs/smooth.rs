@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Mutex;
 
 use argmin::core::{CostFunction, Error, Gradient};
+use mops_core::math;
 use mops_core::{Halt, Oracle};
 
 use crate::rows::{Linear, Rows};
@@ -46,7 +47,7 @@ const WALL: f64 = 100.0;
 
 /// The point of the unit box that variables stand for.
 pub fn inside(v: &[f64]) -> Vec<f64> {
-    v.iter().map(|v| (0.5 * (1.0 - (PI * v).cos())).clamp(0.0, 1.0)).collect()
+    v.iter().map(|v| (0.5 * (1.0 - math::cos(PI * v))).clamp(0.0, 1.0)).collect()
 }
 
 impl<'a> Smooth<'a> {
@@ -64,7 +65,7 @@ impl<'a> Smooth<'a> {
 
     /// The variables of a point of the box.
     pub fn begin(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().map(|u| (1.0 - 2.0 * u.clamp(AWAY, 1.0 - AWAY)).acos() / PI).collect()
+        point.iter().map(|u| math::acos(1.0 - 2.0 * u.clamp(AWAY, 1.0 - AWAY)) / PI).collect()
     }
 
     /// Why the oracle stopped answering, if it did.
@@ -96,7 +97,7 @@ impl<'a> Smooth<'a> {
             }
             None => self.wall(&state, &point),
         };
-        let slope = along.iter().zip(v).map(|(slope, v)| slope * 0.5 * PI * (PI * v).sin()).collect();
+        let slope = along.iter().zip(v).map(|(slope, v)| slope * 0.5 * PI * math::sin(PI * v)).collect();
         let known = Known { v: v.to_vec(), value, slope };
         let answer = what(&known);
         state.last = Some(known);
@@ -130,13 +131,13 @@ impl<'a> Smooth<'a> {
     /// The smooth largest of rows.
     fn largest(&self, rows: Vec<Linear>) -> (f64, Vec<f64>) {
         let most = rows.iter().map(|row| row.value).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = rows.iter().map(|row| (self.sharpness * (row.value - most)).exp()).collect();
+        let weights: Vec<f64> = rows.iter().map(|row| math::exp(self.sharpness * (row.value - most))).collect();
         let sum: f64 = weights.iter().sum();
         let mut slope = vec![0.0; rows[0].slope.len()];
         for (row, weight) in rows.iter().zip(&weights) {
             slope.iter_mut().zip(&row.slope).for_each(|(slope, s)| *slope += weight / sum * s);
         }
-        (most + sum.ln() / self.sharpness, slope)
+        (most + math::ln(sum) / self.sharpness, slope)
     }
 }
 

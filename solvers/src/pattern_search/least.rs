@@ -1,5 +1,6 @@
 //! The step that makes the models' objective least.
 
+use mops_core::math;
 use mops_core::{Shape, Usage};
 use nalgebra::DMatrix;
 
@@ -265,7 +266,7 @@ fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
     }
     // In units of the largest entry, so that nothing overflows: no eigenvalue is below -n.
     let least = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
-    let first = ADDED * matrix.iter().map(|h| (h / size).powi(2)).sum::<f64>().sqrt();
+    let first = ADDED * matrix.iter().map(|h| math::powi(h / size, 2)).sum::<f64>().sqrt();
     let mut added = if least > -POSITIVE { 0.0 } else { first - least };
     loop {
         factor.clear();
@@ -287,7 +288,7 @@ mod tests {
     #[test]
     fn the_kink_of_two_parabolas_is_found() {
         // y^2 and (y - 1)^2 meet at 1/2.
-        let models = through(&[[0.0], [1.0], [-1.0]], |y| vec![y[0] * y[0], (y[0] - 1.0).powi(2)]);
+        let models = through(&[[0.0], [1.0], [-1.0]], |y| vec![y[0] * y[0], math::powi(y[0] - 1.0, 2)]);
         let shape = Shape { spacing: vec![0.0], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
         let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
         let mut least = Least::default();

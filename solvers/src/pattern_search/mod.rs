@@ -7,6 +7,7 @@ mod models;
 mod pattern;
 mod points;
 
+use mops_core::math;
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 use schemars::JsonSchema;
@@ -505,7 +506,7 @@ impl State {
 
     /// Shrinks and turns the pattern; by less after every restart.
     fn shrink(&mut self, factor: f64) {
-        self.radius *= factor.powf(0.5_f64.powi(self.restarts));
+        self.radius *= math::powf(factor, math::powi(0.5, self.restarts));
         // Where the search went tells where it may go on.
         match self.turned_at.replace(self.best.point.clone()) {
             Some(before) if before != self.best.point => {
@@ -581,7 +582,7 @@ mod tests {
         let (mut memory, mut direction) = (Vec::new(), Vec::new());
         assert!(find_unknown(&along, 2, &mut memory, &mut direction));
         assert!(
-            (2.0 * direction[0] + direction[1]).abs() < 0.1 && direction[0].hypot(direction[1]) > 0.999,
+            (2.0 * direction[0] + direction[1]).abs() < 0.1 && math::hypot(direction[0], direction[1]) > 0.999,
             "{direction:?}"
         );
         let around = through(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], flat);

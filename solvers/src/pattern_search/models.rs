@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 use super::known::Known;
 use crate::active_set::dot;
 use crate::definite::factored;
+use mops_core::math;
 
 /// What a unit of squared misfit costs, in units of squared curvature over the trust region.
 const MISS: f64 = 1e-4;
@@ -70,7 +71,7 @@ impl Models {
     /// 5.3; least change: M. J. D. Powell, Mathematical Programming 100 (2004) 183-215.
     pub fn fit(&mut self, known: &Known, near: &[(f64, usize)], centre: &[f64], radius: f64) -> bool {
         let (n, rows, count) = (self.n, self.rows, near.len());
-        let unit = (radius / self.radius).powi(2);
+        let unit = math::powi(radius / self.radius, 2);
         self.curvatures.iter_mut().for_each(|h| *h *= unit);
         self.radius = radius;
         self.are_fitted = false;
@@ -99,7 +100,7 @@ impl Models {
         let fill = |matrix: &mut DMatrix<f64>| {
             for i in 0..count {
                 for j in 0..=i {
-                    matrix[(i, j)] = 0.5 * dot(step(i), step(j)).powi(2);
+                    matrix[(i, j)] = 0.5 * math::powi(dot(step(i), step(j)), 2);
                 }
                 matrix[(i, i)] += MISS;
             }

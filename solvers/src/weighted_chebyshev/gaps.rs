@@ -1,5 +1,6 @@
 //! Two criteria: the rectangle between two neighbours, from the largest down.
 
+use mops_core::math;
 use mops_core::{FEASIBLE, Halt, Oracle};
 
 use super::aim::Aim;
@@ -45,7 +46,7 @@ impl Gaps {
         }
         let range = subproblems.range.clone();
         let length = |p: &Place, q: &Place| {
-            (0..2).map(|k| ((p.criteria[k] - q.criteria[k]) / range[k]).powi(2)).sum::<f64>().sqrt()
+            (0..2).map(|k| math::powi((p.criteria[k] - q.criteria[k]) / range[k], 2)).sum::<f64>().sqrt()
         };
         let open =
             |i: &usize| self.poor(&front[*i], &front[*i + 1]) < POOR && is_wide(&front[*i], &front[*i + 1], &range);

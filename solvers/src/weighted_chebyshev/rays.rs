@@ -1,5 +1,6 @@
 //! Three criteria and more: rays from the ideal point, spread evenly.
 
+use mops_core::math;
 use mops_core::{Halt, Oracle};
 
 use super::aim::Aim;
@@ -34,7 +35,7 @@ impl Rays {
         subproblems: &mut Subproblems,
         front: &mut Vec<Place>,
     ) -> Result<bool, Halt> {
-        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>();
         let nearest = |ray: &[f64]| {
             let of = |(other, place): &(Vec<f64>, Place)| (distance(ray, other), place.clone());
             self.followed.iter().map(of).min_by(|a, b| a.0.total_cmp(&b.0))

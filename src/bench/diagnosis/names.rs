@@ -1,5 +1,6 @@
 //! What the test bed and the catalogue call the same things.
 
+use mops_core::math;
 use mops_models::effects::effects;
 use mops_testbed::TrueEffect;
 
@@ -53,7 +54,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "bouc-wen" => {
             // Where z ends: (1/(beta + gamma))^(1/n).
             let (sum, n) = (of("beta") + of("gamma"), of("power"));
-            let end = sum.powf(-1.0 / n);
+            let end = math::powf(sum, -1.0 / n);
             vec![("c", of("stiffness") * end), ("y", end), ("n", n)]
         }
         "constant-force" => vec![("f", of("force"))],

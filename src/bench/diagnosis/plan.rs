@@ -1,5 +1,6 @@
 //! Which simulated cases are asked for.
 
+use mops_core::math;
 use mops_testbed::{Draw, Effect, Missing, Plant, Trial, effects, generate, outside, plants};
 
 /// Attempts to make a case: not every effect reaches every size in every plant.
@@ -84,7 +85,7 @@ impl Plan {
 
     /// The size asked for that is nearest to one reached.
     pub fn nearest(&self, reached: f64) -> f64 {
-        let off = |size: &f64| (size / reached).ln().abs();
+        let off = |size: &f64| math::ln(size / reached).abs();
         self.sizes.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(reached)
     }
 

@@ -1,5 +1,7 @@
 //! Rates with their intervals, and whether stated probabilities are what they say.
 
+use mops_core::math;
+
 /// How often something was so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Rate {
@@ -40,10 +42,10 @@ fn at_least(hits: usize, of: usize, rate: f64) -> f64 {
     let mut sum = 0.0;
     for k in 0..=of {
         if k > 0 {
-            choose += ((of - k + 1) as f64 / k as f64).ln();
+            choose += math::ln((of - k + 1) as f64 / k as f64);
         }
         if k >= hits {
-            sum += (choose + k as f64 * rate.ln() + (of - k) as f64 * (-rate).ln_1p()).exp();
+            sum += math::exp(choose + k as f64 * math::ln(rate) + (of - k) as f64 * math::ln_1p(-rate));
         }
     }
     sum
@@ -90,7 +92,7 @@ pub(crate) fn reliability(stated: &[(f64, bool)]) -> Vec<Bin> {
 /// expressed in terms of probability, Monthly Weather Review 78 (1950).
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn brier(stated: &[(f64, bool)]) -> f64 {
-    stated.iter().map(|(p, so)| (p - f64::from(u8::from(*so))).powi(2)).sum::<f64>() / stated.len() as f64
+    stated.iter().map(|(p, so)| math::powi(p - f64::from(u8::from(*so)), 2)).sum::<f64>() / stated.len() as f64
 }
 
 /// Largest distance between the distribution of the values and a uniform one from 0 to 1, and the distance that 5 % of
@@ -124,7 +126,7 @@ mod tests {
     fn intervals_are_those_of_published_tables() {
         // 0 of n: 1 - 0.025^(1/n). 1 of 10 and 5 of 10: 0.0025 to 0.4450, 0.1871 to 0.8129.
         let [low, high] = Rate { hits: 0, of: 1000 }.interval95();
-        assert!(low == 0.0 && (high - (1.0 - 0.025_f64.powf(1e-3))).abs() < 1e-9, "{high}");
+        assert!(low == 0.0 && (high - (1.0 - math::powf(0.025, 1e-3))).abs() < 1e-9, "{high}");
         for (hits, expected) in [(1, [0.0025, 0.4450]), (5, [0.1871, 0.8129]), (10, [0.6915, 1.0])] {
             let interval = Rate { hits, of: 10 }.interval95();
             assert!(interval.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{interval:?} {expected:?}");

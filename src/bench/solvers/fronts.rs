@@ -1,6 +1,7 @@
 //! Fronts over seeds: mean and deviation of hypervolume and distance for every problem.
 
 use super::results::{Results, Row};
+use mops_core::math;
 
 /// What a solver reaches on a problem over all seeds.
 pub(crate) struct Spread {
@@ -50,7 +51,7 @@ fn of(results: &Results, first: &Row) -> Option<Spread> {
 fn statistics(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let count = values.clone().count();
     let mean = values.clone().sum::<f64>() / count as f64;
-    let square = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count.max(2) - 1) as f64;
+    let square = values.map(|value| math::powi(value - mean, 2)).sum::<f64>() / (count.max(2) - 1) as f64;
     [mean, square.sqrt()]
 }
 

@@ -1,6 +1,7 @@
 //! The state feedback that `mops linearise` designs on request.
 
 use mops_core::linear::{Complex, Placement, eigenvalues, lqr, place};
+use mops_core::math::complex;
 use mops_core::{Diagnostic, StateSpace};
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
@@ -104,7 +105,7 @@ fn notes(placed: &Placement, asked: &[Complex]) -> String {
         "entries of A and B that change by one part in a million move a pole by up to {} 1/s\n",
         number(placed.sensitivity)
     );
-    let largest = asked.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let largest = asked.iter().map(|pole| complex::norm(*pole)).fold(0.0, f64::max);
     if placed.error > OFF * largest {
         text += &format!(
             "note: rounding alone moves a pole by up to {} 1/s from where it was asked for\n",

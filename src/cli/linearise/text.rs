@@ -1,6 +1,7 @@
 //! A linear system as text: operating point, matrices, poles, zeros and transfer functions.
 
 use mops_core::linear::{Complex, TransferFunction, undecided};
+use mops_core::math::{self, complex};
 use mops_core::{Resting, StateSpace, Unit, Variable};
 use nalgebra::DMatrix;
 
@@ -82,10 +83,11 @@ pub(super) fn named(name: &str, matrix: &DMatrix<f64>, rows: &[String], columns:
 
 /// Numbers of which nothing is left that is rounding beside the largest of `all`.
 fn rounded(numbers: &[Complex], all: &[Complex]) -> Vec<Complex> {
-    let largest = all.iter().chain(numbers).map(|z| z.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
+    let largest =
+        all.iter().chain(numbers).map(|z| complex::norm(*z)).filter(|size| size.is_finite()).fold(0.0, f64::max);
     // Poles of one system may well lie nine decades apart.
     let part = |part: f64, size: f64| if part.abs() < 1e-12 * largest || part.abs() < 1e-9 * size { 0.0 } else { part };
-    numbers.iter().map(|z| Complex::new(part(z.re, z.norm()), part(z.im, z.norm()))).collect()
+    numbers.iter().map(|z| Complex::new(part(z.re, complex::norm(*z)), part(z.im, complex::norm(*z)))).collect()
 }
 
 /// A matrix without what is rounding beside its largest entry.
@@ -99,8 +101,8 @@ pub(super) fn rounded_matrix(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 fn rounded_polynomial(coefficients: &[f64], poles: &[Complex]) -> Vec<f64> {
     let degree = coefficients.len().saturating_sub(1);
     let poles = rounded(poles, poles);
-    let frequencies: Vec<f64> = poles.iter().map(|pole| pole.norm()).filter(|size| *size > 0.0).collect();
-    let term = |i: usize, omega: f64| coefficients[i].abs() * omega.powi((degree - i) as i32);
+    let frequencies: Vec<f64> = poles.iter().map(|pole| complex::norm(*pole)).filter(|size| *size > 0.0).collect();
+    let term = |i: usize, omega: f64| coefficients[i].abs() * math::powi(omega, (degree - i) as i32);
     let counts = |i: usize, omega: f64| {
         let largest = (0..=degree).map(|j| term(j, omega)).fold(0.0, f64::max);
         term(i, omega) >= 1e-9 * largest
@@ -133,9 +135,9 @@ pub(super) fn poles_table(what: &str, poles: &[Complex]) -> String {
     let mut sorted = rounded(poles, poles);
     sorted.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
     let row = |p: &Complex| {
-        let damping = if p.norm() == 0.0 { String::new() } else { number(-p.re / p.norm()) };
+        let damping = if complex::norm(*p) == 0.0 { String::new() } else { number(-p.re / complex::norm(*p)) };
         let constant = if p.re < 0.0 { number(-1.0 / p.re) } else { String::new() };
-        vec![spelled(*p), damping, number(p.norm()), constant]
+        vec![spelled(*p), damping, number(complex::norm(*p)), constant]
     };
     let header = [&format!("{what} (1/s)"), "damping", "frequency (rad/s)", "time constant (s)"];
     format!("\n{}", table(&header, &[1, 2, 3], sorted.iter().map(row).collect()))

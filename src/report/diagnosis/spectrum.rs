@@ -1,5 +1,7 @@
 //! Spectrum and autocorrelation of a residual.
 
+use mops_core::math;
+
 /// Lags that are shown: at most so many, and a quarter of the samples.
 const MOST_LAGS: usize = 100;
 /// Samples of a segment of the spectrum: a third of all, within these bounds.
@@ -39,11 +41,12 @@ pub(super) fn even(times: &[f64], values: &[f64]) -> Option<(f64, Vec<f64>)> {
 /// Fourier transform for the estimation of power spectra, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 pub(super) fn spectrum(step: f64, values: &[f64], noise: f64) -> Vec<(f64, f64)> {
     let length = (values.len() / 3).clamp(SEGMENT[0], SEGMENT[1]).min(values.len());
-    let window: Vec<f64> =
-        (0..length).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+    let window: Vec<f64> = (0..length)
+        .map(|i| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / length as f64), 2))
+        .collect();
     let weight: f64 = window.iter().map(|w| w * w).sum();
     let circle: Vec<(f64, f64)> =
-        (0..length).map(|i| (std::f64::consts::TAU * i as f64 / length as f64).sin_cos()).collect();
+        (0..length).map(|i| math::sin_cos(std::f64::consts::TAU * i as f64 / length as f64)).collect();
     let starts: Vec<usize> = (0..).map(|i| i * (length / 2)).take_while(|s| s + length <= values.len()).collect();
     let power = |k: usize| {
         let of_segment = |&start: &usize| {
@@ -97,8 +100,11 @@ mod tests {
         let mean = flat.iter().map(|p| p.1).sum::<f64>() / flat.len() as f64;
         assert!((mean - 1.0).abs() < 0.05, "{mean}");
         assert!((flat[flat.len() - 1].0 - 50.0).abs() < 1e-9, "it ends at half the sampling frequency");
-        let with_sine: Vec<f64> =
-            noise.iter().enumerate().map(|(i, v)| v + (std::f64::consts::TAU * 7.03 * 0.01 * i as f64).sin()).collect();
+        let with_sine: Vec<f64> = noise
+            .iter()
+            .enumerate()
+            .map(|(i, v)| v + math::sin(std::f64::consts::TAU * 7.03 * 0.01 * i as f64))
+            .collect();
         let peak = spectrum(0.01, &with_sine, 1.0).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!((peak.0 - 7.03).abs() < 0.2 && peak.1 > 30.0, "{peak:?}");
     }

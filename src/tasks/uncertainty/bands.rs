@@ -2,6 +2,7 @@
 
 use mops_core::BandReport;
 use mops_core::identification::Spread;
+use mops_core::math;
 
 use super::Calibrated;
 
@@ -35,7 +36,7 @@ pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandRepo
                 calibrated.covariance.spread(&slopes)
             };
             let spreads: Vec<Spread> = (0..times.len()).map(spread).collect();
-            let measured = |spread: &Spread| Spread { deviation: spread.deviation.hypot(noise), ..*spread };
+            let measured = |spread: &Spread| Spread { deviation: math::hypot(spread.deviation, noise), ..*spread };
             bands.push(BandReport {
                 experiment: case.name.clone(),
                 channel: channel.signal.clone(),
@@ -52,5 +53,5 @@ pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandRepo
 
 #[allow(clippy::cast_precision_loss)]
 fn rms(measured: &[f64], fitted: &[f64]) -> f64 {
-    (measured.iter().zip(fitted).map(|(y, f)| (y - f).powi(2)).sum::<f64>() / measured.len() as f64).sqrt()
+    (measured.iter().zip(fitted).map(|(y, f)| math::powi(y - f, 2)).sum::<f64>() / measured.len() as f64).sqrt()
 }

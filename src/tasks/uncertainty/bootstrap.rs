@@ -1,5 +1,6 @@
 //! The bootstrap of a calibration: residuals drawn anew in blocks, everything estimated again.
 
+use mops_core::math;
 use mops_core::statistics::{Summary, moving_blocks, quantile};
 use mops_core::{BootstrapParameter, BootstrapReport, Role, Stream, Study, UncertaintyTask, Watch, stream};
 
@@ -103,7 +104,7 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
             let raw: Vec<f64> = channel.values.iter().zip(&fitted).map(|(y, f)| y - f).collect();
             let mean = raw.iter().sum::<f64>() / raw.len() as f64;
             let scale = scale(&raw, mean, calibrated.covariance.noise().of_channel(plan.case, &channel.signal));
-            let usual = (raw.len() as f64).cbrt().ceil() as usize;
+            let usual = math::cbrt(raw.len() as f64).ceil() as usize;
             let block = task.block.unwrap_or(usual).clamp(1, raw.len());
             let residuals = raw.into_iter().map(|e| scale * (e - mean)).collect();
             all.push(Measured { case: plan.case, channel: index, fitted, residuals, block });
@@ -115,7 +116,7 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
 /// Factor that gives residuals about their mean the standard deviation of the noise, where that is known.
 #[allow(clippy::cast_precision_loss)]
 fn scale(residuals: &[f64], mean: f64, noise: Option<f64>) -> f64 {
-    let size = (residuals.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / residuals.len() as f64).sqrt();
+    let size = (residuals.iter().map(|e| math::powi(e - mean, 2)).sum::<f64>() / residuals.len() as f64).sqrt();
     noise.filter(|noise| noise.is_finite() && size > 0.0).map_or(1.0, |noise| noise / size)
 }
 

@@ -1,6 +1,7 @@
 //! Short names for what formulas of test problems are made of.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 /// A constant.
 pub(crate) fn c<S: Scalar>(value: f64) -> S {
@@ -34,12 +35,12 @@ pub(crate) fn dot<S: Scalar>(coefficients: &[f64], x: &[S]) -> S {
 
 /// Arc tangent.
 pub(crate) fn atan<S: Scalar>(x: S) -> S {
-    x.chain(x.value().atan(), 1.0 / (1.0 + x.value().powi(2)))
+    x.chain(math::atan(x.value()), 1.0 / (1.0 + math::powi(x.value(), 2)))
 }
 
 /// Hyperbolic sine.
 pub(crate) fn sinh<S: Scalar>(x: S) -> S {
-    x.chain(x.value().sinh(), x.value().cosh())
+    x.chain(math::sinh(x.value()), math::cosh(x.value()))
 }
 
 /// A power with an exponent that varies, of a positive number.
@@ -60,7 +61,7 @@ pub(crate) fn penalised<S: Scalar>(weight: f64, outputs: &[S]) -> Vec<S> {
 /// Source: NIST Handbook of Mathematical Functions (2010), equations 7.6.2 and 7.9.2.
 pub(crate) fn normal<S: Scalar>(x: S) -> S {
     let z = x.value();
-    let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+    let density = math::exp(-0.5 * z * z) / std::f64::consts::TAU.sqrt();
     let tail = |z: f64| (1..120).rev().fold(z, |fraction, k| z + f64::from(k) / fraction);
     let value = if z.abs() < 3.0 {
         let terms = (1..80).scan(z, |term, k| {

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use mops_math as math;
+
 use crate::draw::Draw;
 use crate::effects::{Effect, Family};
 use crate::fit::{Series, fit};
@@ -50,7 +52,7 @@ impl Bench {
     pub fn draw(plant: &'static Plant, seed: u64, label: &str) -> Option<Self> {
         let draw = |what: &str| Draw::new(seed, &format!("{label} {what}"));
         let mut numbers = draw("parameters");
-        let p: Vec<f64> = plant.parameters.iter().map(|p| p.nominal * numbers.between(-0.3, 0.3).exp()).collect();
+        let p: Vec<f64> = plant.parameters.iter().map(|p| p.nominal * math::exp(numbers.between(-0.3, 0.3))).collect();
         // Guesses are 20 to 60 % off, either way; bounds are a factor of 10 to 40 away from them.
         let mut off = draw("guesses");
         let guesses = p.iter().map(|p| {
@@ -61,7 +63,7 @@ impl Bench {
         let setups: Vec<Setup> =
             (0..EXPERIMENTS.len()).map(|e| (plant.setup)(&mut draw(&format!("experiment {e}")), e)).collect();
         let mut sizes = draw("noise sizes");
-        let white: Vec<f64> = plant.outputs.iter().map(|o| o.noise * sizes.between(-0.5, 0.5).exp()).collect();
+        let white: Vec<f64> = plant.outputs.iter().map(|o| o.noise * math::exp(sizes.between(-0.5, 0.5))).collect();
         let total = plant.outputs.iter().zip(&white).map(|(o, s)| (s * s + o.lsb * o.lsb / 12.0).sqrt()).collect();
         let noise = setups.iter().enumerate().map(|(e, setup)| {
             let mut normal = draw(&format!("noise {e}"));
@@ -157,7 +159,7 @@ impl Bench {
                 return None;
             }
             let squares = measured.iter().zip(&clean).zip(&self.total);
-            let squares = squares.flat_map(|((m, y), s)| m.iter().zip(y).map(move |(m, y)| ((m - y) / s).powi(2)));
+            let squares = squares.flat_map(|((m, y), s)| m.iter().zip(y).map(move |(m, y)| math::powi((m - y) / s, 2)));
             let count = self.setups[e].samples * clean.len();
             floors.push(((*name).to_owned(), (squares.sum::<f64>() / count as f64).sqrt()));
             files.push((format!("{name}.csv"), self.csv(e, &measured)));
@@ -171,7 +173,7 @@ impl Bench {
         let measures = plant.outputs.iter().map(|output| format!("{}_m", plant.states[output.state].0));
         let columns: Vec<String> = ["t".to_owned()].into_iter().chain(header).chain(measures).collect();
         let mut s = columns.join(",") + "\n";
-        let digits: Vec<usize> = self.white.iter().map(|s| (3.0 - s.log10()).ceil().max(0.0) as usize).collect();
+        let digits: Vec<usize> = self.white.iter().map(|s| (3.0 - math::log10(*s)).ceil().max(0.0) as usize).collect();
         for k in 0..setup.samples {
             let t = (k as f64 * setup.dt * 1e9).round() / 1e9;
             write!(s, "{t}").expect("a string takes everything");

@@ -1,7 +1,7 @@
 //! Random numbers of a trial: streams by label, so that one draw more in one place changes nothing elsewhere.
 
+use mops_math as math;
 use rand::{Rng, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// A stream of random numbers.
@@ -26,12 +26,12 @@ impl Draw {
 
     /// Uniform in the logarithm between two positive numbers.
     pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
+        math::exp(self.between(math::ln(low), math::ln(high)))
     }
 
     /// Standard normal.
     pub fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
+        math::normal(&mut self.0)
     }
 
     /// 1 or -1.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mops_math as math;
+
 use crate::draw::Draw;
 
 /// Rounds to what the data file shows.
@@ -14,7 +16,7 @@ pub fn multisine(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f6
     let n = 4 + draw.below(4);
     let lines: Vec<_> = (0..n).map(|_| (TAU * draw.log_between(low, high), draw.between(0.0, TAU))).collect();
     let amplitude = rms * (2.0 / n as f64).sqrt();
-    shown((0..samples).map(|k| lines.iter().map(|(w, phase)| amplitude * (w * k as f64 * dt + phase).sin()).sum()))
+    shown((0..samples).map(|k| lines.iter().map(|(w, phase)| amplitude * math::sin(w * k as f64 * dt + phase)).sum()))
 }
 
 /// Levels between two values, each kept for a time between two, s.
@@ -35,7 +37,7 @@ pub fn chirp(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), 
     let (phase, end) = (draw.between(0.0, TAU), samples as f64 * dt);
     shown((0..samples).map(|k| {
         let t = k as f64 * dt;
-        amplitude * (phase + TAU * (low * t + (high - low) * t * t / (2.0 * end))).sin()
+        amplitude * math::sin(phase + TAU * (low * t + (high - low) * t * t / (2.0 * end)))
     }))
 }
 
@@ -54,6 +56,6 @@ pub fn weather(draw: &mut Draw, samples: usize, dt: f64, mean: f64, swing: f64) 
     let kick = 0.15 * swing * (dt / 3600.0).sqrt();
     shown((0..samples).map(|k| {
         walk += kick * draw.normal() - walk * dt / 40_000.0;
-        mean + walk + swing * (TAU * k as f64 * dt / 86_400.0 + phase).sin()
+        mean + walk + swing * math::sin(TAU * k as f64 * dt / 86_400.0 + phase)
     }))
 }

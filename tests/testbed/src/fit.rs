@@ -1,5 +1,7 @@
 //! Least squares of the base model: Levenberg and Marquardt, slopes by differences.
 
+use mops_math as math;
+
 use crate::plant::{Plant, Setup};
 use crate::simulate::base_outputs;
 
@@ -25,9 +27,9 @@ pub struct Fit {
 pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from: (&[f64], &[f64])) -> Option<Fit> {
     let (np, nx) = (from.0.len(), from.1.len());
     let n = np + nx;
-    let mut at: Vec<f64> = from.0.iter().map(|p| p.ln()).chain(from.1.iter().copied()).collect();
+    let mut at: Vec<f64> = from.0.iter().map(|p| math::ln(*p)).chain(from.1.iter().copied()).collect();
     let residual = |at: &[f64]| -> Option<Vec<f64>> {
-        let p: Vec<f64> = at[..np].iter().map(|p| p.exp()).collect();
+        let p: Vec<f64> = at[..np].iter().map(|p| math::exp(*p)).collect();
         let y = base_outputs(plant, &p, &at[np..], setup, STEPS)?;
         let weighted = y.iter().zip(measured).zip(noise);
         let r: Vec<f64> = weighted.flat_map(|((y, m), s)| y.iter().zip(m).map(move |(y, m)| (y - m) / s)).collect();
@@ -73,7 +75,7 @@ pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from:
             break;
         }
     }
-    let parameters = at[..np].iter().map(|p| p.exp()).collect();
+    let parameters = at[..np].iter().map(|p| math::exp(*p)).collect();
     Some(Fit { parameters, start: at[np..].to_vec(), error: (best / r.len() as f64).sqrt() })
 }
 

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mops_math as math;
+
 use crate::draw::Draw;
 use crate::effects::{Effect, Family, Scene, any_joint, any_place, any_sensor, processes};
 use crate::law::{At, Law};
@@ -25,18 +27,19 @@ fn bumps(s: &Scene<'_>, n: usize, width: f64) -> impl Fn(f64) -> f64 + Send + Sy
             (s.range.0 + c * (s.range.1 - s.range.0), sign * s.between(0.5, 1.0))
         })
         .collect();
-    move |q| shapes.iter().map(|(c, a)| a * (-((q - c) / width).powi(2)).exp()).sum()
+    move |q| shapes.iter().map(|(c, a)| a * math::exp(-math::powi((q - c) / width, 2))).sum()
 }
 
 /// A signal that jumps between -1 and 1 after random times of a mean length, other ones in every experiment.
 fn telegraph(s: &Scene<'_>, mean: f64) -> [Vec<f64>; 3] {
     let end = 2.0 * s.setup.duration();
     [0, 1, 2].map(|experiment| {
-        let mut draw = Draw::new((s.between(0.0, 1.0) * 2.0_f64.powi(53)) as u64, &format!("telegraph {experiment}"));
+        let mut draw =
+            Draw::new((s.between(0.0, 1.0) * math::powi(2.0, 53)) as u64, &format!("telegraph {experiment}"));
         let mut t = -mean;
         let mut jumps = Vec::new();
         while t < end {
-            t += -mean * (1.0 - draw.between(0.0, 1.0)).ln();
+            t += -mean * math::ln(1.0 - draw.between(0.0, 1.0));
             jumps.push(t);
         }
         jumps
@@ -58,7 +61,7 @@ const ALL: &[Effect] = &[
             Family::up_to(8.0 * s.force, move |a| {
                 let pull = move |at: &At<'_>| {
                     let r = (at.q - centre) / width;
-                    -a * r * (-r * r).exp()
+                    -a * r * math::exp(-r * r)
                 };
                 (force(pull), vec![("force", a), ("centre", centre), ("width", width)])
             })
@@ -97,8 +100,8 @@ const ALL: &[Effect] = &[
             let (centre, width) = (s.within(0.25, 0.75), s.reach() * s.between(0.12, 0.3));
             Family::up_to(6.0 * s.force / s.speed, move |d| {
                 let push = move |at: &At<'_>| {
-                    let r2 = ((at.q - centre) / width).powi(2);
-                    d * at.v * (1.0 - 2.0 * r2) * (-r2).exp()
+                    let r2 = math::powi((at.q - centre) / width, 2);
+                    d * at.v * (1.0 - 2.0 * r2) * math::exp(-r2)
                 };
                 (force(push), vec![("damping", d), ("centre", centre), ("width", width)])
             })
@@ -115,8 +118,8 @@ const ALL: &[Effect] = &[
             let base = base.clamp(6.0 * TAU / end, 0.08 * TAU / s.setup.dt);
             Family::up_to(2.0 * s.force, move |a| {
                 let signal = move |at: &At<'_>| {
-                    let wander = sway * (slow * at.t / end + 2.0 * phases[at.experiment]).sin();
-                    a * (base * at.t + wander * 2.0 + phases[at.experiment]).sin()
+                    let wander = sway * math::sin(slow * at.t / end + 2.0 * phases[at.experiment]);
+                    a * math::sin(base * at.t + wander * 2.0 + phases[at.experiment])
                 };
                 (force(signal), vec![("force", a), ("frequency", base)])
             })

@@ -1,5 +1,7 @@
 //! What can stand in for what: outputs as vectors, with all that the base model can absorb taken out.
 
+use mops_math as math;
+
 use crate::bench::Bench;
 use crate::draw::Draw;
 use crate::effects::{Scene, effects};
@@ -56,7 +58,7 @@ impl<'a> Frame<'a> {
         let mut rest = off(&self.absorbed, minus(&weigh(self.bench, measured), &self.base));
         let mut candidates = self.catalogue();
         for _ in 0..TOGETHER {
-            let along = |v: &Vec<f64>| dot(v, &rest).powi(2) / dot(v, v).max(1e-300);
+            let along = |v: &Vec<f64>| math::powi(dot(v, &rest), 2) / dot(v, v).max(1e-300);
             let Some(best) =
                 (0..candidates.len()).max_by(|&a, &b| along(&candidates[a]).total_cmp(&along(&candidates[b])))
             else {

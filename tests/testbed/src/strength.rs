@@ -1,5 +1,7 @@
 //! The strength at which the refitted base model has a wanted error.
 
+use mops_math as math;
+
 /// Relative error that is good enough.
 const CLOSE: f64 = 0.04;
 
@@ -13,7 +15,7 @@ pub fn find(
     mut error: impl FnMut(f64) -> Option<f64>,
 ) -> Option<f64> {
     let excess = |value: f64| (value * value - floor * floor).max(1e-6 * floor * floor).sqrt();
-    let wanted = excess(size).ln();
+    let wanted = math::ln(excess(size));
     let mut below: Option<(f64, f64)> = None;
     let mut above: Option<(f64, f64)> = None;
     let mut e = start.clamp(low, high);
@@ -23,7 +25,7 @@ pub fn find(
             if (value / size - 1.0).abs() < CLOSE {
                 return Some(e);
             }
-            let point = (e.ln(), excess(value).ln());
+            let point = (math::ln(e), math::ln(excess(value)));
             if point.1 < wanted {
                 if e >= high {
                     return None;
@@ -34,7 +36,7 @@ pub fn find(
             }
         } else {
             // It diverges: as good as too strong.
-            above = Some((e.ln(), f64::INFINITY));
+            above = Some((math::ln(e), f64::INFINITY));
         }
         e = match (below, above) {
             (Some(b), Some(a)) => {
@@ -44,10 +46,10 @@ pub fn find(
                 let secant = b.0 + (wanted - b.1) * (a.0 - b.0) / (a.1 - b.1);
                 let margin = 0.1 * (a.0 - b.0);
                 let inside = if a.1.is_finite() { secant } else { 0.5 * (a.0 + b.0) };
-                inside.clamp(b.0 + margin, a.0 - margin).exp()
+                math::exp(inside.clamp(b.0 + margin, a.0 - margin))
             }
-            (Some(b), None) => (b.0 + (wanted - b.1).clamp(0.2, 3.0)).exp().min(high),
-            (None, Some(a)) if a.1.is_finite() => (a.0 + (wanted - a.1).clamp(-4.0, -0.2)).exp(),
+            (Some(b), None) => math::exp(b.0 + (wanted - b.1).clamp(0.2, 3.0)).min(high),
+            (None, Some(a)) if a.1.is_finite() => math::exp(a.0 + (wanted - a.1).clamp(-4.0, -0.2)),
             _ => e * 0.1,
         };
         if e < low {

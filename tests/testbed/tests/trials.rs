@@ -1,5 +1,7 @@
 //! What trials promise.
 
+use mops_math as math;
+
 use mops_testbed::{Missing, SIZES, Trial, effects, generate, outside, plants};
 
 /// The first trial that there is, over a few seeds.
@@ -75,7 +77,7 @@ fn the_noise_between_neighbours_in_the_file_is_the_one_declared() {
     let line = trial.study.lines().find(|line| line.starts_with("channels")).unwrap();
     let declared: f64 = line.split("noise = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     let h = column(&trial, 0, "h1_m");
-    let squares: f64 = h.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2)).sum();
+    let squares: f64 = h.windows(4).map(|w| math::powi(w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0], 2)).sum();
     let seen = (squares / (20.0 * (h.len() - 3) as f64)).sqrt();
     assert!((seen / declared - 1.0).abs() < 0.12, "{seen}, declared {declared}");
     assert!(h.iter().all(|h| (h / 0.02 - (h / 0.02).round()).abs() < 1e-6), "steps of the quantisation");

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use mops_core::math;
 use mops_core::{Analysis, Case, Effect, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind, Strength};
 
 use super::effects;
@@ -80,7 +81,7 @@ fn a_tank_with_a_leak_empties_as_torricelli_says() {
     // sqrt(h - hole) falls by k/(2 A) per second; A = 2, h0 = 1.44 + 0.5, k = 0.8, hole = 0.5: the level is there at 6 s.
     let times = [1.0, 3.0, 5.0, 8.0];
     let found = values(&model, &[2.0, 1.94, 0.8, 0.5], NOTHING, "h", &times);
-    let level = |t: f64| 0.5 + (1.2 - 0.2 * t).max(0.0).powi(2);
+    let level = |t: f64| 0.5 + math::powi((1.2 - 0.2 * t).max(0.0), 2);
     close(&found, &times.map(level), 1e-6);
 }
 
@@ -90,7 +91,7 @@ fn an_edge_keeps_a_level_where_as_much_spills_as_comes_in() {
     // A = 2, h0 = 0, inflow 0.5, k = 4, edge at 1, a plain edge: 1 + 0.125 (1 - exp(-2 (t - 4))).
     let times = [2.0, 4.0, 5.0, 9.0];
     let found = values(&model, &[2.0, 0.0, 4.0, 1.0, 1.0], Input::Constant(0.5), "h", &times);
-    let level = |t: f64| if t < 4.0 { 0.25 * t } else { 1.0 + 0.125 * (1.0 - (-2.0 * (t - 4.0)).exp()) };
+    let level = |t: f64| if t < 4.0 { 0.25 * t } else { 1.0 + 0.125 * (1.0 - math::exp(-2.0 * (t - 4.0))) };
     close(&found, &times.map(level), 1e-6);
 }
 
@@ -104,7 +105,7 @@ fn what_spills_runs_into_the_next_tank() {
     let lower = values(&model, &parameters, Input::Constant(0.5), "h", &times);
     let expected: Vec<f64> = times.iter().zip(&upper).map(|(t, g)| 0.25 * (0.5 * t - 2.0 * g) / 2.0).collect();
     close(&lower, &expected, 1e-9);
-    close(&upper[1..2], &[1.0 + 0.125 * (1.0 - (-2.0_f64).exp())], 1e-6);
+    close(&upper[1..2], &[1.0 + 0.125 * (1.0 - math::exp(-2.0))], 1e-6);
 }
 
 #[test]
@@ -112,7 +113,7 @@ fn a_loss_to_the_surroundings_decays_to_them() {
     let model = with(TANK, "linear-loss", "process:h", None);
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 1.0, -1.0], NOTHING, "h", &times);
-    close(&found, &times.map(|t| -1.0 + 4.0 * (-t / 2.0).exp()), 1e-7);
+    close(&found, &times.map(|t| -1.0 + 4.0 * math::exp(-t / 2.0)), 1e-7);
 }
 
 #[test]
@@ -121,10 +122,10 @@ fn what_radiates_to_an_input_cools_as_stefan_says() {
     // A T' = -k T^4 with nothing around: 1/T^3 = 1/T0^3 + 3 k t/A.
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 0.1, 0.0], NOTHING, "h", &times);
-    close(&found, &times.map(|t| (1.0 / 27.0 + 0.15 * t).powf(-1.0 / 3.0)), 1e-6);
+    close(&found, &times.map(|t| math::powf(1.0 / 27.0 + 0.15 * t, -1.0 / 3.0)), 1e-6);
     // Fed by as much as it radiates: A T' = u - k ((T + 1)^4 - (u + 1)^4) rests where (T + 1)^4 = (u + 1)^4 + u/k.
     let found = values(&model, &[2.0, 3.0, 0.1, 1.0], Input::Constant(0.5), "h", &[200.0]);
-    close(&found, &[(1.5_f64.powi(4) + 5.0).powf(0.25) - 1.0], 1e-6);
+    close(&found, &[math::powf(math::powi(1.5, 4) + 5.0, 0.25) - 1.0], 1e-6);
 }
 
 #[test]
@@ -133,7 +134,7 @@ fn a_hidden_store_shares_what_there_is() {
     // A = 2, k = 1, tau = 4: the hidden store holds k tau = 4. From h = 3 and z = 0: both end at 1, at the rate 1/2 + 1/4.
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 1.0, 4.0, -3.0], NOTHING, "h", &times);
-    close(&found, &times.map(|t| 1.0 + 2.0 * (-0.75 * t).exp()), 1e-7);
+    close(&found, &times.map(|t| 1.0 + 2.0 * math::exp(-0.75 * t)), 1e-7);
 }
 
 #[test]
@@ -142,14 +143,14 @@ fn a_lag_follows_a_step_exponentially() {
     let times = [1.0, 1.3, 2.0, 4.0];
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5, 0.0], STEP, "v", &times);
     // v' = 1 - exp(-(t - 1)/tau) from 1 s on.
-    close(&found, &times.map(|t| (t - 1.0) - 0.5 * (1.0 - (-(t - 1.0) / 0.5).exp())), 1e-7);
+    close(&found, &times.map(|t| (t - 1.0) - 0.5 * (1.0 - math::exp(-(t - 1.0) / 0.5))), 1e-7);
 }
 
 #[test]
 fn a_lag_starts_where_its_free_start_value_says() {
     let model = with(BLOCK, "actuator-lag", "actuator:u", None);
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5, 3.0], NOTHING, "v", &[2.0]);
-    close(&found, &[1.5 * 0.5 * (1.0 - (-4.0_f64).exp())], 1e-7);
+    close(&found, &[1.5 * 0.5 * (1.0 - math::exp(-4.0))], 1e-7);
 }
 
 #[test]
@@ -158,7 +159,7 @@ fn a_sensor_with_a_lag_lets_the_plant_alone() {
     let times = [0.5, 2.0];
     // v = t: z = t - tau (1 - exp(-t/tau)).
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5, 0.0], Input::Constant(2.0), "v", &times);
-    close(&found, &times.map(|t: f64| t - 0.5 * (1.0 - (-t / 0.5).exp())), 1e-7);
+    close(&found, &times.map(|t: f64| t - 0.5 * (1.0 - math::exp(-t / 0.5))), 1e-7);
     let x = values(&model, &[2.0, 0.0, 0.0, 0.5, 0.0], Input::Constant(2.0), "x", &times);
     close(&x, &times.map(|t| t * t / 2.0), 1e-7);
 }
@@ -171,7 +172,7 @@ fn a_lag_of_second_order_overshoots_as_its_damping_says() {
     let times: Vec<f64> = (1..40).map(|k| f64::from(k) * 0.05).collect();
     let found = values(&model, &[1.0, 1.0, 0.0, tau, d, -1.0, 0.0], NOTHING, "x", &times);
     let wd = (1.0 - d * d).sqrt() / tau;
-    let step = |t: &f64| 1.0 - (-d * t / tau).exp() * ((wd * t).cos() + d / (wd * tau) * (wd * t).sin());
+    let step = |t: &f64| 1.0 - math::exp(-d * t / tau) * (math::cos(wd * t) + d / (wd * tau) * math::sin(wd * t));
     close(&found, &times.iter().map(step).collect::<Vec<_>>(), 1e-6);
 }
 
@@ -219,7 +220,7 @@ fn play_at_a_sensor_keeps_what_it_shows_where_the_motion_turns() {
     let times = [1.0, 2.0, 3.1, 3.5, 4.0, 5.0, 6.0];
     let found = values(&model, &[1.0, 0.0, 0.0, 0.5, 0.0], cosine, "x", &times);
     let shown = |t: f64| {
-        let x = 1.0 - t.cos();
+        let x = 1.0 - math::cos(t);
         if t < PI { x - 0.25 } else { (x + 0.25).min(1.75) }
     };
     close(&found, &times.map(shown), 2e-3);
@@ -238,7 +239,7 @@ fn a_mass_on_a_flexible_mode_swings_at_both_its_frequencies() {
         let shape = w * w / (w * w - square);
         let times: Vec<f64> = (1..30).map(|i| f64::from(i) * 0.1).collect();
         let found = values(&sprung, &[m1, 1.0, 0.0, m2, w, 0.0, shape - 1.0, 0.0], NOTHING, "x", &times);
-        close(&found, &times.iter().map(|t| (square.sqrt() * t).cos()).collect::<Vec<_>>(), 1e-6);
+        close(&found, &times.iter().map(|t| math::cos(square.sqrt() * t)).collect::<Vec<_>>(), 1e-6);
     }
     // Without it the masses move on together, as their momentum says.
     let found = values(&model, &[m1, 0.0, 1.0, m2, w, 0.5, 0.0, -1.0], NOTHING, "v", &[60.0]);
@@ -265,7 +266,7 @@ fn damped_contact_in_a_coupling_takes_speed_and_does_not_pull() {
     let damped = COUPLED.replace("k*(x - y)", "(k*(x - y) + 2.4 [N s/m]*(v - w))");
     let model = with(&damped, "coupling-play", "joint:x", Some("joint:y"));
     let parameters = [2.0, 16.0, 0.0, 1.0, 0.0, 0.0, 16.0, 1.0, tau];
-    let restitution = (-ratio / (1.0 - ratio * ratio).sqrt() * (PI - 2.0 * ratio.asin())).exp();
+    let restitution = math::exp(-ratio / (1.0 - ratio * ratio).sqrt() * (PI - 2.0 * math::asin(ratio)));
     close(&values(&model, &parameters, NOTHING, "v", &[0.4, 2.0]), &[1.0, 0.5 * (1.0 - restitution)], 1e-5);
     close(&values(&model, &parameters, NOTHING, "w", &[0.4, 2.0]), &[0.0, 0.5 * (1.0 + restitution)], 1e-5);
 }
@@ -289,7 +290,7 @@ fn a_mass_that_becomes_less_is_faster_by_a_logarithm() {
     // v = (F/r) ln(m/(m - r t)).
     let times = [1.0, 3.0];
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5], Input::Constant(1.0), "v", &times);
-    close(&found, &times.map(|t| 2.0 * (2.0 / (2.0 - 0.5 * t)).ln()), 1e-7);
+    close(&found, &times.map(|t| 2.0 * math::ln(2.0 / (2.0 - 0.5 * t))), 1e-7);
 }
 
 #[test]
@@ -299,8 +300,11 @@ fn a_block_in_a_fluid_slows_down_as_the_powers_of_the_speed_say() {
         let model = with(BLOCK, name, "joint:x", None);
         let found = values(&model, &[2.0, 0.0, 3.0, 0.5], NOTHING, "v", &[4.0]);
         // v' = -(c/m) v^p.
-        let speed: f64 =
-            if p == 1.0 { 3.0 * (-1.0_f64).exp() } else { (3.0_f64.powf(1.0 - p) + (p - 1.0)).powf(1.0 / (1.0 - p)) };
+        let speed: f64 = if p == 1.0 {
+            3.0 * math::exp(-1.0)
+        } else {
+            math::powf(math::powf(3.0, 1.0 - p) + (p - 1.0), 1.0 / (1.0 - p))
+        };
         close(&found, &[speed], 1e-7);
         if p > 1.0 {
             let power = with(BLOCK, "power-friction", "joint:x", None);
@@ -343,14 +347,14 @@ fn a_hysteresis_at_small_strokes_is_a_spring() {
     // Far below its limit: stiffness c/y = 8, mass 2, frequency 2 rad/s.
     let times = [0.4, 1.0, 2.0];
     let found = values(&model, &[2.0, 0.0, 0.002, 8.0, 1.0, 1.0, 1.5, 0.0], NOTHING, "x", &times);
-    close(&found, &times.map(|t: f64| 0.001 * (2.0 * t).sin()), 3e-6);
+    close(&found, &times.map(|t: f64| 0.001 * math::sin(2.0 * t)), 3e-6);
 }
 
 #[test]
 fn back_emf_is_viscous_friction_where_the_input_is_the_force() {
     let model = with(BLOCK, "back-emf", "actuator:u", Some("joint:x"));
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5], Input::Constant(1.0), "v", &[3.0]);
-    close(&found, &[2.0 * (1.0 - (-0.75_f64).exp())], 1e-7);
+    close(&found, &[2.0 * (1.0 - math::exp(-0.75))], 1e-7);
     assert_eq!(model.interface().parameters.last().expect("it has one").variable.unit.to_string(), "N/(m/s)");
 }
 
@@ -365,7 +369,7 @@ fn friction_of_a_loaded_gear_grows_with_the_input() {
 fn risen_so_far(t: f64, from: f64, length: f64) -> f64 {
     let since = (t - from).max(0.0);
     let rising = since.min(length);
-    0.5 * (rising - length / PI * (PI * rising / length).sin()) + (since - rising)
+    0.5 * (rising - length / PI * math::sin(PI * rising / length)) + (since - rising)
 }
 
 #[test]
@@ -374,10 +378,10 @@ fn a_block_whose_friction_changes_with_time_slows_down_by_its_integral() {
     // m = 2, v0 = 3: v = v0 exp(-(integral of the factor)/m).
     let drift = with(BLOCK, "damping-drift", "joint:x", None);
     let found = values(&drift, &[2.0, 0.0, 3.0, 0.4], NOTHING, "v", &times);
-    close(&found, &times.map(|t| 3.0 * (-0.4 * t * t / 4.0).exp()), 1e-6);
+    close(&found, &times.map(|t| 3.0 * math::exp(-0.4 * t * t / 4.0)), 1e-6);
     let step = with(BLOCK, "damping-step", "joint:x", None);
     let found = values(&step, &[2.0, 0.0, 3.0, 0.9, from, length], NOTHING, "v", &times);
-    close(&found, &times.map(|t| 3.0 * (-0.45 * risen_so_far(t, from, length)).exp()), 1e-6);
+    close(&found, &times.map(|t| 3.0 * math::exp(-0.45 * risen_so_far(t, from, length))), 1e-6);
 }
 
 #[test]
@@ -397,7 +401,7 @@ fn a_vibration_shakes_a_block_by_its_integrals() {
     let model = with(BLOCK, "periodic-disturbance", "joint:x", None);
     let times = [0.3, 1.0, 2.5];
     let found = values(&model, &[2.0, 0.0, 0.0, 3.0, 5.0, PI / 2.0], NOTHING, "v", &times);
-    close(&found, &times.map(|t: f64| 0.3 * (5.0 * t).sin()), 1e-7);
+    close(&found, &times.map(|t: f64| 0.3 * math::sin(5.0 * t)), 1e-7);
 }
 
 #[test]
@@ -412,13 +416,15 @@ fn what_stores_energy_gives_it_back() {
     type Potential = fn(f64) -> f64;
     let cases: [(&str, Vec<f64>, Potential); 8] = [
         ("constant-force", vec![0.7], |q| -0.7 * q),
-        ("linear-stiffness", vec![3.0, 0.2], |q| 1.5 * (q - 0.2).powi(2)),
-        ("cubic-stiffness", vec![3.0, 0.2], |q| 0.75 * (q - 0.2).powi(4)),
-        ("quadratic-stiffness", vec![0.3, 0.2], |q| 0.1 * (q - 0.2).powi(3)),
-        ("end-stop", vec![30.0, -0.3, 0.4, 0.0], |q| 15.0 * ((q - 0.4).max(0.0).powi(2) + (-0.3 - q).max(0.0).powi(2))),
-        ("imbalance", vec![2.0, 0.3], |q| -2.0 * (q - 0.3).cos()),
-        ("cogging", vec![2.0, 6.0, 0.3], |q| (6.0 * q + 0.3).cos() / 3.0),
-        ("position-ripple", vec![2.0, 5.5, 0.3], |q| 2.0 * (5.5 * q + 0.3).cos() / 5.5),
+        ("linear-stiffness", vec![3.0, 0.2], |q| 1.5 * math::powi(q - 0.2, 2)),
+        ("cubic-stiffness", vec![3.0, 0.2], |q| 0.75 * math::powi(q - 0.2, 4)),
+        ("quadratic-stiffness", vec![0.3, 0.2], |q| 0.1 * math::powi(q - 0.2, 3)),
+        ("end-stop", vec![30.0, -0.3, 0.4, 0.0], |q| {
+            15.0 * (math::powi((q - 0.4).max(0.0), 2) + math::powi((-0.3 - q).max(0.0), 2))
+        }),
+        ("imbalance", vec![2.0, 0.3], |q| -2.0 * math::cos(q - 0.3)),
+        ("cogging", vec![2.0, 6.0, 0.3], |q| math::cos(6.0 * q + 0.3) / 3.0),
+        ("position-ripple", vec![2.0, 5.5, 0.3], |q| 2.0 * math::cos(5.5 * q + 0.3) / 5.5),
     ];
     for (name, strengths, potential) in cases {
         let model = with(BLOCK, name, "joint:x", None);

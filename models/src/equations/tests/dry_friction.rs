@@ -1,6 +1,7 @@
 //! Dry friction that is 0, always or for a while, is no friction.
 
 use super::*;
+use mops_core::math;
 
 fn joint(rate: &str, friction: &str) -> Equations {
     let text = format!(
@@ -37,12 +38,12 @@ fn a_throw_without_friction_turns_round() {
 #[test]
 fn an_oscillator_without_friction_keeps_its_amplitude() {
     let model = joint("-1 [1/s2]*q", "coulomb = 'c'");
-    close(end(&model, &[("c", 0.0), ("q0", 1.0), ("w0", 0.0)], 20.0), [20_f64.cos(), -20_f64.sin()]);
+    close(end(&model, &[("c", 0.0), ("q0", 1.0), ("w0", 0.0)], 20.0), [math::cos(20.0), -math::sin(20.0)]);
     let damped = joint("-1 [1/s2]*q", "coulomb = 'c', viscous = '0.2'");
     let exact = |t: f64| {
         let nu = 0.99_f64.sqrt();
-        let envelope = (-0.1 * t).exp();
-        [envelope * ((nu * t).cos() + 0.1 / nu * (nu * t).sin()), -envelope * (nu * t).sin() / nu]
+        let envelope = math::exp(-0.1 * t);
+        [envelope * (math::cos(nu * t) + 0.1 / nu * math::sin(nu * t)), -envelope * math::sin(nu * t) / nu]
     };
     close(end(&damped, &[("c", 0.0), ("q0", 1.0), ("w0", 0.0)], 15.0), exact(15.0));
 }
@@ -63,7 +64,7 @@ fn a_joint_without_friction_moves_beside_one_that_sticks() {
                 der = { a = 'va', va = '-1 [1/s2]*a', b = 'vb', vb = '0.1 [1/s2]*a' }\n\
                 friction = { a = { coulomb = 'ca' }, b = { coulomb = 'cb' } }";
     let response = respond(&read(text).unwrap(), &[], &[("ca", 0.0), ("cb", 0.3), ("a0", 1.0)], 20.0);
-    assert!((at(&response, "a", 20.0) - 20_f64.cos()).abs() < 1e-6);
+    assert!((at(&response, "a", 20.0) - math::cos(20.0)).abs() < 1e-6);
     assert_eq!(at(&response, "b", 20.0), 0.0);
 }
 

@@ -1,6 +1,7 @@
 //! Long and deeply nested expressions.
 
 use super::{model, read, respond};
+use mops_core::math;
 
 /// `x' = text`, from `x = 1` over 1 s, where `k` is a parameter.
 fn of_one_state(text: &str) -> String {
@@ -28,7 +29,7 @@ fn sums_products_and_conditions_may_have_any_number_of_operands() {
     for (first, more, last) in growth {
         let text = of_one_state(&format!("{first}{}{last}", more.repeat(n)));
         let end = respond(&model(&text), &[], &[("k", -1.0)], 1.0).trace("x").unwrap().last();
-        assert!((end - (-1f64).exp()).abs() < 1e-6, "{end}: {first}{more}{last}");
+        assert!((end - math::exp(-1.0)).abs() < 1e-6, "{end}: {first}{more}{last}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Errors relative to the size of each state: the same accuracy whatever the units are.
 
 use super::*;
+use mops_core::math;
 
 /// Decades of the size of the states beside 1.
 const DECADES: [i32; 7] = [-12, -9, -6, -3, 0, 3, 6];
@@ -20,11 +21,11 @@ fn a_capacitor_is_charged_as_the_closed_form_says_from_picofarads_on() {
                 outputs = { v = { value = 'q/C', unit = 'V' } }";
     let model = read(text).unwrap();
     for decade in DECADES {
-        let c = 10_f64.powi(decade);
+        let c = math::powi(10.0, decade);
         let constant = 1e6 * c;
         for end in [2.0, 20.0, 200.0] {
             let response = respond(&model, &[("u", Input::Constant(5.0))], &[("R", 1e6), ("C", c)], end * constant);
-            let worst = off(&response, "v", 5.0, end * constant, |t| 5.0 * (1.0 - (-t / constant).exp()));
+            let worst = off(&response, "v", 5.0, end * constant, |t| 5.0 * (1.0 - math::exp(-t / constant)));
             assert!(worst < ACCURACY, "{c} F, {end} time constants: {worst}");
         }
     }
@@ -34,11 +35,11 @@ fn a_capacitor_is_charged_as_the_closed_form_says_from_picofarads_on() {
 fn a_spring_swings_as_the_closed_form_says_at_all_sizes() {
     let text = "states = { x = 'm', v = 'm/s' }\nparameters = { k = '1/s2' }\nder = { x = 'v', v = '-k*x' }";
     let model = read(text).unwrap();
-    for size in DECADES.map(|decade| 10_f64.powi(decade)) {
+    for size in DECADES.map(|decade| math::powi(10.0, decade)) {
         for time in [1e-6_f64, 1.0, 1e6] {
-            let given = [("k", time.powi(-2)), ("x0", size)];
+            let given = [("k", math::powi(time, -2)), ("x0", size)];
             let response = respond(&model, &[], &given, 30.0 * time);
-            let worst = off(&response, "x", size, 30.0 * time, |t| size * (t / time).cos());
+            let worst = off(&response, "x", size, 30.0 * time, |t| size * math::cos(t / time));
             assert!(worst < 10.0 * ACCURACY, "{size} m, {time} s: {worst}");
         }
     }
@@ -52,7 +53,7 @@ fn a_pendulum_of_any_length_swings_alike() {
         let ends: Vec<f64> = DECADES
             .iter()
             .map(|&decade| {
-                let l = 10_f64.powi(decade);
+                let l = math::powi(10.0, decade);
                 at(&respond(&model, &[], &[("l", l), ("th0", start)], 10.0 * l.sqrt()), "th", 10.0 * l.sqrt())
             })
             .collect();

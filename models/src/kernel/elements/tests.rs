@@ -1,5 +1,6 @@
 //! Elements in small systems, against closed forms.
 
+use mops_core::math;
 use mops_core::{Dual, Scalar, Trace};
 
 use super::*;
@@ -103,7 +104,7 @@ fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
     let (x, _) = simulate(Sprung(element), [2.0, 0.0], 4.0, |_, _, x| x[0]);
     let wd = w * (1.0 - d * d).sqrt();
     for t in [0.3_f64, 1.0, 2.7, 4.0] {
-        let exact = 1.0 + (-d * w * t).exp() * ((wd * t).cos() + d * w / wd * (wd * t).sin());
+        let exact = 1.0 + math::exp(-d * w * t) * (math::cos(wd * t) + d * w / wd * math::sin(wd * t));
         near(x.at(t), exact, 1e-9);
     }
     near(element.energy(2.0), 4.5, 1e-15);
@@ -157,7 +158,7 @@ impl Element for Backlash<f64> {
 impl<E: Element> Dynamics<f64> for Through<E> {
     type State = [f64; 1];
     fn derivative(&self, t: f64, _: &[f64; 1], dx: &mut [f64; 1]) {
-        dx[0] = self.0.output(2.0 * t.sin());
+        dx[0] = self.0.output(2.0 * math::sin(t));
     }
     fn longest_step(&self) -> f64 {
         0.4
@@ -166,10 +167,10 @@ impl<E: Element> Dynamics<f64> for Through<E> {
         1
     }
     fn guard(&self, _: usize, t: f64, _: &[f64; 1]) -> f64 {
-        self.0.guard(2.0 * t.sin(), 2.0 * t.cos())
+        self.0.guard(2.0 * math::sin(t), 2.0 * math::cos(t))
     }
     fn switch(&mut self, _: usize, t: f64, _: &mut [f64; 1]) -> &str {
-        self.0.switch(2.0 * t.sin());
+        self.0.switch(2.0 * math::sin(t));
         ""
     }
 }
@@ -184,7 +185,7 @@ fn a_saturated_sine_is_cut_where_it_meets_the_limit() {
     }
     assert_eq!(events.len(), 4);
     // Half a period: twice 2 (1 - cos(pi/6)), and 1 for 2 pi/3.
-    near(integral.at(PI), 4.0 * (1.0 - FRAC_PI_6.cos()) + 2.0 * PI / 3.0, 1e-9);
+    near(integral.at(PI), 4.0 * (1.0 - math::cos(FRAC_PI_6)) + 2.0 * PI / 3.0, 1e-9);
     near(integral.at(TAU), 0.0, 1e-9);
 }
 
@@ -195,21 +196,21 @@ fn a_dead_zone_answers_only_beyond_its_edges() {
         near(*event, exact, 1e-9);
     }
     // What a saturation leaves: 4 - its integral over half a period.
-    near(integral.at(PI), 4.0 - 4.0 * (1.0 - FRAC_PI_6.cos()) - 2.0 * PI / 3.0, 1e-9);
+    near(integral.at(PI), 4.0 - 4.0 * (1.0 - math::cos(FRAC_PI_6)) - 2.0 * PI / 3.0, 1e-9);
 }
 
 #[test]
 fn play_is_crossed_at_every_reversal() {
     let (y, events) =
-        simulate(Through(Backlash::new(1.0, 0.0)), [0.0], TAU, |through, t, _| through.0.output(2.0 * t.sin()));
+        simulate(Through(Backlash::new(1.0, 0.0)), [0.0], TAU, |through, t, _| through.0.output(2.0 * math::sin(t)));
     // Touches at sin = 1/4, reverses at pi/2, touches below where 2 sin t = 1.5 - 0.5, reverses at 3 pi/2, and above.
-    let exact = [0.25_f64.asin(), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
+    let exact = [math::asin(0.25), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
     assert_eq!(events.len(), exact.len(), "{events:?}");
     for (event, exact) in events.iter().zip(exact) {
         near(*event, exact, 1e-7);
     }
     for (t, exact) in
-        [(0.1, 0.0), (1.0, 2.0 * 1.0_f64.sin() - 0.5), (2.0, 1.5), (4.0, 2.0 * 4.0_f64.sin() + 0.5), (5.5, -1.5)]
+        [(0.1, 0.0), (1.0, 2.0 * math::sin(1.0) - 0.5), (2.0, 1.5), (4.0, 2.0 * math::sin(4.0) + 0.5), (5.5, -1.5)]
     {
         near(y.at(t), exact, 1e-6);
     }
@@ -239,8 +240,8 @@ fn a_lag_approaches_a_step_exponentially() {
     let mut lag = Lagging(Lag { time: Dual::variable(0.5, 0) });
     let (y, _) = integrate(&mut lag, 0.0, 2.0, start, &TIGHT, &mut ()).unwrap();
     // y = 1 - exp(-t/T), dy/dT = -t/T^2 exp(-t/T).
-    near(y[0].value, 1.0 - (-4.0_f64).exp(), 1e-10);
-    near(y[0].tangent[0], -8.0 * (-4.0_f64).exp(), 1e-8);
+    near(y[0].value, 1.0 - math::exp(-4.0), 1e-10);
+    near(y[0].tangent[0], -8.0 * math::exp(-4.0), 1e-8);
 }
 
 /// `y' = -y(t - T)`, `y = 1` up to 0.
@@ -276,8 +277,8 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
 fn a_delayed_feedback_is_its_polynomials() {
     // By the method of steps: sum over k of (-1)^k (t - (k - 1) T)^k / k!, as far as t > (k - 1) T; here T = 1.
     let exact = |t: f64| {
-        1.0 - t + (t - 1.0).max(0.0).powi(2) / 2.0 - (t - 2.0).max(0.0).powi(3) / 6.0
-            + (t - 3.0).max(0.0).powi(4) / 24.0
+        1.0 - t + math::powi((t - 1.0).max(0.0), 2) / 2.0 - math::powi((t - 2.0).max(0.0), 3) / 6.0
+            + math::powi((t - 3.0).max(0.0), 4) / 24.0
     };
     let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), [1.0], 4.0, |_, _, x| x[0]);
     for t in [0.5, 1.0, 1.3, 2.2, 3.0, 4.0] {

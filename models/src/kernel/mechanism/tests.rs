@@ -1,5 +1,6 @@
 //! Stick and slip against closed forms.
 
+use mops_core::math;
 use mops_core::{Dual, Scalar};
 
 use super::*;
@@ -51,7 +52,7 @@ fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
     integrate(&mut block, 0.0, 20.0, [0.0, 0.0], &TIGHT, &mut events).unwrap();
     let w = f64::sqrt(k / m);
     let amplitude = (peak - 1.0) * force / k;
-    let slip = 2.0 * (std::f64::consts::PI - (amplitude * w / belt).atan()) / w;
+    let slip = 2.0 * (std::f64::consts::PI - math::atan(amplitude * w / belt)) / w;
     let stick = 2.0 * amplitude / belt;
     let (released, what) = events.0[0].clone();
     assert!(what == "first slides" && (released - peak * force / (k * belt)).abs() < 1e-9, "{released}");
@@ -141,7 +142,7 @@ struct Chain;
 
 impl Bodies<f64, 2> for Chain {
     fn mass_and_force(&self, t: f64, q: &[f64; 2], _: &[f64; 2]) -> ([[f64; 2]; 2], [f64; 2]) {
-        let push = 1.3 * (2.0 * t).sin();
+        let push = 1.3 * math::sin(2.0 * t);
         ([[1.0, 0.3], [0.3, 0.7]], [push - 4.0 * q[0] + 2.0 * q[1], 2.0 * q[0] - 4.0 * q[1]])
     }
     fn longest_step(&self) -> f64 {

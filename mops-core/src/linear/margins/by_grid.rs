@@ -8,6 +8,7 @@ use rand::Rng;
 
 use crate::linear::testing::c;
 use crate::linear::{Complex, Loop, TransferFunction};
+use crate::math::{self, complex};
 use crate::random::stream;
 
 /// Frequencies of a grid from which on a loop is not looked at.
@@ -27,12 +28,12 @@ impl Factored {
     fn random(seed: u64) -> Self {
         let mut stream = stream(seed, "loop");
         let mut root = |left: bool| {
-            let size = (stream.random_range(-1.0..2.0) * LN_10).exp();
+            let size = math::exp(stream.random_range(-1.0..2.0) * LN_10);
             if stream.random_bool(0.5) {
                 vec![c(if left { -size } else { size }, 0.0)]
             } else {
                 let damping: f64 = stream.random_range(0.05..0.95);
-                let z = Complex::from_polar(size, PI - damping.acos()) * if left { 1.0 } else { -1.0 };
+                let z = complex::from_polar(size, PI - math::acos(damping)) * if left { 1.0 } else { -1.0 };
                 vec![z, z.conj()]
             }
         };
@@ -47,11 +48,11 @@ impl Factored {
         if seed.is_multiple_of(4) {
             poles.push(c(0.0, 0.0));
         }
-        let delay = if seed.is_multiple_of(2) { (stream.random_range(-2.0..1.0) * LN_10).exp() } else { 0.0 };
+        let delay = if seed.is_multiple_of(2) { math::exp(stream.random_range(-2.0..1.0) * LN_10) } else { 0.0 };
         let bare = Self { zeros, poles, gain: 1.0, delay };
         // A gain of a thirtieth to thirty somewhere among the corners.
-        let omega = (stream.random_range(-1.0..2.0) * LN_10).exp();
-        let gain = (stream.random_range(-1.5..1.5) * LN_10).exp() / bare.at(omega).norm();
+        let omega = math::exp(stream.random_range(-1.0..2.0) * LN_10);
+        let gain = math::exp(stream.random_range(-1.5..1.5) * LN_10) / complex::norm(bare.at(omega));
         Self { gain, ..bare }
     }
 
@@ -59,7 +60,7 @@ impl Factored {
         let s = c(0.0, omega);
         let above: Complex = self.zeros.iter().map(|z| s - z).product();
         let below: Complex = self.poles.iter().map(|p| s - p).product();
-        above / below * self.gain * (-s * self.delay).exp()
+        above / below * self.gain * complex::exp(-s * self.delay)
     }
 
     fn system(&self) -> Loop {
@@ -75,7 +76,7 @@ impl Factored {
         let mut omega: f64 = 1e-7;
         while grid.len() < MOST {
             grid.push(omega);
-            if omega > 1e4 && self.at(omega).norm() < 1e-7 {
+            if omega > 1e4 && complex::norm(self.at(omega)) < 1e-7 {
                 break;
             }
             let step = if self.delay > 0.0 { 0.05 / self.delay } else { f64::INFINITY };
@@ -86,37 +87,43 @@ impl Factored {
 
     /// Number of unstable poles of the closed loop with L multiplied by `gain`.
     fn unstable(&self, gain: f64, values: &[Complex]) -> i64 {
-        let turn: f64 = values.windows(2).map(|l| ((l[1] * gain + 1.0) / (l[0] * gain + 1.0)).arg()).sum();
+        let turn: f64 = values.windows(2).map(|l| complex::arg((l[1] * gain + 1.0) / (l[0] * gain + 1.0))).sum();
         self.count(turn, gain, values[0])
     }
 
     /// The same by the turn of 1 + L over all frequencies of a grid, which begins at `first`.
     fn count(&self, turn: f64, gain: f64, first: Complex) -> i64 {
         // The way around a pole at 0, or from frequency 0, where the response is real, to the first one.
-        let integrators = self.poles.iter().filter(|p| p.norm() == 0.0).count() as f64;
-        let at_zero = c(first.norm().copysign(first.re), 0.0);
-        let start = if integrators > 0.0 { 0.0 } else { ((first * gain + 1.0) / (at_zero * gain + 1.0)).arg() };
+        let integrators = self.poles.iter().filter(|p| complex::norm(**p) == 0.0).count() as f64;
+        let at_zero = c(complex::norm(first).copysign(first.re), 0.0);
+        let start = if integrators > 0.0 { 0.0 } else { complex::arg((first * gain + 1.0) / (at_zero * gain + 1.0)) };
         let poles = self.poles.iter().filter(|p| p.re > 0.0).count() as f64;
         (poles - (2.0 * (turn + start) - integrators * PI) / TAU).round() as i64
     }
 
     /// Where `|L| = 1`, on a grid.
     fn crossovers(&self, grid: &[f64], values: &[Complex]) -> Vec<f64> {
-        let passes = |l: &[Complex]| (l[0].norm() >= 1.0) != (l[1].norm() >= 1.0);
+        let passes = |l: &[Complex]| (complex::norm(l[0]) >= 1.0) != (complex::norm(l[1]) >= 1.0);
         let pairs = grid.windows(2).zip(values.windows(2)).filter(|(_, l)| passes(l));
-        pairs.map(|(w, l)| bisect(w, |omega| (self.at(omega).norm() >= 1.0) == (l[0].norm() >= 1.0))).collect()
+        pairs
+            .map(|(w, l)| bisect(w, |omega| (complex::norm(self.at(omega)) >= 1.0) == (complex::norm(l[0]) >= 1.0)))
+            .collect()
     }
 
     /// The number of unstable poles where L is turned by a lead, rad, at all frequencies but the very lowest.
     fn unstable_with_lead(&self, lead: f64, values: &[Complex]) -> i64 {
         let ramp: f64 = (0..2000)
             .map(|i| {
-                let at = |i: i32| values[0] * Complex::from_polar(1.0, lead * f64::from(i) / 2000.0) + 1.0;
-                (at(i + 1) / at(i)).arg()
+                let at = |i: i32| values[0] * complex::from_polar(1.0, lead * f64::from(i) / 2000.0) + 1.0;
+                complex::arg(at(i + 1) / at(i))
             })
             .sum();
-        let turned: Vec<Complex> = values.iter().map(|l| l * Complex::from_polar(1.0, lead)).collect();
-        self.count(ramp + turned.windows(2).map(|l| ((l[1] + 1.0) / (l[0] + 1.0)).arg()).sum::<f64>(), 1.0, values[0])
+        let turned: Vec<Complex> = values.iter().map(|l| l * complex::from_polar(1.0, lead)).collect();
+        self.count(
+            ramp + turned.windows(2).map(|l| complex::arg((l[1] + 1.0) / (l[0] + 1.0))).sum::<f64>(),
+            1.0,
+            values[0],
+        )
     }
 
     /// Gains above 1/1000 and below 1000 with which L meets -1.
@@ -125,12 +132,12 @@ impl Factored {
         for (w, l) in grid.windows(2).zip(values.windows(2)) {
             if l[0].re < 0.0 && (l[0].im >= 0.0) != (l[1].im >= 0.0) {
                 let omega = bisect(w, |omega| (self.at(omega).im >= 0.0) == (l[0].im >= 0.0));
-                gains.push(1.0 / self.at(omega).norm());
+                gains.push(1.0 / complex::norm(self.at(omega)));
             }
         }
         let start = self.at(0.0);
         if start.is_finite() && start.re < 0.0 {
-            gains.push(1.0 / start.norm());
+            gains.push(1.0 / complex::norm(start));
         }
         gains.sort_by(f64::total_cmp);
         gains
@@ -175,7 +182,7 @@ fn agrees(margin: &Result<f64, String>, nearest: Result<f64, f64>) -> bool {
 }
 
 fn decibel(gain: f64) -> f64 {
-    20.0 * gain.log10()
+    20.0 * math::log10(gain)
 }
 
 /// The highest value of a function on a grid, made exact between its neighbours.
@@ -214,27 +221,27 @@ proptest! {
             // The grid ends at -140 dB.
             prop_assert!((margin - decibel(exact)).abs() < 1e-6 || margin.min(decibel(exact)) > 130.0,
                 "{} {} {:?}", margin, decibel(exact), factored);
-            let closed = |l: Complex| (l / (l + 1.0)).norm();
+            let closed = |l: Complex| complex::norm(l / (l + 1.0));
             let start = if factored.at(0.0).is_finite() { closed(factored.at(0.0)) } else { 1.0 };
             let crossovers = factored.crossovers(&grid, &values);
-            let lags = crossovers.iter().map(|&w| (w, (-factored.at(w)).arg()));
+            let lags = crossovers.iter().map(|&w| (w, complex::arg(-factored.at(w))));
             let phase = lags.clone().map(|(_, lag)| lag.abs()).fold(f64::INFINITY, f64::min);
             let delay = lags.map(|(w, lag)| lag.rem_euclid(TAU) / w).fold(f64::INFINITY, f64::min);
             let same = |a: f64, b: f64| a == b || (a - b).abs() < 1e-6 * (1.0 + b);
             prop_assert!(same(found.phase_margin().unwrap(), phase), "{} {:?}", phase, factored);
             prop_assert!(same(found.delay_margin().unwrap(), delay), "{} {:?}", delay, factored);
             let mt = highest(&grid, |w| closed(factored.at(w))).max(start);
-            let ms = highest(&grid, |w| (factored.at(w) + 1.0).inv().norm()).max(1.0);
+            let ms = highest(&grid, |w| complex::norm((factored.at(w) + 1.0).inv())).max(1.0);
             let (t, s) = (found.peak_complementary().unwrap(), found.peak_sensitivity().unwrap());
             prop_assert!((t / mt - 1.0).abs() < 1e-6, "{} {} {:?}", t, mt, factored);
             prop_assert!((s / ms - 1.0).abs() < 1e-6, "{} {} {:?}", s, ms, factored);
         } else {
             let gains = gains.iter().map(|g| decibel(*g)).collect();
-            let gain = nearest(gains, |g| factored.unstable(10f64.powf(g / 20.0), &values));
+            let gain = nearest(gains, |g| factored.unstable(math::powf(10.0, g / 20.0), &values));
             let margin = found.gain_margin(false);
             prop_assert!(agrees(&margin, gain), "gain {:?} {:?} {:?}", margin, gain, factored);
             let lags: Vec<(f64, f64)> =
-                factored.crossovers(&grid, &values).iter().map(|&w| (w, (-factored.at(w)).arg())).collect();
+                factored.crossovers(&grid, &values).iter().map(|&w| (w, complex::arg(-factored.at(w)))).collect();
             let leads = lags.iter().flat_map(|(_, lag)| (-9..=9).map(move |k| TAU * f64::from(k) - lag)).collect();
             let phase = nearest(leads, |lead| factored.unstable_with_lead(lead, &values));
             let margin = found.phase_margin();

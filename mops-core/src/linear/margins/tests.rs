@@ -1,6 +1,7 @@
 use crate::linear::search::maximise;
 use crate::linear::testing::assert_near;
 use crate::linear::{TransferFunction, bandwidth};
+use crate::math::{self, complex};
 
 use super::*;
 
@@ -12,7 +13,7 @@ fn loop_of(numerator: &[f64], denominator: &[f64], delay: f64) -> Loop {
 /// Phase crossovers with a gain above -60 dB.
 fn phase_crossovers(l: &Loop) -> Vec<Crossing> {
     let mut found = Vec::new();
-    l.phase_crossovers_in(|span| span.gain()[1] > 1e-3f64.ln(), |crossing| found.push(crossing)).unwrap();
+    l.phase_crossovers_in(|span| span.gain()[1] > math::ln(1e-3), |crossing| found.push(crossing)).unwrap();
     found
 }
 
@@ -25,11 +26,11 @@ fn the_third_order_lag_has_its_closed_form() {
     assert_eq!(crossing.len(), 1, "{crossing:?}");
     assert_near(crossing[0].frequency, 3.0f64.sqrt(), 1e-12);
     assert_near(crossing[0].response.re, -0.5, 1e-12);
-    let w = (4.0f64.powf(2.0 / 3.0) - 1.0).sqrt();
+    let w = (math::powf(4.0, 2.0 / 3.0) - 1.0).sqrt();
     assert_near(l.gain_crossovers[0].frequency, w, 1e-12);
-    assert_near(l.gain_margin(false).unwrap(), 20.0 * 2.0f64.log10(), 1e-11);
-    assert_near(l.phase_margin().unwrap(), PI - 3.0 * w.atan(), 1e-12);
-    assert_near(l.delay_margin().unwrap(), (PI - 3.0 * w.atan()) / w, 1e-12);
+    assert_near(l.gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-11);
+    assert_near(l.phase_margin().unwrap(), PI - 3.0 * math::atan(w), 1e-12);
+    assert_near(l.delay_margin().unwrap(), (PI - 3.0 * math::atan(w)) / w, 1e-12);
 }
 
 #[test]
@@ -72,13 +73,13 @@ fn a_loop_may_become_stable_by_a_delay() {
 fn encirclements(delay: f64) -> i32 {
     let l = |w: f64| {
         let s = Complex::new(0.0, w);
-        (-s * delay).exp() * 0.2 / (s * s - s * 0.1 + 1.0)
+        complex::exp(-s * delay) * 0.2 / (s * s - s * 0.1 + 1.0)
     };
     let points = (-400_000..400_000).map(|i| l(f64::from(i) * 1e-3) + 1.0);
     let mut turn = 0.0;
     let mut last: Option<Complex> = None;
     for p in points {
-        turn -= last.map_or(0.0, |last| (p / last).arg());
+        turn -= last.map_or(0.0, |last| complex::arg(p / last));
         last = Some(p);
     }
     (turn / TAU).round() as i32
@@ -100,9 +101,9 @@ fn an_unstable_plant_may_lose_less_gain_than_it_may_gain() {
     // 2 (s + 3)/((s - 1)(s + 10)): -0.6 at frequency 0, so unstable; with the gain 4 it is -1.2 and stable.
     let at = |k: f64| loop_of(&[k, 3.0 * k], &[1.0, 9.0, -10.0], 0.0);
     assert!(!at(2.0).is_stable() && at(4.0).is_stable());
-    assert_near(at(4.0).gain_margin(true).unwrap(), 20.0 * 1.2f64.log10(), 1e-11);
+    assert_near(at(4.0).gain_margin(true).unwrap(), 20.0 * math::log10(1.2), 1e-11);
     assert_eq!(at(4.0).gain_margin(false).unwrap(), f64::INFINITY);
-    assert_near(at(2.0).gain_margin(false).unwrap(), 20.0 * 0.6f64.log10(), 1e-11);
+    assert_near(at(2.0).gain_margin(false).unwrap(), 20.0 * math::log10(0.6), 1e-11);
 }
 
 #[test]
@@ -113,7 +114,7 @@ fn the_bandwidth_has_its_closed_form_with_and_without_delay() {
     assert_near(loop_of(&[7.0], &[1.0, 0.0], 0.0).closed_loop_bandwidth().unwrap(), 7.0, 1e-11);
     // k exp(-s T)/s: |j w exp(j w T) + k|^2 = 2 k^2, that is w^2 - 2 k w sin(w T) = k^2.
     let w = loop_of(&[1.0], &[1.0, 0.0], 0.3).closed_loop_bandwidth().unwrap();
-    assert_near(w * w - 2.0 * w * (0.3 * w).sin(), 1.0, 1e-9);
+    assert_near(w * w - 2.0 * w * math::sin(0.3 * w), 1.0, 1e-9);
     let lead = TransferFunction::new(vec![2.0, 1.0], vec![1.0, 1.0]).state_space().unwrap();
     assert!(bandwidth(&lead).unwrap_err().contains("never"));
 }
@@ -139,9 +140,9 @@ fn limit_of_lag(delay: f64) -> f64 {
     let (mut low, mut high) = (0.0, PI / delay);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if middle * delay + f64::atan(middle) < PI { low = middle } else { high = middle }
+        if middle * delay + math::atan(middle) < PI { low = middle } else { high = middle }
     }
-    f64::hypot(1.0, low)
+    math::hypot(1.0, low)
 }
 
 #[test]
@@ -152,15 +153,15 @@ fn the_margins_of_an_unstable_loop_lead_back_to_stability_whatever_lies_between(
         let limit = limit_of_lag(delay);
         let mut last = (0.0, 0.0);
         for i in 1..40 {
-            let excess = 1.12f64.powi(i);
+            let excess = math::powi(1.12, i);
             let l = loop_of(&[limit * excess], &[1.0, 1.0], delay);
             let (gain, phase) = (l.gain_margin(false).unwrap(), l.phase_margin().unwrap());
-            assert_near(gain, -20.0 * excess.log10(), 1e-9);
+            assert_near(gain, -20.0 * math::log10(excess), 1e-9);
             assert!(gain < last.0 && phase < last.1, "{delay} {excess}: {phase} after {}", last.1);
             // The lead that brings the crossover back to -1 from where the delay has turned it.
-            let w = (limit * excess).powi(2) - 1.0;
+            let w = math::powi(limit * excess, 2) - 1.0;
             let w = w.sqrt();
-            assert_near(phase, PI - w * delay - w.atan(), 1e-8 * (1.0 + w * delay));
+            assert_near(phase, PI - w * delay - math::atan(w), 1e-8 * (1.0 + w * delay));
             last = (gain, phase);
         }
     }
@@ -171,17 +172,17 @@ fn a_conditionally_stable_loop_is_led_to_the_nearer_of_its_limits() {
     // k (s + 1)^2/s^3 is stable from k = 1/2 on. With a further lag (0.01 s + 1)^2 there is an upper limit too.
     let above = |k: f64| loop_of(&[k, 2.0 * k, k], &[1.0, 0.0, 0.0, 0.0], 0.0);
     for k in [0.499, 0.3, 0.1, 0.01, 1e-4] {
-        assert_near(above(k).gain_margin(false).unwrap(), 20.0 * (k / 0.5).log10(), 1e-9);
+        assert_near(above(k).gain_margin(false).unwrap(), 20.0 * math::log10(k / 0.5), 1e-9);
     }
     for k in [0.501, 1.0, 50.0] {
-        assert_near(above(k).gain_margin(true).unwrap(), 20.0 * (k / 0.5).log10(), 1e-9);
+        assert_near(above(k).gain_margin(true).unwrap(), 20.0 * math::log10(k / 0.5), 1e-9);
     }
     let between = |k: f64| loop_of(&[k, 2.0 * k, k], &[1e-4, 0.02, 1.0, 0.0, 0.0, 0.0], 0.0);
     let (least, most) = (0.520_781_340_206_577, 192.019_168_659_793);
     assert!(between(least * 1.000_01).is_stable() && !between(least * 0.999_99).is_stable());
     assert!(between(most * 0.999_99).is_stable() && !between(most * 1.000_01).is_stable());
-    assert_near(between(0.1).gain_margin(false).unwrap(), 20.0 * (0.1 / least).log10(), 1e-9);
-    assert_near(between(1e3).gain_margin(false).unwrap(), -20.0 * (1e3 / most).log10(), 1e-9);
+    assert_near(between(0.1).gain_margin(false).unwrap(), 20.0 * math::log10(0.1 / least), 1e-9);
+    assert_near(between(1e3).gain_margin(false).unwrap(), -20.0 * math::log10(1e3 / most), 1e-9);
 }
 
 #[test]
@@ -192,7 +193,7 @@ fn margins_of_what_nothing_makes_stable_are_refused() {
     let slow = loop_of(&[0.5], &[1.0, -1.0], 0.1);
     assert!(slow.phase_margin().unwrap_err().contains("no turn of the phase"));
     assert!(slow.delay_margin().unwrap_err().contains("no delay"));
-    assert_near(slow.gain_margin(false).unwrap(), -20.0 * 2.0f64.log10(), 1e-9);
+    assert_near(slow.gain_margin(false).unwrap(), -20.0 * math::log10(2.0), 1e-9);
 }
 
 #[test]
@@ -203,7 +204,7 @@ fn with_a_delay_the_complementary_sensitivity_is_one_at_frequency_zero_whatever_
         assert_near(l.peak_complementary().unwrap(), 1.0, 1e-12);
         let integrator = loop_of(&[k], &[1.0, 0.0], delay);
         assert_near(integrator.peak_complementary().unwrap(), 1.0, 1e-12);
-        assert_near(integrator.gain_margin(false).unwrap(), 20.0 * (0.5 * PI / (k * delay)).log10(), 1e-8);
+        assert_near(integrator.gain_margin(false).unwrap(), 20.0 * math::log10(0.5 * PI / (k * delay)), 1e-8);
     }
     // Without an integrator it starts at k/(1 + k).
     for k in [0.5, 1e-2, 1e-5] {
@@ -214,11 +215,11 @@ fn with_a_delay_the_complementary_sensitivity_is_one_at_frequency_zero_whatever_
 #[test]
 fn a_loop_of_gain_alone_and_one_of_nothing_have_margins() {
     let l = |k: f64, delay: f64| loop_of(&[k], &[1.0], delay);
-    assert_near(l(0.5, 1.0).gain_margin(false).unwrap(), 20.0 * 2.0f64.log10(), 1e-12);
+    assert_near(l(0.5, 1.0).gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-12);
     assert_near(l(0.5, 1.0).peak_sensitivity().unwrap(), 2.0, 1e-12);
     assert_eq!(l(0.5, 0.0).gain_margin(false).unwrap(), f64::INFINITY);
     assert!(!l(2.0, 1.0).is_stable());
-    assert_near(l(2.0, 1.0).gain_margin(false).unwrap(), -20.0 * 2.0f64.log10(), 1e-12);
+    assert_near(l(2.0, 1.0).gain_margin(false).unwrap(), -20.0 * math::log10(2.0), 1e-12);
     let none = loop_of(&[0.0], &[1.0, 1.0], 0.1);
     assert_eq!((none.gain_margin(true).unwrap(), none.phase_margin().unwrap()), (f64::INFINITY, f64::INFINITY));
     assert_eq!((none.peak_sensitivity().unwrap(), none.peak_complementary().unwrap()), (1.0, 0.0));

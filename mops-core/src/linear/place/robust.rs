@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::linear::Complex;
 use crate::linear::system::beside;
 use crate::linear::zeros::complement;
+use crate::math::complex;
 
 /// The closed loop `A - B K` with eigenvectors as independent as possible; `range` spans the columns of `B`. `None` where
 /// they depend on each other.
@@ -90,7 +91,7 @@ fn set(x: &mut DMatrix<f64>, j: usize, pole: Complex, vector: &DVector<Complex>)
     if pole.im == 0.0 {
         // The largest entry is made real, and with it all.
         let turn = vector[vector.icamax()];
-        let real = (vector * (turn.conj() / turn.norm())).map(|z| z.re);
+        let real = (vector * (turn.conj() / complex::norm(turn))).map(|z| z.re);
         x.set_column(j, &real.normalize());
     } else {
         let unit = vector / Complex::new(length, 0.0);

@@ -7,6 +7,7 @@ use super::*;
 use crate::linear::testing::{assert_near, assert_same_set, c, furuta, random};
 use crate::linear::transfer::polynomial;
 use crate::linear::{TransferFunction, eigenvalues, reference};
+use crate::math::{self, complex};
 
 #[test]
 fn the_pendulum_gets_the_feedback_of_the_thesis() {
@@ -54,7 +55,7 @@ fn with_several_inputs_the_poles_are_placed_and_hardly_move_with_the_model() {
         let disturbed = &a + random(n, n, seed + 90) * 1e-6;
         let moved = |k: &DMatrix<f64>| {
             let roots = eigenvalues(&(&disturbed - &b * k)).unwrap();
-            let nearest = |z: &Complex| roots.iter().map(|root| (root - z).norm()).fold(f64::INFINITY, f64::min);
+            let nearest = |z: &Complex| roots.iter().map(|root| complex::norm(root - z)).fold(f64::INFINITY, f64::min);
             wanted.iter().map(nearest).fold(0.0, f64::max)
         };
         assert!(moved(&k) < 2e-5, "{n} {inputs}: {}", moved(&k));
@@ -98,7 +99,7 @@ fn several_inputs_may_repeat_a_pole_more_often_than_there_are_inputs() {
     let (a, b) = (random(5, 5, 8), random(5, 2, 9));
     let k = place(&a, &b, &[c(-2.0, 0.0); 5]).unwrap().k;
     // A defective eigenvalue: its computed copies lie on a circle around it.
-    assert!(eigenvalues(&(&a - &b * k)).unwrap().iter().all(|z| (z + 2.0).norm() < 0.02));
+    assert!(eigenvalues(&(&a - &b * k)).unwrap().iter().all(|z| complex::norm(z + 2.0) < 0.02));
 }
 
 #[test]
@@ -119,7 +120,7 @@ fn error_of_polynomial(a: &DMatrix<f64>, b: &DMatrix<f64>, k: &DMatrix<f64>, pol
     use reference::{characteristic, exactly, minus, times};
     let closed = minus(&exactly(a), &times(&exactly(b), &exactly(k)));
     let found = characteristic(&closed);
-    let sizes: Vec<Complex> = poles.iter().map(|p| c(-p.norm(), 0.0)).collect();
+    let sizes: Vec<Complex> = poles.iter().map(|p| c(-complex::norm(*p), 0.0)).collect();
     let (wanted, size) = (polynomial(poles), polynomial(&sizes));
     let n = poles.len();
     (0..n).map(|i| (found[i].0 - wanted[n - i]).abs() / size[n - i]).fold(0.0, f64::max)
@@ -213,7 +214,7 @@ fn check(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<(), Te
     // The reference has 30 digits, of which a multiple root keeps its part.
     let copies = poles.iter().map(|p| poles.iter().filter(|q| *q == p).count()).max().unwrap_or(1);
     prop_assert!(
-        far <= 10.0 * placed.error + 100.0 * 1e-29f64.powf(1.0 / copies as f64) + 1e-10,
+        far <= 10.0 * placed.error + 100.0 * math::powf(1e-29, 1.0 / copies as f64) + 1e-10,
         "{} {} {:?}",
         far,
         placed.error,

@@ -6,6 +6,7 @@ use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::experiment::Experiment;
 use crate::expression::Expression;
+use crate::math;
 use crate::model::Parameter;
 use crate::study::draft::{Free, Mistake, TunerDraft};
 use crate::tuner::{Grid, Scale, Tuner};
@@ -130,7 +131,7 @@ pub(super) fn build_tuner(
         return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
             .with_help("raise `min`, or leave `scale` out"));
     }
-    let width = if draft.scale == Scale::Log { (max / min).ln() } else { max - min };
+    let width = if draft.scale == Scale::Log { math::ln(max / min) } else { max - min };
     if !fixed && !width.is_finite() {
         return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} is wider than numbers reach"))
             .with_help("narrow the bounds to what is plausible"));

@@ -5,6 +5,7 @@
 use std::f64::consts::PI;
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::Instance;
 use super::transform::{asymmetric, conditioned, oscillated, outside, rotated, rounded, share, shifted, sum, wavy};
@@ -17,7 +18,7 @@ fn size<S>(x: &[S]) -> f64 {
 /// `sum 10^(6 s_i) z_i^2`.
 fn ellipsoid<S: Scalar>(z: &[S]) -> S {
     let n = z.len();
-    sum(z.iter().enumerate().map(|(i, z)| *z * *z * 1e6_f64.powf(share(i, n))))
+    sum(z.iter().enumerate().map(|(i, z)| *z * *z * math::powf(1e6_f64, share(i, n))))
 }
 
 /// `10 (n - sum cos(2 pi z_i)) + |z|^2`.
@@ -112,7 +113,7 @@ impl Instance {
         let z = oscillated(&shifted(x, &self.optimum));
         let scale = |(i, z): (usize, &S)| {
             let steep = if z.value() > 0.0 && i % 2 == 0 { 10.0 } else { 1.0 };
-            *z * (steep * 10.0_f64.powf(0.5 * share(i, x.len())))
+            *z * (steep * math::powf(10.0, 0.5 * share(i, x.len())))
         };
         let z: Vec<S> = z.iter().enumerate().map(scale).collect();
         rastrigin(&z) + outside(x) * 100.0
@@ -120,7 +121,7 @@ impl Instance {
 
     fn linear_slope<S: Scalar>(&self, x: &[S]) -> S {
         let of = |(i, (x, o)): (usize, (&S, &f64))| {
-            let slope = 10.0_f64.powf(share(i, self.optimum.len())).copysign(*o);
+            let slope = math::powf(10.0, share(i, self.optimum.len())).copysign(*o);
             -*x * slope + 5.0 * slope.abs()
         };
         sum(x.iter().zip(&self.optimum).enumerate().map(of))
@@ -137,7 +138,7 @@ impl Instance {
         let step = |z: &S| if z.value().abs() > 0.5 { rounded(*z) } else { rounded(*z * 10.0) / 10.0 };
         let steps: Vec<S> = z.iter().map(step).collect();
         let turned = rotated(&self.r, &steps);
-        let inner = sum(turned.iter().enumerate().map(|(i, z)| *z * *z * 100.0_f64.powf(share(i, x.len()))));
+        let inner = sum(turned.iter().enumerate().map(|(i, z)| *z * *z * math::powf(100.0, share(i, x.len()))));
         let slope = z[0].abs() * 1e-4;
         (if slope.value() > inner.value() { slope } else { inner }) * 0.1 + outside(x)
     }
@@ -145,8 +146,9 @@ impl Instance {
     fn weierstrass<S: Scalar>(&self, x: &[S]) -> S {
         let z = rotated(&self.q, &oscillated(&self.turned(x)));
         let z = rotated(&self.r, &conditioned(&z, 1e-2));
-        let waves = |z: S| sum((0..12).map(|k| ((z + 0.5) * (2.0 * PI * 3.0_f64.powi(k))).cos() * 0.5_f64.powi(k)));
-        let least: f64 = (0..12).map(|k| 0.5_f64.powi(k) * (PI * 3.0_f64.powi(k)).cos()).sum();
+        let waves =
+            |z: S| sum((0..12).map(|k| ((z + 0.5) * (2.0 * PI * math::powi(3.0, k))).cos() * math::powi(0.5, k)));
+        let least: f64 = (0..12).map(|k| math::powi(0.5, k) * math::cos(PI * math::powi(3.0, k))).sum();
         let above = sum(z.into_iter().map(waves)) / size(x) - least;
         above * above * above * 10.0 + outside(x) * (10.0 / size(x))
     }
@@ -192,12 +194,13 @@ impl Instance {
     fn katsuura<S: Scalar>(&self, x: &[S]) -> S {
         let z = self.turned_twice(x, 100.0);
         let n = size(x);
-        let rough =
-            |z: S| sum((1..33).map(|j| (z * 2.0_f64.powi(j) - rounded(z * 2.0_f64.powi(j))).abs() / 2.0_f64.powi(j)));
+        let rough = |z: S| {
+            sum((1..33).map(|j| (z * math::powi(2.0, j) - rounded(z * math::powi(2.0, j))).abs() / math::powi(2.0, j)))
+        };
         #[allow(clippy::cast_precision_loss)]
         let factor = |(i, z): (usize, &S)| rough(*z) * (i as f64 + 1.0) + 1.0;
         let product = z.iter().enumerate().map(factor).fold(S::from(1.0), |product, f| product * f);
-        (product.powf(10.0 / n.powf(1.2)) - 1.0) * (10.0 / (n * n)) + outside(x)
+        (product.powf(10.0 / math::powf(n, 1.2)) - 1.0) * (10.0 / (n * n)) + outside(x)
     }
 
     fn lunacek<S: Scalar>(&self, x: &[S]) -> S {

@@ -3,6 +3,7 @@
 //! Source: N. Hansen, S. Finck, R. Ros, A. Auger, Real-Parameter Black-Box Optimization Benchmarking 2009: Noiseless
 //! Functions Definitions, INRIA RR-6829 (2009), with the generators of the accompanying reference code (COCO).
 
+use mops_core::math;
 use std::f64::consts::PI;
 
 /// A square matrix, by rows.
@@ -42,7 +43,7 @@ pub(crate) fn uniform(count: usize, seed: i64) -> Vec<f64> {
 /// Normal numbers, by the method of Box and Muller.
 pub(crate) fn normal(count: usize, seed: i64) -> Vec<f64> {
     let u = uniform(2 * count, seed);
-    let of = |i: usize| (-2.0 * u[i].ln()).sqrt() * (2.0 * PI * u[count + i]).cos();
+    let of = |i: usize| (-2.0 * math::ln(u[i])).sqrt() * math::cos(2.0 * PI * u[count + i]);
     (0..count).map(of).map(|g| if g == 0.0 { 1e-99 } else { g }).collect()
 }
 

@@ -7,6 +7,7 @@ mod instance;
 mod published;
 mod transform;
 
+use mops_core::math;
 use mops_core::{Scalar, stream};
 use rand::Rng;
 
@@ -113,14 +114,14 @@ fn peaks(count: usize, q: &Matrix, seed: i64) -> Vec<Peak> {
     let draws = instance::uniform(n * count, seed);
     let peak = |i: usize| {
         let last = (count - 2) as f64;
-        let condition = if i == 0 { best_condition } else { 1000.0_f64.powf(conditions[i - 1] as f64 / last) };
+        let condition = if i == 0 { best_condition } else { math::powf(1000.0, conditions[i - 1] as f64 / last) };
         let nearer = if i == 0 { 0.8 } else { 1.0 };
         let at: Vec<f64> = (0..n).map(|k| nearer * (width * draws[i * n + k] - centre)).collect();
         let order = permutation(n, seed + 1000 * i64::try_from(i).expect("few peaks"));
         Peak {
             height: if i == 0 { 10.0 } else { 1.1 + 8.0 * (i - 1) as f64 / last },
             at: transform::rotated(q, &at),
-            scales: order.iter().map(|&k| condition.powf(transform::share(k, n) - 0.5)).collect(),
+            scales: order.iter().map(|&k| math::powf(condition, transform::share(k, n) - 0.5)).collect(),
         }
     };
     (0..count).map(peak).collect()

@@ -1,6 +1,7 @@
 //! The transformations that the functions share.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::instance::Matrix;
 
@@ -24,7 +25,7 @@ pub(crate) fn share(i: usize, n: usize) -> f64 {
 /// `Lambda^alpha z`: coordinate `i` times `alpha^(i / (2 (n - 1)))`.
 pub(crate) fn conditioned<S: Scalar>(z: &[S], alpha: f64) -> Vec<S> {
     let n = z.len();
-    z.iter().enumerate().map(|(i, z)| *z * alpha.powf(0.5 * share(i, n))).collect()
+    z.iter().enumerate().map(|(i, z)| *z * math::powf(alpha, 0.5 * share(i, n))).collect()
 }
 
 /// `T_osz` of a number: smooth, small, self-similar waves.

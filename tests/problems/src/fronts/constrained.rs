@@ -1,6 +1,7 @@
 //! `constrained-fronts`: two objectives with constraints.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::{best_of, evenly, problem, sampled};
 use crate::arithmetic::atan;
@@ -58,10 +59,11 @@ fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
 /// least of the second objective.
 fn srn_front(count: usize) -> Vec<Vec<f64>> {
     let top = (225.0_f64 - 6.25).sqrt();
-    let pieces = evenly(2.5, 3.7, count)
-        .map(|y| [3.0 * y - 10.0, y])
-        .chain(evenly(2.5, top, count).map(|y| [-2.5, y]))
-        .chain(evenly((2.5_f64 / 15.0).asin(), 0.5, count).map(|angle| [-15.0 * angle.sin(), 15.0 * angle.cos()]));
+    let pieces =
+        evenly(2.5, 3.7, count).map(|y| [3.0 * y - 10.0, y]).chain(evenly(2.5, top, count).map(|y| [-2.5, y])).chain(
+            evenly(math::asin(2.5_f64 / 15.0), 0.5, count)
+                .map(|angle| [-15.0 * math::sin(angle), 15.0 * math::cos(angle)]),
+        );
     best_of(&pieces.map(|x| srn(&x)[..2].to_vec()).collect::<Vec<_>>())
 }
 
@@ -74,11 +76,11 @@ fn tnk<S: Scalar>(x: &[S]) -> Vec<S> {
 /// Of the first constraint's edge, what the second allows and nothing dominates.
 fn tnk_front(count: usize) -> Vec<Vec<f64>> {
     let edge = |angle: f64| {
-        let radius = (1.0 + 0.1 * (16.0 * angle).cos()).sqrt();
-        vec![radius * angle.sin(), radius * angle.cos()]
+        let radius = (1.0 + 0.1 * math::cos(16.0 * angle)).sqrt();
+        vec![radius * math::sin(angle), radius * math::cos(angle)]
     };
     let quarter = std::f64::consts::FRAC_PI_2;
-    let allowed = |p: &Vec<f64>| (p[0] - 0.5).powi(2) + (p[1] - 0.5).powi(2) <= 0.5;
+    let allowed = |p: &Vec<f64>| math::powi(p[0] - 0.5, 2) + math::powi(p[1] - 0.5, 2) <= 0.5;
     best_of(&evenly(1e-9, quarter - 1e-9, 3 * count).map(edge).filter(allowed).collect::<Vec<_>>())
 }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::{best_of, evenly, known, problem, sampled};
 use crate::Suite;
@@ -17,8 +18,8 @@ pub(crate) const SUITE: Suite = Suite {
     problems: || {
         let unit = |n: usize| vec![[0.0, 1.0]; n];
         // The box less what lies below the plane, or inside the sphere.
-        let plane = known(&[0.55; 3], 0.55_f64.powi(3) - 0.5_f64.powi(3) / 6.0, plane_front);
-        let sphere = || known(&[1.1; 3], 1.1_f64.powi(3) - PI / 6.0, sphere_front);
+        let plane = known(&[0.55; 3], math::powi(0.55, 3) - math::powi(0.5, 3) / 6.0, plane_front);
+        let sphere = || known(&[1.1; 3], math::powi(1.1, 3) - PI / 6.0, sphere_front);
         let curve = || sampled(&[1.1; 3], 20_000, curve_front);
         vec![
             problem("DTLZ1", unit(7), (dtlz1, dtlz1), plane),
@@ -122,9 +123,9 @@ fn curve_front(count: usize) -> Vec<Vec<f64>> {
 fn pieces_front(count: usize) -> Vec<Vec<f64>> {
     let side = (3.0 * count as f64).sqrt() as usize;
     // Along each coordinate only what lies on the one-dimensional front can lie on this one.
-    let line = |f: &f64| vec![*f, -f * (1.0 + (3.0 * PI * f).sin())];
+    let line = |f: &f64| vec![*f, -f * (1.0 + math::sin(3.0 * PI * f))];
     let coarse: Vec<f64> = evenly(0.0, 0.86, 2 * side).collect();
     let kept: Vec<f64> = best_of(&coarse.iter().map(line).collect::<Vec<_>>()).into_iter().map(|p| p[0]).collect();
-    let height = |f: f64| f * (1.0 + (3.0 * PI * f).sin());
+    let height = |f: f64| f * (1.0 + math::sin(3.0 * PI * f));
     kept.iter().flat_map(|&a| kept.iter().map(move |&b| vec![a, b, 6.0 - height(a) - height(b)])).collect()
 }

@@ -269,6 +269,7 @@ fn disconnected_front(count: usize) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mops_core::math;
 
     /// The power by which [`dependent`] raises a parameter.
     fn power(u: f64) -> f64 {
@@ -283,8 +284,8 @@ mod tests {
         y[..POSITION].copy_from_slice(&position);
         let mean = |y: &[f64]| y.iter().sum::<f64>() / y.len() as f64;
         match name {
-            "WFG8" => (POSITION..n).for_each(|i| y[i] = 0.35_f64.powf(1.0 / power(mean(&y[..i])))),
-            "WFG9" => (POSITION..n - 1).rev().for_each(|i| y[i] = 0.35_f64.powf(1.0 / power(mean(&y[i + 1..])))),
+            "WFG8" => (POSITION..n).for_each(|i| y[i] = math::powf(0.35, 1.0 / power(mean(&y[..i])))),
+            "WFG9" => (POSITION..n - 1).rev().for_each(|i| y[i] = math::powf(0.35, 1.0 / power(mean(&y[i + 1..])))),
             _ => {}
         }
         y
@@ -309,12 +310,12 @@ mod tests {
                 let off = match problem.name.as_str() {
                     // x_1 from the first objective, and the second at it.
                     "WFG1" | "WFG2" => {
-                        let x = (1.0 - 0.5 * f[0]).acos() / FRAC_PI_2;
+                        let x = math::acos(1.0 - 0.5 * f[0]) / FRAC_PI_2;
                         let shape = if problem.name == "WFG1" { mixed(x) } else { disconnected(x) };
                         f[1] - 4.0 * shape[1]
                     }
                     "WFG3" => f[0] / 2.0 + f[1] / 4.0 - 1.0,
-                    _ => (f[0] / 2.0).powi(2) + (f[1] / 4.0).powi(2) - 1.0,
+                    _ => math::powi(f[0] / 2.0, 2) + math::powi(f[1] / 4.0, 2) - 1.0,
                 };
                 assert!(off.abs() < 1e-6, "{}: {f:?} {off}", problem.name);
             }

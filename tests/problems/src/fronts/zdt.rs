@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::{Points, best_of, evenly, known, problem, sampled};
 use crate::Suite;
@@ -20,7 +21,7 @@ pub(crate) const SUITE: Suite = Suite {
         // With f_2 = 1 - sqrt(f_1), and 1 - f_1^2: the integral of 1.1 - f_2 over [a, 1], and the strip beyond 1.
         let root = || known(&REFERENCE, 0.1 + 2.0 / 3.0 + 0.11, convex);
         let square =
-            |a: f64, points: Points| known(&REFERENCE, 0.1 * (1.0 - a) + (1.0 - a.powi(3)) / 3.0 + 0.11, points);
+            |a: f64, points: Points| known(&REFERENCE, 0.1 * (1.0 - a) + (1.0 - math::powi(a, 3)) / 3.0 + 0.11, points);
         vec![
             problem("ZDT1", unit(30), (zdt1, zdt1), root()),
             problem("ZDT2", unit(30), (zdt2, zdt2), square(0.0, concave)),
@@ -84,6 +85,6 @@ fn biased(count: usize) -> Vec<Vec<f64>> {
 
 /// Of the curve, what is not dominated: about a third.
 fn disconnected(count: usize) -> Vec<Vec<f64>> {
-    let curve = |f: f64| vec![f, 1.0 - f.sqrt() - f * (10.0 * PI * f).sin()];
+    let curve = |f: f64| vec![f, 1.0 - f.sqrt() - f * math::sin(10.0 * PI * f)];
     best_of(&evenly(0.0, 0.852, 3 * count).map(curve).collect::<Vec<_>>())
 }

@@ -1,6 +1,7 @@
 //! Problems 41 to 60: two to seven variables.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::common::hs43;
 use super::{POSITIVE, hs, within};
@@ -10,7 +11,7 @@ use crate::problem::Problem;
 
 pub(super) fn problems() -> Vec<(u32, Problem)> {
     let root = 2.0_f64.sqrt();
-    let (a, b) = ((1.0_f64 / 4.2).sqrt().asin(), (5.0_f64 / 7.2).sqrt().asin());
+    let (a, b) = (math::asin((1.0_f64 / 4.2).sqrt()), math::asin((5.0_f64 / 7.2).sqrt()));
     let wide = [-10.0, 10.0];
     vec![
         within(

@@ -1,6 +1,7 @@
 //! Problems 88 to 100: two to seven variables.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::common::hs100;
 use super::{POSITIVE, hs, within};
@@ -39,17 +40,17 @@ fn heating<S: Scalar>(x: &[S]) -> Vec<S> {
     let terms: Vec<(f64, f64, S)> = (0..30)
         .map(|k| {
             let mu = frequency(f64::from(k));
-            let (sin, cos) = mu.sin_cos();
+            let (sin, cos) = math::sin_cos(mu);
             (mu, 2.0 * sin / (mu + sin * cos), response(mu, x))
         })
         .collect();
     let mut deviation = c::<S>(2.0 / 15.0);
     for (i, &(mu, a, rho)) in terms.iter().enumerate() {
-        let (sin, cos) = mu.sin_cos();
-        deviation += sq(rho) * (mu.powi(4) * a * a * ((2.0 * mu).sin() / (2.0 * mu) + 1.0) / 2.0);
-        deviation -= rho * (mu * mu * a * (2.0 * sin / mu.powi(3) - 2.0 * cos / (mu * mu)));
+        let (sin, cos) = math::sin_cos(mu);
+        deviation += sq(rho) * (math::powi(mu, 4) * a * a * (math::sin(2.0 * mu) / (2.0 * mu) + 1.0) / 2.0);
+        deviation -= rho * (mu * mu * a * (2.0 * sin / math::powi(mu, 3) - 2.0 * cos / (mu * mu)));
         for &(nu, b, sigma) in &terms[i + 1..] {
-            let overlap = (mu + nu).sin() / (mu + nu) + (mu - nu).sin() / (mu - nu);
+            let overlap = math::sin(mu + nu) / (mu + nu) + math::sin(mu - nu) / (mu - nu);
             deviation += rho * sigma * (mu * mu * nu * nu * a * b * overlap);
         }
     }
@@ -60,7 +61,7 @@ fn heating<S: Scalar>(x: &[S]) -> Vec<S> {
 fn frequency(k: f64) -> f64 {
     let mut mu = k * std::f64::consts::PI + if k == 0.0 { 0.86 } else { 1.0 / (k * std::f64::consts::PI) };
     for _ in 0..20 {
-        let (sin, cos) = mu.sin_cos();
+        let (sin, cos) = math::sin_cos(mu);
         mu -= (mu * sin - cos) / (mu * cos + 2.0 * sin);
     }
     mu

@@ -1,6 +1,7 @@
 //! Problems 101 to 110: seven to ten variables.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::{POSITIVE, hs, within};
 use crate::arithmetic::{cube, sq, sum};
@@ -131,7 +132,7 @@ fn hs106<S: Scalar>(x: &[S]) -> Vec<S> {
 
 /// Power flow: three nodes.
 fn hs107<S: Scalar>(x: &[S]) -> Vec<S> {
-    let (sin, cos) = 0.25_f64.sin_cos();
+    let (sin, cos) = math::sin_cos(0.25);
     let (c, d) = (48.4 / 50.176 * sin, 48.4 / 50.176 * cos);
     let ((y1, y2), (y3, y4), (y5, y6)) = (x[7].sin_cos(), x[8].sin_cos(), (x[7] - x[8]).sin_cos());
     let (v, w, z) = (x[4], x[5], x[6]);
@@ -169,7 +170,7 @@ fn hs108<S: Scalar>(x: &[S]) -> Vec<S> {
 /// Power flow: generators with limits on apparent power.
 fn hs109<S: Scalar>(x: &[S]) -> Vec<S> {
     const A: f64 = 50.176;
-    let (b, c) = 0.25_f64.sin_cos();
+    let (b, c) = math::sin_cos(0.25);
     let (u, v, w) = (x[4], x[5], x[6]);
     let sin = |angle: S| (angle - 0.25).sin();
     let cos = |angle: S| (angle - 0.25).cos();

@@ -1,6 +1,7 @@
 //! The problems that fit a curve: 25, 57, 70 and 105.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::{hs, within};
 use crate::arithmetic::{c, power, sq, sum};
@@ -49,7 +50,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
 fn hs25<S: Scalar>(x: &[S]) -> Vec<S> {
     let at = |i: u32| {
         let share = 0.01 * f64::from(i);
-        let u = 25.0 + (-50.0 * share.ln()).powf(2.0 / 3.0);
+        let u = 25.0 + math::powf(-50.0 * math::ln(share), 2.0 / 3.0);
         (-power(-x[1] + u, x[2]) / x[0]).exp() - share
     };
     (1..100).map(at).collect()

@@ -1,6 +1,7 @@
 //! Curves through given points, as near as can be in the worst of them: the largest absolute value counts.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use crate::arithmetic::{dot, sq, sum};
 use crate::formula::Functions;
@@ -37,8 +38,8 @@ fn even(first: f64, last: f64, count: usize) -> impl Iterator<Item = f64> {
 
 fn pbc3<S: Scalar>(x: &[S]) -> Vec<S> {
     let data = |t: f64| {
-        let swing = 3.0 * (2.0 * t).sin() + 11.0 * (2.0 * t).cos();
-        3.0 / 20.0 * (-t).exp() + (-5.0 * t).exp() / 52.0 - (-2.0 * t).exp() / 65.0 * swing
+        let swing = 3.0 * math::sin(2.0 * t) + 11.0 * math::cos(2.0 * t);
+        3.0 / 20.0 * math::exp(-t) + math::exp(-5.0 * t) / 52.0 - math::exp(-2.0 * t) / 65.0 * swing
     };
     even(0.0, 10.0, 21).map(|t| x[2] / x[1] * (-x[0] * t).exp() * (x[1] * t).sin() - data(t)).collect()
 }
@@ -59,7 +60,9 @@ fn kowalik<S: Scalar>(x: &[S]) -> Vec<S> {
 }
 
 fn davidon2<S: Scalar>(x: &[S]) -> Vec<S> {
-    even(0.2, 4.0, 20).map(|t| sq(x[0] + x[1] * t - t.exp()) + sq(x[2] + x[3] * t.sin() - t.cos())).collect()
+    even(0.2, 4.0, 20)
+        .map(|t| sq(x[0] + x[1] * t - math::exp(t)) + sq(x[2] + x[3] * math::sin(t) - math::cos(t)))
+        .collect()
 }
 
 fn oet5<S: Scalar>(x: &[S]) -> Vec<S> {
@@ -80,8 +83,8 @@ fn gamma<S: Scalar>(x: &[S]) -> Vec<S> {
     ];
     let at = |t: f64| {
         // The factor that makes e^t Gamma(t + 1) = ((t + 1) y)^(t + 1/2), so that the power is one of a number near 1.
-        let y = (log_gamma(t + 1.0) + t) / (t + 0.5) - (t + 1.0).ln();
-        let base = (x[1] + t + S::from(1.0) / (x[2] * t + x[3])) / ((t + 1.0) * y.exp());
+        let y = (log_gamma(t + 1.0) + t) / (t + 0.5) - math::ln(t + 1.0);
+        let base = (x[1] + t + S::from(1.0) / (x[2] * t + x[3])) / ((t + 1.0) * math::exp(y));
         x[0] * base.abs().powf(t + 0.5) - 1.0
     };
     T.map(at).to_vec()
@@ -98,26 +101,26 @@ fn log_gamma(mut z: f64) -> f64 {
     }
     let series = 1.0 / 12.0
         - (1.0 / 360.0 - (1.0 / 1260.0 - (1.0 / 1680.0 - 1.0 / 1188.0 / (z * z)) / (z * z)) / (z * z)) / (z * z);
-    (z - 0.5) * z.ln() - z + 0.5 * std::f64::consts::TAU.ln() + series / z - f64::ln(product)
+    (z - 0.5) * math::ln(z) - z + 0.5 * math::ln(std::f64::consts::TAU) + series / z - math::ln(product)
 }
 
 fn exp<S: Scalar>(x: &[S]) -> Vec<S> {
-    let at = |t: f64| (x[0] + x[1] * t) / ((x[2] + (x[3] + x[4] * t) * t) * t + 1.0) - t.exp();
+    let at = |t: f64| (x[0] + x[1] * t) / ((x[2] + (x[3] + x[4] * t) * t) * t + 1.0) - math::exp(t);
     even(-1.0, 1.0, 21).map(at).collect()
 }
 
 fn pbc1<S: Scalar>(x: &[S]) -> Vec<S> {
-    let data = |t: f64| ((8.0 * t - 1.0).powi(2) + 1.0).sqrt() * (8.0 * t).atan() / (8.0 * t);
+    let data = |t: f64| (math::powi(8.0 * t - 1.0, 2) + 1.0).sqrt() * math::atan(8.0 * t) / (8.0 * t);
     let at = |t: f64| (x[0] + (x[1] + x[2] * t) * t) / ((x[3] + x[4] * t) * t + 1.0) - data(t);
     even(-1.0, 1.0, 30).map(at).collect()
 }
 
 fn evd61<S: Scalar>(x: &[S]) -> Vec<S> {
     let data = |t: f64| {
-        0.5 * (-t).exp() - (-2.0 * t).exp()
-            + 0.5 * (-3.0 * t).exp()
-            + 1.5 * (-1.5 * t).exp() * (7.0 * t).sin()
-            + (-2.5 * t).exp() * (5.0 * t).sin()
+        0.5 * math::exp(-t) - math::exp(-2.0 * t)
+            + 0.5 * math::exp(-3.0 * t)
+            + 1.5 * math::exp(-1.5 * t) * math::sin(7.0 * t)
+            + math::exp(-2.5 * t) * math::sin(5.0 * t)
     };
     let at = |t: f64| x[0] * (-x[1] * t).exp() * (x[2] * t + x[3]).cos() + x[4] * (-x[5] * t).exp() - data(t);
     even(0.0, 5.0, 51).map(at).collect()
@@ -136,7 +139,7 @@ fn filter<S: Scalar>(x: &[S]) -> Vec<S> {
         _ => 0.95 + 0.01 * (i - 35) as f64,
     };
     let at = |f: f64| {
-        let (sin, cos) = (std::f64::consts::PI * f).sin_cos();
+        let (sin, cos) = math::sin_cos(std::f64::consts::PI * f);
         let square = |j: usize| sq(x[j] + (x[j + 1] + 1.0) * cos) + sq((-x[j + 1] + 1.0) * sin);
         x[8] * (square(0) / square(2)).sqrt() * (square(4) / square(6)).sqrt() - (1.0 - 2.0 * f).abs()
     };
@@ -147,8 +150,8 @@ fn filter<S: Scalar>(x: &[S]) -> Vec<S> {
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
 fn watson<S: Scalar>(x: &[S]) -> Vec<S> {
     let at = |t: f64| {
-        let slope: Vec<f64> = (1..x.len()).map(|j| j as f64 * t.powi(j as i32 - 1)).collect();
-        let value: Vec<f64> = (0..x.len()).map(|j| t.powi(j as i32)).collect();
+        let slope: Vec<f64> = (1..x.len()).map(|j| j as f64 * math::powi(t, j as i32 - 1)).collect();
+        let value: Vec<f64> = (0..x.len()).map(|j| math::powi(t, j as i32)).collect();
         dot(&slope, &x[1..]) - sq(dot(&value, x)) - 1.0
     };
     let ends = vec![x[0], x[1] - sq(x[0]) - 1.0];
@@ -181,7 +184,7 @@ mod tests {
         let mut factorial = 1.0_f64;
         for n in 1..20 {
             factorial *= f64::from(n);
-            assert!((log_gamma(f64::from(n) + 1.0) - factorial.ln()).abs() < 1e-13 * factorial.ln().max(1.0));
+            assert!((log_gamma(f64::from(n) + 1.0) - math::ln(factorial)).abs() < 1e-13 * math::ln(factorial).max(1.0));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Min-max problems with linear constraints.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::penalties::{WONG2, WONG3};
 use crate::arithmetic::{dot, penalised, sinh, sq, sum};
@@ -107,7 +108,7 @@ fn pentagon<S: Scalar>(x: &[S]) -> Vec<S> {
     let mut rows = vec![distance(0, 2), distance(2, 4), distance(4, 0)];
     for point in [0, 2, 4] {
         for side in 0..5 {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(side) / 5.0).sin_cos();
+            let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(side) / 5.0);
             rows.push(x[point] * sin + x[point + 1] * cos - 1.0);
         }
     }
@@ -117,7 +118,7 @@ fn pentagon<S: Scalar>(x: &[S]) -> Vec<S> {
 /// Side lobes of an antenna of 15 elements at the positions x.
 fn mad6<S: Scalar>(x: &[S]) -> Vec<S> {
     let lobe = |i: u32| {
-        let angle = std::f64::consts::TAU * ((8.5 + 0.5 * f64::from(i)).to_radians()).sin();
+        let angle = std::f64::consts::TAU * math::sin((8.5 + 0.5 * f64::from(i)).to_radians());
         (sum(x.iter().map(|&x| (x * angle).cos())) * 2.0 + 1.0) / 15.0
     };
     let mut rows: Vec<S> = (1..=163).map(lobe).collect();
@@ -184,7 +185,7 @@ fn bpfilter<S: Scalar>(x: &[S]) -> Vec<S> {
     let attenuation = |frequency: f64| {
         let w = frequency * frequency;
         let section = |i: usize| (sq(sq(x[i + 4]) - w) + sq(x[i]) * w).ln();
-        (sum((0..4).map(section)) - 8.0 * frequency.ln()) * 0.5 - x[8]
+        (sum((0..4).map(section)) - 8.0 * math::ln(frequency)) * 0.5 - x[8]
     };
     let band: Vec<S> = (0..61).map(|i| attenuation(0.987423 + 0.025154 * f64::from(i) / 60.0)).collect();
     let mut rows = vec![attenuation(0.96732) + 3.0164, attenuation(1.03268) + 3.0164];

@@ -1,6 +1,7 @@
 //! Few functions of few variables.
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use crate::arithmetic::{c, cube, fourth, sq, sum};
 use crate::formula::Functions;
@@ -81,7 +82,7 @@ fn polak2<S: Scalar>(x: &[S]) -> Vec<S> {
 
 #[allow(clippy::cast_precision_loss)]
 fn polak3<S: Scalar>(x: &[S]) -> Vec<S> {
-    let term = |i: usize, j: usize| sq(x[j] - ((i + 2 * j) as f64).sin()).exp() * (i + j + 1) as f64;
+    let term = |i: usize, j: usize| sq(x[j] - math::sin((i + 2 * j) as f64)).exp() * (i + j + 1) as f64;
     // N.B.: the angle is i + 2 j - 1 of the report with i and j from 1, that is i + 2 j from 0.
     (0..10).map(|i| sum((0..11).map(|j| term(i, j)))).collect()
 }

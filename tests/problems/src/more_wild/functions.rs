@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use super::data::{BARD, KOWALIK, KOWALIK_AT, MEYER, OSBORNE_1, OSBORNE_2};
 use crate::arithmetic::{atan, c, cube, sq, sum};
@@ -112,7 +113,7 @@ fn bard<S: Scalar>(x: &[S]) -> Vec<S> {
 fn watson<S: Scalar>(x: &[S]) -> Vec<S> {
     let of = |i: u32| {
         let t = f64::from(i) / 29.0;
-        let power = |j: usize| t.powi(i32::try_from(j).expect("few variables"));
+        let power = |j: usize| math::powi(t, i32::try_from(j).expect("few variables"));
         let slope = sum((1..x.len()).map(|j| x[j] * (j as f64 * power(j - 1))));
         slope - sq(sum((0..x.len()).map(|j| x[j] * power(j)))) - 1.0
     };
@@ -125,11 +126,13 @@ fn exponentials<S: Scalar>(function: u32, m: usize, x: &[S]) -> Vec<S> {
     let of = |i: usize| {
         let i = i as f64;
         match function {
-            12 => (x[0] * (-i / 10.0)).exp() - (x[1] * (-i / 10.0)).exp() + x[2] * ((-i).exp() - (-i / 10.0).exp()),
+            12 => {
+                (x[0] * (-i / 10.0)).exp() - (x[1] * (-i / 10.0)).exp() + x[2] * (math::exp(-i) - math::exp(-i / 10.0))
+            }
             13 => -(x[0] * i).exp() - (x[1] * i).exp() + (2.0 + 2.0 * i),
             _ => {
                 let t = i / 5.0;
-                sq(x[0] + x[1] * t - t.exp()) + sq(x[2] + x[3] * t.sin() - t.cos())
+                sq(x[0] + x[1] * t - math::exp(t)) + sq(x[2] + x[3] * math::sin(t) - math::cos(t))
             }
         }
     };
@@ -147,7 +150,7 @@ fn chebyquad<S: Scalar>(m: usize, x: &[S]) -> Vec<S> {
             (before, now) = (now, double * now - before);
         }
     }
-    let integral = |i: usize| if i % 2 == 1 { 1.0 / ((i + 1) as f64).mul_add((i + 1) as f64, -1.0) } else { 0.0 };
+    let integral = |i: usize| if i % 2 == 1 { 1.0 / math::mul_add((i + 1) as f64, (i + 1) as f64, -1.0) } else { 0.0 };
     means.into_iter().enumerate().map(|(i, mean)| mean / x.len() as f64 + integral(i)).collect()
 }
 
@@ -187,7 +190,7 @@ fn mancino<S: Scalar>(x: &[S]) -> Vec<S> {
     let n = x.len();
     let of = |i: usize| {
         let waves = sum((0..n).map(|j| wave((sq(x[i]) + (i + 1) as f64 / (j + 1) as f64).sqrt())));
-        x[i] * 1400.0 + (i as f64 - 49.0).powi(3) + waves
+        x[i] * 1400.0 + math::powi(i as f64 - 49.0, 3) + waves
     };
     (0..n).map(of).collect()
 }
@@ -196,7 +199,7 @@ fn mancino<S: Scalar>(x: &[S]) -> Vec<S> {
 fn mancino_start(n: usize) -> Vec<f64> {
     let of = |i: usize| {
         let waves: f64 = (0..n).map(|j| wave(((i + 1) as f64 / (j + 1) as f64).sqrt())).sum();
-        -8.710_996e-4 * ((i as f64 - 49.0).powi(3) + waves)
+        -8.710_996e-4 * (math::powi(i as f64 - 49.0, 3) + waves)
     };
     (0..n).map(of).collect()
 }

@@ -5,6 +5,7 @@ mod data;
 mod functions;
 
 use mops_core::Scalar;
+use mops_core::math;
 
 use crate::{Answer, Formula, Functions, Problem, Suite};
 use functions::{residuals, start};
@@ -110,7 +111,7 @@ const TABLE: [(u32, usize, usize, i32); 53] = [
 
 fn all(kind: Kind) -> Vec<Problem> {
     let of = |&(function, n, m, power): &(u32, usize, usize, i32)| {
-        let start: Vec<f64> = start(function, n).into_iter().map(|x| x * 10.0_f64.powi(power)).collect();
+        let start: Vec<f64> = start(function, n).into_iter().map(|x| x * math::powi(10.0, power)).collect();
         let name = format!("{function} n{n} m{m}{}", if power > 0 { " far" } else { "" });
         let functions = Functions::with(Summed { function, m, kind });
         let least = if kind == Kind::Smooth { least(function, n, m) } else { None };
@@ -173,7 +174,7 @@ impl Formula for Summed {
 fn noise<S: Scalar>(x: &[S]) -> f64 {
     let values = || x.iter().map(|x| x.value().abs());
     let (one, two) = (values().sum::<f64>(), values().map(|x| x * x).sum::<f64>().sqrt());
-    let phi = 0.9 * (100.0 * one).sin() * (100.0 * values().fold(0.0, f64::max)).cos() + 0.1 * two.cos();
+    let phi = 0.9 * math::sin(100.0 * one) * math::cos(100.0 * values().fold(0.0, f64::max)) + 0.1 * math::cos(two);
     phi * (4.0 * phi * phi - 3.0)
 }
 

@@ -1,5 +1,7 @@
 //! What an actuator makes of its command.
 
+use mops_math as math;
+
 use super::{Effect, Family, any_actuator, real_actuator};
 use crate::law::{At, Law, Own, Spot};
 use crate::plant::{Place, Plant};
@@ -149,7 +151,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let (turned, n, phase) = (s.plant.places[0].state(), (1 + s.below(6)) as f64, s.between(-3.0, 3.0));
             Family::up_to(0.9, move |a| {
-                let ripple = move |at: &At<'_>, u: f64| u * (1.0 + a * (n * at.x[turned] + phase).sin());
+                let ripple = move |at: &At<'_>, u: f64| u * (1.0 + a * math::sin(n * at.x[turned] + phase));
                 (
                     Law { actuate: Some(Box::new(ripple)), ..Law::default() },
                     vec![("share", a), ("waves", n), ("phase", phase)],

@@ -1,5 +1,7 @@
 //! Friction and drag.
 
+use mops_math as math;
+
 use super::{Effect, Family, any_joint, joints};
 use crate::law::Spot;
 use crate::law::{Dry, Law};
@@ -33,7 +35,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let (ratio, vs) = (s.between(1.5, 2.5), s.speed * s.between(0.05, 0.25));
             Family::up_to(0.6 * s.force, move |c| {
-                let slide = move |_, v: f64| c * (1.0 + (ratio - 1.0) * (-(v / vs).powi(2)).exp());
+                let slide = move |_, v: f64| c * (1.0 + (ratio - 1.0) * math::exp(-math::powi(v / vs, 2)));
                 (dry(slide, ratio * c), vec![("coulomb", c), ("static", ratio * c), ("speed", vs)])
             })
         },
@@ -68,7 +70,7 @@ pub const ALL: &[Effect] = &[
             let (depth, phase) = (s.between(0.5, 0.9), s.between(-3.0, 3.0));
             let n = if s.is_angle() { (1 + s.below(3)) as f64 } else { s.between(2.0, 5.0) / s.reach() };
             Family::up_to(0.7 * s.force, move |c| {
-                let level = move |q: f64| c * (1.0 + depth * (n * q + phase).cos());
+                let level = move |q: f64| c * (1.0 + depth * math::cos(n * q + phase));
                 let levels = move |at: &crate::law::At<'_>, _| Dry { slide: level(at.q), hold: level(at.q) };
                 let law = Law { dry: Some(Box::new(levels)), ..Law::default() };
                 (law, vec![("torque", c), ("depth", depth), ("waves", n), ("phase", phase)])
@@ -102,14 +104,18 @@ pub const ALL: &[Effect] = &[
         name: "quadratic-drag",
         fits: any_joint,
         build: |s| {
-            Family::up_to(4.0 * s.force / s.speed.powi(2), |k| (push(move |v| -k * v * v.abs()), vec![("drag", k)]))
+            Family::up_to(4.0 * s.force / math::powi(s.speed, 2), |k| {
+                (push(move |v| -k * v * v.abs()), vec![("drag", k)])
+            })
         },
     },
     Effect {
         name: "cubic-damping",
         fits: any_joint,
         build: |s| {
-            Family::up_to(4.0 * s.force / s.speed.powi(3), |k| (push(move |v| -k * v.powi(3)), vec![("drag", k)]))
+            Family::up_to(4.0 * s.force / math::powi(s.speed, 3), |k| {
+                (push(move |v| -k * math::powi(v, 3)), vec![("drag", k)])
+            })
         },
     },
 ];

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mops_math as math;
+
 use super::{Effect, Family, Scene, any_joint, any_place, real_actuator};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
@@ -46,7 +48,7 @@ pub const ALL: &[Effect] = &[
             let omega = (s.omega * s.between(0.6, 3.0)).clamp(slow, 0.1 * TAU / s.setup.dt);
             let phases = [s.between(-3.0, 3.0), s.between(-3.0, 3.0), s.between(-3.0, 3.0)];
             Family::up_to(1.5 * s.force, move |a| {
-                let force = move |at: &At<'_>| a * (omega * at.t + phases[at.experiment]).sin();
+                let force = move |at: &At<'_>| a * math::sin(omega * at.t + phases[at.experiment]);
                 (
                     Law { force: Some(Box::new(force)), ..Law::default() },
                     vec![("amplitude", a), ("frequency", omega), ("phase", phases[0])],
@@ -65,7 +67,7 @@ pub const ALL: &[Effect] = &[
                 let force = move |at: &At<'_>| {
                     let c = (at.t - from) / long;
                     if at.experiment == 0 && (0.0..1.0).contains(&c) {
-                        sign * a * 0.5 * (1.0 - (TAU * c).cos())
+                        sign * a * 0.5 * (1.0 - math::cos(TAU * c))
                     } else {
                         0.0
                     }

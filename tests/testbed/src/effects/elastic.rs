@@ -1,5 +1,7 @@
 //! Springs, stops, play, and forces that repeat with the position.
 
+use mops_math as math;
+
 use super::{Effect, Family, Scene, any_joint, joints};
 use crate::law::{Law, Spot};
 use crate::plant::{Place, Plant};
@@ -52,8 +54,8 @@ pub const ALL: &[Effect] = &[
         fits: mechanisms,
         build: |s| {
             let (rest, sign) = (s.rest(), s.sign());
-            Family::up_to(1.0 * s.force / farthest(s, rest).powi(2), move |k| {
-                (pull(move |q| -sign * k * (q - rest).powi(2)), vec![("stiffness", sign * k)])
+            Family::up_to(1.0 * s.force / math::powi(farthest(s, rest), 2), move |k| {
+                (pull(move |q| -sign * k * math::powi(q - rest, 2)), vec![("stiffness", sign * k)])
             })
         },
     },
@@ -64,8 +66,8 @@ pub const ALL: &[Effect] = &[
             // Mostly hardening.
             let (rest, sign) = (s.rest(), if s.chance(0.75) { 1.0 } else { -1.0 });
             let most = if sign > 0.0 { 3.0 } else { 0.4 };
-            Family::up_to(most * s.force / farthest(s, rest).powi(3), move |k| {
-                (pull(move |q| -sign * k * (q - rest).powi(3)), vec![("stiffness", sign * k)])
+            Family::up_to(most * s.force / math::powi(farthest(s, rest), 3), move |k| {
+                (pull(move |q| -sign * k * math::powi(q - rest, 3)), vec![("stiffness", sign * k)])
             })
         },
     },
@@ -114,7 +116,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let (n, phase) = (waves(s), s.between(-3.0, 3.0));
             Family::up_to(1.2 * s.force, move |a| {
-                (pull(move |q| a * (n * q + phase).sin()), vec![("torque", a), ("waves", n), ("phase", phase)])
+                (pull(move |q| a * math::sin(n * q + phase)), vec![("torque", a), ("waves", n), ("phase", phase)])
             })
         },
     },
@@ -148,7 +150,7 @@ pub const ALL: &[Effect] = &[
             // z saturates at (1/(b + g))^(1/n).
             let yield_at = s.reach() * s.between(0.05, 0.3);
             let n = if s.chance(0.5) { 1 } else { 2 };
-            let sum = yield_at.powi(-n);
+            let sum = math::powi(yield_at, -n);
             let b = s.between(0.4, 0.9) * sum;
             let g = sum - b;
             Family::up_to(1.2 * s.force / yield_at, move |k| {
@@ -156,7 +158,8 @@ pub const ALL: &[Effect] = &[
                     states: vec![0.0],
                     rates: Some(Box::new(move |at, dz| {
                         let z = at.z[0];
-                        dz[0] = at.v - b * at.v.abs() * z.abs().powi(n - 1) * z - g * at.v * z.abs().powi(n);
+                        dz[0] =
+                            at.v - b * at.v.abs() * math::powi(z.abs(), n - 1) * z - g * at.v * math::powi(z.abs(), n);
                     })),
                     force: Some(Box::new(move |at| -k * at.z[0])),
                     ..Law::default()

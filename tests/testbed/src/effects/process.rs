@@ -1,5 +1,7 @@
 //! Flows of liquid, heat and charge.
 
+use mops_math as math;
+
 use super::{Effect, Family, processes};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
@@ -63,11 +65,11 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             // Around: the second input in a room, else 20 degC. The range of temperatures sees little of the fourth power.
             let outdoors = s.plant.name == "room";
-            let span = 4.0 * (ICE + s.range.1).powi(3) * (s.range.1 - 10.0).abs().max(10.0);
+            let span = 4.0 * math::powi(ICE + s.range.1, 3) * (s.range.1 - 10.0).abs().max(10.0);
             Family::up_to(6.0 * s.force / span, move |k| {
                 let law = move |at: &At<'_>| {
                     let around = if outdoors { at.u[1] } else { 20.0 };
-                    -k * ((at.q + ICE).powi(4) - (around + ICE).powi(4))
+                    -k * (math::powi(at.q + ICE, 4) - math::powi(around + ICE, 4))
                 };
                 (Law { force: Some(Box::new(law)), ..Law::default() }, vec![("coefficient", k)])
             })

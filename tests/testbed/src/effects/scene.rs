@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 
+use mops_math as math;
+
 use crate::draw::Draw;
 use crate::law::{Law, Spot};
 use crate::plant::{Place, Plant, Setup};
@@ -85,7 +87,7 @@ impl<'a> Scene<'a> {
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let rms = |v: &[f64]| (v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64).sqrt();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let spread = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
+        let spread = (values.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / values.len() as f64).sqrt();
         let omega = if speeds.is_empty() { 1.0 } else { rms(&speeds) / spread.max(1e-12) };
         let speed = speeds.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let draw = RefCell::new(draw);

@@ -1,5 +1,7 @@
 //! What a sensor makes of a state.
 
+use mops_math as math;
+
 use super::{Effect, Family, any_sensor};
 use crate::law::{Law, Spot};
 use crate::plant::Plant;
@@ -117,7 +119,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let phase = s.between(-3.0, 3.0);
             Family::up_to(0.3, move |a| {
-                (curve(move |y| y + a * (y + phase).sin()), vec![("amplitude", a), ("phase", phase)])
+                (curve(move |y| y + a * math::sin(y + phase)), vec![("amplitude", a), ("phase", phase)])
             })
         },
     },

@@ -1,5 +1,7 @@
 //! Trolley with a hanging load, driven by a force; th = 0 hangs. The load's joint has no friction in the base model.
 
+use mops_math as math;
+
 use super::length;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Place, Plant, Setup, Traits};
@@ -29,7 +31,7 @@ w  = "m*l*v'*cos(th) + m*l^2*w' + m*g*l*sin(th) = 0"
 "#,
     rates: |x, u, p, f, dx| {
         let [mc, m, l, b] = [p[0], p[1], p[2], p[3]];
-        let (sin, cos) = x[2].sin_cos();
+        let (sin, cos) = math::sin_cos(x[2]);
         let (m11, m12, m22) = (mc + m, m * l * cos, m * l * l);
         let f1 = u[0] - b * x[1] + m * l * x[3] * x[3] * sin + f[0];
         let f2 = -m * G * l * sin + f[1];

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use mops_math as math;
+
 use super::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
@@ -71,7 +73,7 @@ pub const DRIVEN: Plant = Plant {
 fn rates(x: &[f64], u: f64, p: &[f64], w: &[f64], dx: &mut [f64]) {
     let [a, b, c, d, bp, ba] = [p[0], p[1], p[2], p[3], p[4], p[5]];
     let (thd, phd) = (x[1], x[3]);
-    let (sin, cos) = x[0].sin_cos();
+    let (sin, cos) = math::sin_cos(x[0]);
     let m12 = c * cos;
     let m22 = b + a * sin * sin;
     let f1 = a * phd * phd * sin * cos + d * sin - bp * thd + w[0];

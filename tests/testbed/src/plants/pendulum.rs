@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mops_math as math;
+
 use super::angle;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
 
@@ -22,7 +24,7 @@ pub const PLANT: Plant = Plant {
     equations: "der        = { th = \"w\", w = \"w' = -(g/L)*sin(th) - b*w\" }\n",
     rates: |x, _, p, w, dx| {
         dx[0] = x[1];
-        dx[1] = -G / p[0] * x[0].sin() - p[1] * x[1] + w[0];
+        dx[1] = -G / p[0] * math::sin(x[0]) - p[1] * x[1] + w[0];
     },
     setup: |draw, _| {
         let start = vec![draw.sign() * draw.between(0.3, 2.0), draw.between(-1.0, 1.0)];
