@@ -63,6 +63,8 @@ fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
         assert_eq!(found(&diagnosis), [(effect, truth.place.as_str())], "{}", case.name);
         let value = &diagnosis.found[0].strengths[0];
         let expected = truth.strengths.iter().find(|(n, _)| n == told).expect("it is told").1;
+        // Forces of the equations are in SI units, those of the test bed's tanks in cm3/s.
+        let expected = if plant == "tanks" { 1e-6 } else { 1.0 } * expected;
         assert!(value.name == name && (value.value / expected - 1.0).abs() < 0.2, "{}: {value:?}", case.name);
         for error in &diagnosis.after {
             assert!(error.normalised < 1.15, "{}: {} leaves {}", case.name, error.name, error.normalised);

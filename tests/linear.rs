@@ -179,7 +179,7 @@ name = 'joint'
 [models.p.equations]
 states = { ph = 'rad', w = 'rad/s' }
 inputs = { u = 'N m' }
-der = { ph = 'w', w = \"0.01*w' = u - 0.6*ph\" }
+der = { ph = 'w', w = \"0.01 [kg m2]*w' = u - 0.6 [N m]*ph\" }
 [models.p.linearise]
 [experiments.sweep]
 file = 'sweep.csv'
@@ -215,7 +215,7 @@ name = 'joint'
 [models.p.equations]
 states = { ph = 'rad', w = 'rad/s' }
 inputs = { u = 'N m' }
-der = { ph = 'w', w = \"0.01*w' = u - 0.6*sin(ph)\" }
+der = { ph = 'w', w = \"0.01 [kg m2]*w' = u - 0.6 [N m]*sin(ph)\" }
 friction.ph = { coulomb = 0.05, viscous = 0.002 }
 horizon = '1 s'
 [cases]

@@ -154,7 +154,7 @@ fn of_the_arms_inertia_and_mass_only_one_combination_can_be_estimated() {
     let text = std::fs::read_to_string(swing()).unwrap();
     let arm = "Jc = { start = 1.4e-3, min = 1e-4, max = 1e-2, unit = \"kg m2\" }\n\
                m  = { start = 0.165, min = 0.05, max = 0.5, unit = \"kg\" }\n\
-               b  = { tie = \"Jc + 0.01500625*m - 2.5e-3\" }\n";
+               b  = { tie = \"Jc + 0.01500625 [m2]*m - 2.5e-3 [kg m2]\" }\n";
     let tied: Vec<&str> = text.lines().map(|line| if line.starts_with("b  =") { arm } else { line }).collect();
     let study = folder.path().join("study.toml");
     std::fs::write(&study, tied.join("\n")).unwrap();

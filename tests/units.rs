@@ -65,7 +65,7 @@ horizon    = '1 h'
 k  = { start = 1e-3, min = 1e-5, max = 1e-1, scale = 'log' }
 Tb = { start = '20 degC', min = '10 degC', max = '30 degC' }
 [cases]
-rest = { inputs.To = '20 degC' }
+rest = { inputs.To.constant = '20 degC' }
 [criteria]
 end  = { steady-state-error = { signal = 'T', target = '20 degC' }, demand = '1 K' }
 top  = { peak = { signal = 'T' }, demand = '25 degC' }

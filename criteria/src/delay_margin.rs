@@ -10,9 +10,12 @@ use crate::common::{Channel, LinearCriterion, Values, capped, feedback, second};
 /// the frequencies at which `|L(j w)| = 1` (the turn counted from 0 to 2 pi), in s. The model is the loop transfer function L,
 /// with unity negative feedback around it.
 ///
-/// Crossings are found exactly, not on a grid; a delay that the model has already enters exactly.
+/// Crossings are found by bounds of L over all frequencies, not on a grid; a delay that the model has already enters exactly.
 ///
-/// Range: any number. More is better: `demand = "0.1 s"` asks for at least 0.1 s. Negative where the closed loop is unstable: the delay that would have to go. An infinite margin counts as 1e6 s.
+/// Range: up to 1e6 s, which stands for an infinite margin. More is better: `demand =
+/// "0.1 s"` asks for at least 0.1 s. Where the closed loop is unstable the margin is negative: minus the smallest change of
+/// the delay, less or more, that makes it stable; less may be more than the delay there is. It has no value where no change of
+/// the delay makes an unstable loop stable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -52,6 +55,8 @@ mod tests {
         assert_near(margin, std::f64::consts::FRAC_PI_2 / 4.0, 1e-13);
         let left = value(&DelayMargin::default(), &linear_delayed(&[4.0], &[1.0, 0.0], 0.5)).number;
         assert_near(left, std::f64::consts::FRAC_PI_2 / 4.0 - 0.5, 1e-12);
+        let late = value(&DelayMargin::default(), &linear_delayed(&[4.0], &[1.0, 0.0], 9.0)).number;
+        assert_near(late, std::f64::consts::FRAC_PI_2 / 4.0 - 9.0, 1e-11);
         let never = value(&DelayMargin::default(), &linear(&[0.5], &[1.0, 1.0]));
         assert_eq!(never.number, 1e6);
     }

@@ -9,11 +9,14 @@ use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 /// The gain margin: the smallest factor `g > 1` with which `g L` meets -1, `20 log10 g` in dB. The model is the loop transfer
 /// function L, with unity negative feedback around it.
 ///
-/// Crossings of the negative real axis are found exactly, not on a grid; a delay of the model enters exactly. For a loop that
-/// would become unstable with less gain too, `either-way = true` takes the smallest change of the gain, up or down.
+/// Crossings of the negative real axis are found by bounds of L over all frequencies, not on a grid; a delay of the model
+/// enters exactly. For a loop that would become unstable with less gain too, `either-way = true` takes the smallest change of
+/// the gain, up or down.
 ///
-/// Range: any number of dB. More is better: `demand = "6 dB"` asks for at least 6 dB. Where the closed loop is unstable the margin is negative: minus the smallest change of the gain with which L
-/// meets -1, so that the value passes 0 where stability is lost. A margin above 200 dB counts as 200 dB.
+/// Range: -200 to 200 dB. More is better: `demand = "6 dB"` asks for at least 6 dB. Where the closed loop is unstable the margin is negative: minus the smallest change of the gain, up or down, that
+/// makes it stable. A crossing that only leads to other unstable poles does not count, so that the value rises to 0 towards
+/// stability and touches 0 nowhere else. A margin above 200 dB counts as 200 dB. It has no value where no change of the gain
+/// by up to 200 dB makes an unstable loop stable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -47,7 +50,7 @@ impl CriterionSpec for GainMargin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::common::testing::{assert_near, linear, linear_delayed, value};
+    use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
     use mops_core::math;
 
     #[test]
@@ -66,5 +69,28 @@ mod tests {
         assert_near(late, 20.0 * math::log10(std::f64::consts::PI / 0.4), 1e-9);
         let never = value(&GainMargin::default(), &linear(&[1.0], &[1.0, 1.0]));
         assert_eq!((never.number, never.note), (200.0, Some("infinite, or as good as")));
+    }
+
+    #[test]
+    fn a_margin_between_60_and_200_decibels_is_no_infinite_one() {
+        // k exp(-s T)/s: pi/(2 k T).
+        for (k, delay) in [(1e-3, 0.5), (1e-5, 2.0), (1e-9, 0.3)] {
+            let margin = value(&GainMargin::default(), &linear_delayed(&[k], &[1.0, 0.0], delay));
+            assert_near(margin.number, 20.0 * math::log10(std::f64::consts::FRAC_PI_2 / (k * delay)), 1e-8);
+            assert!(margin.note.is_none());
+        }
+    }
+
+    #[test]
+    fn an_unstable_loop_has_the_change_that_makes_it_stable_or_no_value() {
+        // k/(s + 1)^3 is stable up to 8; k/(s - 1) from 1 on; k/(s (s - 1)) never.
+        let margin = |numerator: &[f64], denominator: &[f64]| {
+            value(&GainMargin::default(), &linear(numerator, denominator)).number
+        };
+        assert_near(margin(&[800.0], &[1.0, 3.0, 3.0, 1.0]), -40.0, 1e-9);
+        assert_near(margin(&[0.01], &[1.0, -1.0]), -40.0, 1e-9);
+        assert!(
+            undefined(&GainMargin::default(), &linear(&[1.0], &[1.0, -1.0, 0.0])).contains("no change of the gain")
+        );
     }
 }

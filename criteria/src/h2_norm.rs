@@ -11,8 +11,8 @@ use crate::common::{Channel, LinearCriterion, Values};
 /// the input, and the root of the integrated square of the impulse response. In the unit of the output over that of the input,
 /// times s^(-1/2), which is left out.
 ///
-/// From a Lyapunov equation, not from an integral. Less is better. Range: from 0 up. It has no value where the system is unstable or passes its
-/// input on directly.
+/// From both Gramians, which must agree, not from an integral. Less is better. Range: from 0 up. It has no value where the system is unstable, or
+/// rounding decides whether it is, where it passes its input on directly, or where the Gramians do not agree to a millionth.
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

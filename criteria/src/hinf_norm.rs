@@ -10,11 +10,10 @@ use crate::common::{Channel, LinearCriterion, Values};
 /// The Hinf norm `max_w |G(j w)|`: the largest amplification of any sine, in the unit of the output over that of the input. Of
 /// the linearised closed loop from setpoint to actuator it is the largest effort of the controller.
 ///
-/// The peak is found by the eigenvalues of a Hamiltonian matrix, not on a grid. Less is better. Range: from 0 up. It has no value where the
-/// system is unstable.
+/// The peak is found between a gain that is reached and bounds over all frequencies, not on a grid. Less is better. Range: from 0 up. It has no
+/// value where the system is unstable, or rounding decides whether it is.
 ///
-/// Source: N. A. Bruinsma, M. Steinbuch, A fast algorithm to compute the Hinf norm of a transfer function matrix, Systems and
-/// Control Letters 14 (1990) 287-293.
+/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct HinfNorm {

@@ -9,7 +9,8 @@ use crate::common::{Channel, LinearCriterion, Values, feedback};
 /// `Ms = max_w |1/(1 + L(j w))|`, dimensionless: one over the smallest distance of L from -1. The model is the loop transfer
 /// function L, with unity negative feedback around it.
 ///
-/// The peak is found by the eigenvalues of a Hamiltonian matrix, with a delay by following L, never on a grid.
+/// The peak is found between a value that is reached and bounds of L over all frequencies from 0 to infinity, with a delay or
+/// without, never on a grid.
 ///
 /// Less is better. Range: from 1 up (nearly always); 1.2 to 2 is usual. It has no value where the closed loop is unstable.
 ///

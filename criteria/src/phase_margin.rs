@@ -11,11 +11,14 @@ use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 /// The phase margin: `min |pi + arg L(j w)|` over the frequencies at which `|L(j w)| = 1`, in rad. The model is the loop
 /// transfer function L, with unity negative feedback around it.
 ///
-/// Crossings are found exactly, not on a grid; a delay of the model enters exactly. Of several crossings the one with the
-/// smallest turn to -1, either way, counts.
+/// Crossings are found by bounds of L over all frequencies, not on a grid; a delay of the model enters exactly. Of several
+/// crossings the one with the smallest turn to -1, either way, counts.
 ///
-/// Range: -pi to pi. More is better: `demand = "45 deg"` asks for at least 45 degrees. Negative where the closed loop is unstable, so that the value passes 0 where stability is lost. Where `|L|` never
-/// is 1 it counts as pi.
+/// Range: up to pi; a stable loop in which `|L|` never is 1 has pi. More is better: `demand = "45 deg"` asks
+/// for at least 45 deg. Where the closed loop is unstable the margin is negative: minus the
+/// smallest lead or lag, the same at all frequencies above 0, that makes it stable. With a long delay that may be more than a
+/// half turn, and the value below -pi. It has no value where no lead or lag makes an unstable loop stable, as where a real
+/// pole is unstable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -46,7 +49,7 @@ impl CriterionSpec for PhaseMargin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::common::testing::{assert_near, linear, linear_delayed, value};
+    use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
     use mops_core::math;
 
     #[test]
@@ -64,5 +67,13 @@ mod tests {
         let margin = |delay| value(&PhaseMargin::default(), &linear_delayed(&[1.0], &[1.0, 0.0], delay)).number;
         assert_near(margin(0.3), std::f64::consts::FRAC_PI_2 - 0.3, 1e-12);
         assert_near(margin(1.7), std::f64::consts::FRAC_PI_2 - 1.7, 1e-12);
+        // As far as it takes to stability, more than a half turn too.
+        assert_near(margin(20.0), std::f64::consts::FRAC_PI_2 - 20.0, 1e-11);
+    }
+
+    #[test]
+    fn what_no_turn_makes_stable_has_no_value() {
+        let slow = undefined(&PhaseMargin::default(), &linear(&[0.5], &[1.0, -1.0]));
+        assert_eq!(slow, "the closed loop is unstable, and no turn of the phase makes it stable");
     }
 }

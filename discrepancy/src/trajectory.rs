@@ -238,8 +238,8 @@ mod tests {
     states     = { x = "m", v = "m/s" }
     inputs     = { u = "N" }
     parameters = { m = "kg", d = "N s/m", k = "N/m", bias = { unit = "N", default = 0 } }
-    der        = { x = "v", v = "m*v' = u + bias - d*v - k*x - 3*k*x^3" }
-    outputs    = { a = { value = "(u - d*v - k*x - 3*k*x^3)/m", unit = "m/s^2" } }
+    der        = { x = "v", v = "m*v' = u + bias - d*v - k*x - 3 [1/m2]*k*x^3" }
+    outputs    = { a = { value = "(u - d*v - k*x - 3 [1/m2]*k*x^3)/m", unit = "m/s^2" } }
     "#;
 
     fn record(names: &[&'static str], amplitude: f64, step: f64) -> Record {

@@ -31,9 +31,8 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
     }
     let time = file.time_column();
     let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
-    let longest = times.map_or(f64::INFINITY, longest_step);
     let mut rows = Vec::new();
-    let mut sampling = String::new();
+    let (mut sampling, mut unknown) = (String::new(), Vec::new());
     for name in &names {
         let column = file.column(name)?;
         // N.B.: a large file takes its memory once, so that nothing is gathered here.
@@ -42,6 +41,10 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
         if time.as_ref() == Some(name) {
             sampling = sample_time(name, &finite().collect::<Vec<f64>>());
+        }
+        let noise = noise(column.values, times);
+        if noise.is_none() {
+            unknown.push(format!("`{name}`"));
         }
         rows.push(vec![
             name.clone(),
@@ -52,7 +55,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
             number(high),
             finite().next().map_or_else(String::new, number),
             finite().next_back().map_or_else(String::new, number),
-            noise(column.values, times, longest).map_or_else(String::new, number),
+            noise.map_or_else(|| "-".to_owned(), number),
         ]);
     }
     let header = ["column", "unit", "rows", "gaps", "min", "max", "first", "last", "noise (est.)"];
@@ -60,6 +63,10 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
         format!("{}: {}\n\n{}", arguments.file.display(), file.format, table(&header, &[2, 3, 4, 5, 6, 7, 8], rows));
     if !sampling.is_empty() {
         text += &format!("\n{sampling}\n");
+    }
+    if !unknown.is_empty() {
+        let names = unknown.join(", ");
+        text += &format!("no noise of {names}: it takes {FEWEST} times four samples that follow each other evenly\n");
     }
     for skipped in &file.skipped {
         text += &format!("skipped: {skipped}\n");
@@ -104,32 +111,41 @@ fn sample_time(name: &str, times: &[f64]) -> String {
     )
 }
 
-/// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
-/// Gaps, whether empty cells or rows that are missing, are not differenced across. `None` where fewer than 20 differences
-/// are left.
-fn noise(values: &[f64], times: Option<&[f64]>, longest: f64) -> Option<f64> {
-    let times = times.filter(|times| times.len() == values.len());
-    let follows = |i: usize| times.is_none_or(|t| t[i..i + 4].windows(2).all(|pair| pair[1] - pair[0] <= longest));
-    let windows = values.windows(4).enumerate().filter(|(i, w)| w.iter().all(|v| v.is_finite()) && follows(*i));
-    let squares = windows.map(|(_, w)| math::powi(w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0], 2));
-    let (count, sum) = squares.fold((0_u32, 0.0), |(count, sum), square| (count + 1, sum + square));
-    (count >= 20).then(|| (sum / f64::from(count) / 20.0).sqrt())
-}
+/// Third differences from which a noise is estimated, at least: its relative error is then some 20 %.
+const FEWEST: u32 = 20;
 
-/// The longest step between samples that is none over a gap: half as long again as the median.
-fn longest_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 1.5 * median)
+/// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
+///
+/// The samples of a column may be fewer than the rows of the file: empty cells are none. Where two samples are half as far
+/// apart again as the median of the column there is a gap, and nothing is differenced across it. `None` where fewer than
+/// [`FEWEST`] differences are left.
+#[allow(clippy::cast_precision_loss)]
+fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+    let times = times.filter(|times| times.len() == values.len());
+    let samples = || {
+        let at = |row: usize| times.map_or(row as f64, |times| times[row]);
+        values.iter().enumerate().filter(|(_, value)| value.is_finite()).map(move |(row, value)| (at(row), *value))
+    };
+    let mut steps: Vec<f64> = samples().zip(samples().skip(1)).map(|(a, b)| b.0 - a.0).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let longest = 1.5 * steps.get(steps.len() / 2)?;
+    let (mut run, mut last, mut count, mut sum) = ([0.0; 4], f64::NEG_INFINITY, 0_u32, 0.0);
+    let mut length = 0;
+    for (time, value) in samples() {
+        length = if time - last <= longest { length + 1 } else { 1 };
+        run.rotate_left(1);
+        (run[3], last) = (value, time);
+        if length >= run.len() {
+            count += 1;
+            sum += math::powi(run[3] - 3.0 * run[2] + 3.0 * run[1] - run[0], 2);
+        }
+    }
+    (count >= FEWEST).then(|| (sum / f64::from(count) / 20.0).sqrt())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::longest_step;
-
-    fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
-        super::noise(values, times, times.map_or(f64::INFINITY, longest_step))
-    }
+    use super::noise;
 
     /// A steep ramp with an alternating error of 0.1, whose third differences are 0.8.
     fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {
@@ -152,5 +168,13 @@ mod tests {
         near(noise(&without(&values), Some(&without(&times))));
         assert!(noise(&without(&values), None).unwrap() > 2.0 * expected);
         assert_eq!(noise(&values[..22], None), None);
+        assert!(noise(&values[..23], None).is_some());
+        // A logger at a fifth of the rate of the file, with a gap of its own, with and without times.
+        let sparse =
+            |of: &dyn Fn(usize) -> f64| (0..500).map(|i| if i % 5 == 2 { of(i / 5) } else { f64::NAN }).collect();
+        let rows: Vec<f64> = (0..500).map(|i| 0.01 * f64::from(i)).collect();
+        let slow: Vec<f64> = sparse(&|i| if (30..45).contains(&i) { f64::NAN } else { values[i] });
+        near(noise(&slow, Some(&rows)));
+        near(noise(&slow, None));
     }
 }

@@ -126,7 +126,7 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
 
 /// A margin, which may be infinite: then `most` stands for it, with a word on it.
 pub fn capped(margin: f64, most: f64) -> Value {
-    if margin.abs() > most { Value::noted(most.copysign(margin), "infinite, or as good as") } else { margin.into() }
+    if margin > most { Value::noted(most, "infinite, or as good as") } else { margin.into() }
 }
 
 /// The poles that are looked at, for criteria of all poles.

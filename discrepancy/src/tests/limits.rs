@@ -11,7 +11,7 @@ use crate::{Diagnosis, Options, Verdict, diagnose};
 const LOSS: &str = r#"
 states     = { x = "m" }
 parameters = { a = "1/s" }
-der        = { x = "-a*x - 0.5*x*abs(x)" }
+der        = { x = "-a*x - 0.5 [1/m/s]*x*abs(x)" }
 "#;
 
 /// What loses `k x |x|` looks, where 0.5 is declared, as if its sensor showed `0.5 / k` times what it measures.

@@ -174,7 +174,7 @@ const AMPLIFIER: &str = r#"
 states     = { x = "V" }
 inputs     = { u = "V" }
 parameters = { k = "1" }
-der        = { x = "x' = -x" }
+der        = { x = "x' = -1 [1/s]*x" }
 outputs    = { y = { value = "k*u", unit = "V" } }
 "#;
 

@@ -14,7 +14,7 @@ use crate::{Options, diagnose};
 const BODY: &str = r#"
 states     = { T = "degC" }
 parameters = { h = "1/s" }
-der        = { T = "-h*(T - 20)" }
+der        = { T = "-h*(T - 20 [degC])" }
 "#;
 const RADIATED: f64 = 6e-11;
 
@@ -80,7 +80,7 @@ fn waves_of_a_linear_motor_are_looked_for_along_its_rail_whatever_the_unit_of_th
         states     = { x = "m", v = "m/s" }
         inputs     = { u = "mV" }
         parameters = { k = "m/s^2", d = "1/s" }
-        der        = { x = "v", v = "v' = 1e-3*k*u - 40*x - d*v" }
+        der        = { x = "v", v = "v' = k*u/1 [V] - 40 [1/s2]*x - d*v" }
     "#;
     const WAVES: f64 = 60.0;
     let driven = |frequency: f64| {

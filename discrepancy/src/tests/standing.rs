@@ -101,7 +101,7 @@ fn what_an_effect_gains_is_told_over_the_windows_of_the_model_without_it() {
 const TANK: &str = r#"
 states     = { x = "cm" }
 inputs     = { u = "cm/s" }
-parameters = { a = "1" }
+parameters = { a = "cm^0.5/s" }
 der        = { x = "x' = u - a*sqrt(max(x, 0))" }
 "#;
 

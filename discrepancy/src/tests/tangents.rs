@@ -18,7 +18,7 @@ const PLANT: &str = r#"
 states     = { x = "m", v = "m/s" }
 inputs     = { u = "N" }
 parameters = { m = "kg", d = "N s/m", k = "N/m" }
-der        = { x = "v", v = "m*v' = u - d*v - k*x - 3*k*x^3" }
+der        = { x = "v", v = "m*v' = u - d*v - k*x - 3 [1/m2]*k*x^3" }
 "#;
 const TRUTH: [f64; 5] = [2.0, 0.8, 8.0, 0.3, -0.2];
 const COUNT: u32 = 300;
@@ -95,7 +95,7 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
 /// In a plant that is linear in its input the change that is screened is that of the simulation, whatever its size.
 #[test]
 fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
-    let subject = subject(&PLANT.replace(" - 3*k*x^3", ""), &TRUTH, 2, vec![record()]);
+    let subject = subject(&PLANT.replace(" - 3 [1/m2]*k*x^3", ""), &TRUTH, 2, vec![record()]);
     let simulations = Meter::new(&());
     let (mut fit, variant, mut at, _) = fitted(&subject, &simulations);
     fit.pieces = cut(0, &subject.measurements[0], subject.model.as_ref(), 4);

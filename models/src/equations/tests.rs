@@ -9,6 +9,7 @@ use super::{Equations, EquationsOptions};
 
 mod dry_friction;
 mod events;
+mod linear;
 mod order;
 mod scales;
 mod units;
