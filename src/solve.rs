@@ -199,6 +199,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let pareto = pareto(&run, stop, (store, &quiet));
     let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
+    outcome.methods = solver.methods().to_vec();
     outcome.found.slopes = slopes(&run, (store, &quiet));
     outcome.seconds = begun.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());

@@ -399,3 +399,36 @@ fn a_folder_whose_name_is_no_text_works_as_any_other() {
     let report = Command::new(cargo_bin!("mops")).args(["report", "out"]).current_dir(&study).output().unwrap();
     assert!(report.status.success(), "{}", said(&report));
 }
+
+#[test]
+fn a_database_that_stays_locked_is_named_before_anything_is_simulated() {
+    let root = tempfile::tempdir().unwrap();
+    let [out, other] = ["out", "other"].map(|name| root.path().join(name));
+    assert!(mops(&SHORT, &out).status.success());
+    let database = out.join("evaluations.sqlite");
+    let count = points(&database);
+    let lock = Connection::open(&database).unwrap();
+    lock.execute_batch("BEGIN EXCLUSIVE").unwrap();
+    let resumed = [&SHORT[..], &["--resume"]].concat();
+    let reused = [&SHORT[..], &["--reuse", out.to_str().unwrap()]].concat();
+    std::thread::scope(|scope| {
+        for (arguments, folder) in [(&resumed, &out), (&reused, &other)] {
+            scope.spawn(move || {
+                let output = mops(arguments, folder);
+                assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+                let fact = format!("{} is locked by another program", out_of(folder, arguments).display());
+                assert!(said(&output).contains(&fact), "{}", said(&output));
+            });
+        }
+    });
+    lock.execute_batch("ROLLBACK").unwrap();
+    assert!(points(&database) == count && !other.join("result.json").exists());
+    assert!(mops(&resumed, &out).status.success() && mops(&reused, &other).status.success());
+}
+
+/// The database that such a run reads.
+fn out_of(folder: &Path, arguments: &[&str]) -> std::path::PathBuf {
+    let from =
+        arguments.iter().position(|argument| *argument == "--reuse").map(|place| Path::new(arguments[place + 1]));
+    from.unwrap_or(folder).join("evaluations.sqlite")
+}

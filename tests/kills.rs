@@ -79,8 +79,9 @@ fn counted(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path)) -> Vec<(&'s
     CALLS.iter().map(|&call| (call, most(call))).collect()
 }
 
-/// Kills a run at its calls, `some` of them, each in a folder that `prepare` has made, and resumes it; the number of kills.
-fn killed(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path), some: usize) -> usize {
+/// Kills a run at its calls, `some` of them, each in a folder that `prepare` has made, and resumes it, after which the folder
+/// must hold what `keeps` asks for; the number of kills.
+fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2], some: usize) -> usize {
     let whole = root.join("whole");
     assert!(mops(&STUDY, &whole).status().unwrap().success());
     let expected = result(&whole).unwrap();
@@ -119,6 +120,7 @@ fn killed(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path), some: usize)
         if result(&out).as_ref() != Some(&expected) || !passing(&out).is_empty() {
             wrong.push(format!("{call} {k}: {:?} {said} {:?}", again.status.code(), passing(&out)));
         }
+        keeps(&out);
     }
     assert!(wrong.is_empty(), "{} of {kills}: {wrong:#?}", wrong.len());
     kills
@@ -136,7 +138,7 @@ fn has_strace() -> bool {
 fn a_run_killed_at_any_call_in_a_folder_of_its_own_resumes() {
     if has_strace() {
         let root = tempfile::tempdir().unwrap();
-        let kills = killed(&STUDY, root.path(), &|_| (), 8);
+        let kills = killed(&STUDY, root.path(), [&|_| (), &|_| ()], 8);
         eprintln!("{kills} kills in an empty folder");
         assert!(kills >= 5);
     }
@@ -154,9 +156,27 @@ fn a_run_killed_at_any_call_in_the_folder_of_another_resumes() {
                 fs::copy(other.join(file), out.join(file)).unwrap();
             }
         };
-        let kills = killed(&STUDY, root.path(), &prepare, 6);
+        let kills = killed(&STUDY, root.path(), [&prepare, &|_| ()], 6);
         eprintln!("{kills} kills in the folder of another run");
         assert!(kills >= 3);
+
+        // One that came to no end is set aside, with all its points.
+        let database = |out: &Path, name: &str| rusqlite::Connection::open(out.join(name)).unwrap();
+        let unfinished = |out: &Path| {
+            prepare(out);
+            database(out, "evaluations.sqlite").execute("UPDATE runs SET state = 'running'", []).unwrap();
+        };
+        let count = |database: rusqlite::Connection| {
+            database.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).unwrap()
+        };
+        let points = count(database(&other, "evaluations.sqlite"));
+        let kept = |out: &Path| {
+            assert!(out.join("evaluations.previous.sqlite").exists());
+            assert_eq!(count(database(out, "evaluations.previous.sqlite")), points);
+        };
+        let kills = killed(&STUDY, root.path(), [&unfinished, &kept], 6);
+        eprintln!("{kills} kills in the folder of an unfinished run");
+        assert!(points >= 20 && kills >= 3);
     }
 }
 
@@ -173,7 +193,7 @@ fn a_run_killed_at_any_call_while_it_resumes_resumes_again() {
                 fs::copy(short.join(file), out.join(file)).unwrap();
             }
         };
-        let kills = killed(&[&STUDY[..], &["--resume"]].concat(), root.path(), &prepare, 6);
+        let kills = killed(&[&STUDY[..], &["--resume"]].concat(), root.path(), [&prepare, &|_| ()], 6);
         eprintln!("{kills} kills while it resumes");
         assert!(kills >= 3);
     }

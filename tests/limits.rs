@@ -366,3 +366,19 @@ fn an_empty_table_of_the_command_line_stands_for_the_table_that_is_there() {
     let output = mops(&["check", "out/study.toml"], root.path());
     assert!(output.status.success(), "{}", said(&output));
 }
+
+#[test]
+fn a_linearisation_ends_with_its_time_limit() {
+    let root = tempfile::tempdir().unwrap();
+    // A rod of 400 pieces: its poles take longer than the limit.
+    let text = "[study]\nname = \"rod\"\n[models.rod.equations]\nstates = { \"T[1..400]\" = \"1\" }\ninputs = { u = \"1\" }\n\
+                parameters = { k = \"1/s\" }\nhorizon = \"1 s\"\n[models.rod.equations.der]\n\"T[1]\" = \"k*(u - 2*T[1] + T[2])\"\n\
+                \"T[i]\" = \"k*(T[i-1] - 2*T[i] + T[i+1])\"\n\"T[400]\" = \"k*(T[399] - 2*T[400])\"\n\
+                [tuners]\nk = { start = 1.0, min = 0.1, max = 10.0 }\n[criteria]\nend = { final-value = { signal = \"T[400]\" }, demand = 1.0 }\n";
+    fs::write(root.path().join("study.toml"), text).unwrap();
+    let output = mops(&["linearise", "study.toml", "--out", "out", "--time-limit", "0.02"], root.path());
+    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
+    assert!(said(&output).contains("the time limit of 0.02 s came before it was done"), "{}", said(&output));
+    assert!(!root.path().join("out").exists());
+    assert_eq!(mops(&["check", "study.toml"], root.path()).status.code(), Some(0));
+}

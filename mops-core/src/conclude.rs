@@ -108,6 +108,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         task: study.task,
         seed: study.seed,
         solver: solver.kind.to_owned(),
+        methods: Vec::new(),
         run: None,
         stop: ending.stop,
         evaluations: run.archive().len(),

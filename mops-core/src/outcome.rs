@@ -42,6 +42,9 @@ pub struct Outcome {
     pub seed: u64,
     /// Kind of the solver.
     pub solver: String,
+    /// Kinds of the solvers that a composite one has run, in the order in which they began; absent where it is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub methods: Vec<&'static str>,
     /// Which run of the command line it is the result of: a digest of what it was asked, as its database has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,

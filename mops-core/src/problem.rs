@@ -355,7 +355,12 @@ impl Problem {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
-        Ok(rows.map(|(index, row)| (index, value(row))).collect())
+        // A criterion of a large linear system takes as long as a simulation.
+        let unless_cancelled = |(index, row)| match case.cancellation.requested() {
+            Some(_) => Err(Failure::Cancelled),
+            None => Ok((index, value(row))),
+        };
+        rows.map(unless_cancelled).collect()
     }
 
     /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
@@ -454,6 +459,9 @@ impl Problem {
         let rows = study.rows.iter().zip(&self.shape.rows).enumerate();
         let rows = rows.filter(|(_, (row, (usage, _)))| row.job == job && *usage != Usage::Monitor);
         rows.map(|(index, (row, _))| {
+            if case.cancellation.requested().is_some() {
+                return None;
+            }
             let value = row.criterion.value(case, &analysis).ok()?;
             let still = Value { residuals: vec![0.0; value.residuals.len()], ..Value::default() };
             let mut slopes = vec![still; seeds.len()];

@@ -182,6 +182,11 @@ pub trait Solver: Send {
         &[]
     }
 
+    /// Kinds of the solvers that a composite one has run so far, in the order in which they began; else none.
+    fn methods(&self) -> &[&'static str] {
+        &[]
+    }
+
     /// Points of the front, each of which solves a problem of its own; empty where the solver knows no more of them than
     /// that they were evaluated.
     fn front(&self) -> Vec<Vec<f64>> {

@@ -44,13 +44,14 @@ impl SolverOptions for AutoOptions {
     const KIND: &'static str = "auto";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Auto { options: self.clone(), stage: None })
+        Box::new(Auto { options: self.clone(), stage: None, methods: Vec::new() })
     }
 }
 
 struct Auto {
     options: AutoOptions,
     stage: Option<Stage>,
+    methods: Vec<&'static str>,
 }
 
 enum Stage {
@@ -88,12 +89,14 @@ impl Solver for Auto {
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         if oracle.shape().objective == Objective::Each {
-            let mut front = front(oracle.shape());
+            let (mut front, method) = front(oracle.shape());
+            self.ran(&[method]);
             front.begin(oracle, start)?;
             self.stage = Some(Stage::Front(front));
             return Ok(());
         }
-        let Choice { first, local } = choose(oracle, start)?;
+        let Choice { first, local, methods } = choose(oracle, start)?;
+        self.ran(methods);
         let global = Multistart::new(local, self.options.starts);
         let mut global = match first {
             _ if oracle.shape().residuals > 0 => global.until_nothing_changes(),
@@ -135,6 +138,10 @@ impl Solver for Auto {
         }
     }
 
+    fn methods(&self) -> &[&'static str] {
+        &self.methods
+    }
+
     fn members(&self) -> &[Vec<f64>] {
         match &self.stage {
             Some(Stage::Front(front)) => front.members(),
@@ -157,10 +164,16 @@ impl Standing {
 }
 
 impl Auto {
+    fn ran(&mut self, methods: &[&'static str]) {
+        let new: Vec<_> = methods.iter().filter(|method| !self.methods.contains(method)).collect();
+        self.methods.extend(new);
+    }
+
     /// A pattern search from the best point.
     fn polish(&mut self, oracle: &mut dyn Oracle, standing: Standing) -> Result<Progress, Halt> {
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
         let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
+        self.ran(&[PatternSearchOptions::KIND]);
         pattern.begin(oracle, &best)?;
         self.stage = Some(Stage::Polish(pattern, standing));
         Ok(Progress::Continue)
@@ -173,6 +186,7 @@ impl Auto {
             return Ok(standing.ending(progress));
         }
         let before = oracle.best().map_or(f64::INFINITY, |best| best.merit.objective);
+        self.ran(&[SqpOptions::KIND]);
         let mut around = Multistart::around(SqpOptions::default().build(), AROUND, SAME);
         if !around.begin_around(oracle)? {
             return Ok(standing.ending(progress));
@@ -188,49 +202,57 @@ fn gains(oracle: &dyn Oracle, before: f64) -> bool {
 }
 
 /// Few criteria are followed along their front; crowding spreads two objectives evenly, reference directions more of them.
-fn front(shape: &Shape) -> Box<dyn Solver> {
+fn front(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
     let along = WeightedChebyshevOptions::default().build();
     if objectives <= 3 && shape.dimension() <= 50 && along.accepts(shape).is_ok() {
-        return along;
+        return (along, WeightedChebyshevOptions::KIND);
     }
-    if objectives <= 2 { Nsga2Options::default().build() } else { Nsga3Options::default().build() }
+    if objectives <= 2 {
+        (Nsga2Options::default().build(), Nsga2Options::KIND)
+    } else {
+        (Nsga3Options::default().build(), Nsga3Options::KIND)
+    }
 }
 
 /// What runs from several starts, and what from the study's own where that is something else.
 struct Choice {
     first: Option<Box<dyn Solver>>,
     local: Box<dyn Solver>,
+    methods: &'static [&'static str],
 }
 
-impl From<Box<dyn Solver>> for Choice {
-    fn from(local: Box<dyn Solver>) -> Self {
-        Self { first: None, local }
+impl Choice {
+    fn of(local: Box<dyn Solver>, methods: &'static [&'static str]) -> Self {
+        Self { first: None, local, methods }
     }
 }
 
 /// The local solver of a problem.
 fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     let shape = oracle.shape().clone();
+    let pattern = || Choice::of(PatternSearchOptions::default().build(), &[PatternSearchOptions::KIND]);
     // The starts are counted here, not in the chosen solver.
     let least_squares = LevenbergMarquardtOptions::default().local();
     if least_squares.accepts(&shape).is_ok() {
-        return Ok(least_squares.into());
+        return Ok(Choice::of(least_squares, &[LevenbergMarquardtOptions::KIND]));
     }
     let sqp = SqpOptions::default().build();
     if sqp.accepts(&shape).is_err() || start.is_empty() {
-        return Ok(PatternSearchOptions::default().build().into());
+        return Ok(pattern());
     }
     // Where there are several rows a kink is mostly one between them; they are not looked at.
     let one = Box::new(QuasiNewton::default());
     if one.accepts(&shape).is_err() {
-        return Ok(sqp.into());
+        return Ok(Choice::of(sqp, &[SqpOptions::KIND]));
     }
     Ok(match texture(oracle, start)? {
-        Texture::Noisy => PatternSearchOptions::default().build().into(),
-        Texture::Kinked => sqp.into(),
-        Texture::Smooth => {
-            Choice { first: Some(Box::new(SecondOpinion::default())), local: Box::new(Relay::new(one, sqp)) }
-        }
+        Texture::Noisy => pattern(),
+        Texture::Kinked => Choice::of(sqp, &[SqpOptions::KIND]),
+        Texture::Smooth => Choice {
+            first: Some(Box::new(SecondOpinion::default())),
+            local: Box::new(Relay::new(one, sqp)),
+            methods: &[PatternSearchOptions::KIND, "bfgs", SqpOptions::KIND],
+        },
     })
 }

@@ -50,6 +50,16 @@ pub(super) fn within(limit: Limit) -> Cancellation {
     cancellation
 }
 
+/// Ends the program after the limit with an error: for what has nothing to tell before it is done, and writes whole files.
+pub(super) fn or_end(limit: Limit) {
+    let Some(limit) = limit.time_limit else { return };
+    let _ = thread::Builder::new().spawn(move || {
+        thread::sleep(limit);
+        say(&format!("error: the time limit of {} s came before it was done", limit.as_secs_f64()));
+        std::process::exit(3);
+    });
+}
+
 fn wait(limit: Limit, cancellation: &Cancellation) {
     let Some(limit) = limit.time_limit else { return };
     let of_clock = cancellation.clone();

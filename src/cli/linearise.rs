@@ -18,6 +18,7 @@ use serde_json::{Value, json};
 
 use self::feedback::Wanted;
 use self::text::MANY;
+use super::limits::{Limit, or_end};
 use super::study::{StudyArguments, open};
 use super::{Trouble, print};
 
@@ -54,12 +55,15 @@ pub(super) struct Arguments {
     /// State feedback u = -K x by linear-quadratic optimisation: weights of the states, then of the inputs.
     #[arg(long, value_name = "WEIGHTS", conflicts_with = "place")]
     lqr: Option<String>,
+    #[command(flatten)]
+    limit: Limit,
     /// Folder for the plots and linearised.json; nothing is written where absent.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+    or_end(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
     let (job, model) = chosen(&study, arguments)?;
     let (name, case) = (&study.models[model].0, &study.cases[study.jobs[job].case]);

@@ -156,7 +156,7 @@ fn header(report: &Report<'_>) -> Markup {
                 @if let Some(found) = report.diagnosis {
                     @for (name, value) in diagnosis::facts(found) { (fact(&name, &value)) }
                 } @else {
-                    (fact("Solver", &outcome.solver))
+                    (fact("Solver", &verdict::solver(outcome)))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
                     @if let Some(reused) = outcome.reused { (fact("Known before", &reused.to_string())) }
                 }
@@ -166,7 +166,7 @@ fn header(report: &Report<'_>) -> Markup {
             }
             @if report.diagnosis.is_none() { dl class="long" {
                 (fact("Stopped", verdict::stop(outcome)))
-                @if outcome.task == Task::Design { (fact("Pareto", verdict::pareto(outcome.pareto))) }
+                @if outcome.task == Task::Design && outcome.feasible { (fact("Pareto", verdict::pareto(outcome.pareto))) }
             } }
         }
     }

@@ -107,6 +107,7 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
         seed: 1,
         run: None,
         solver: "by-hand".into(),
+        methods: vec!["sqp", "pattern-search"],
         stop: Stop::Converged,
         evaluations: 2,
         reused: None,
@@ -214,7 +215,9 @@ fn the_page_shows_every_criterion_and_escapes_what_users_write() {
 #[test]
 fn an_infeasible_result_names_the_constraint_and_a_failed_start_is_told() {
     let (_folder, page) = written("lag", 15.0, Usage::Inequality);
-    assert!(page.contains("Infeasible: <code>end</code> in case <code>"));
+    assert!(page.contains("No feasible point was found: <code>end</code> in case <code>"));
+    // What a solver by itself has run is said; whether a point that misses a constraint is Pareto-optimal is no question.
+    assert!(page.contains("by-hand: sqp, pattern-search") && !page.contains("<dt>Pareto"));
     assert!(page.contains("No response at the start values: the simulation failed (diverged at 0.1000 s)."));
     assert!(page.contains("1 of 2 points had no value"));
 }

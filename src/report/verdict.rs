@@ -41,7 +41,7 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
         } else {
             String::new()
         };
-        return (Tone::Bad, format!("Infeasible: {what}.{more}"));
+        return (Tone::Bad, format!("No feasible point was found: {what}.{more}"));
     }
     match outcome.task {
         Task::Design => design(report),
@@ -185,13 +185,22 @@ pub(super) fn stop(outcome: &Outcome) -> &'static str {
     }
 }
 
+/// The solver, and those that it has run.
+pub(super) fn solver(outcome: &Outcome) -> String {
+    if outcome.methods.is_empty() {
+        outcome.solver.clone()
+    } else {
+        format!("{}: {}", outcome.solver, outcome.methods.join(", "))
+    }
+}
+
 /// The Pareto status, in words.
 pub(super) fn pareto(pareto: Pareto) -> &'static str {
     match pareto {
         Pareto::CertifiedLocal => {
             "Pareto-optimal to first order: near this point no criterion can be improved at no cost to another"
         }
-        Pareto::NotShown => "not shown: another point may be better in one criterion and as good in all others",
+        Pareto::NotShown => "not certified: another point may be better in one criterion and as good in all others",
         Pareto::No => "not Pareto-optimal: one criterion can be improved at no cost to the others",
     }
 }

@@ -26,10 +26,10 @@ impl Model for Watched {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        // The simulation at whose end the request comes has an answer, for which the criteria come too late.
         if self.simulations.fetch_add(1, Ordering::Relaxed) == self.last {
             self.cancellation.request(Halt::Budget);
-        }
-        if job.case.cancellation.requested().is_some() {
+        } else if job.case.cancellation.requested().is_some() {
             return Err(Failure::Cancelled);
         }
         let mut y = Trace::starting_at(0.0, 1);

@@ -10,6 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mops_core::{Cancellation, Diagnostic, Problem, Store, Study, Watch};
+use rusqlite::ErrorCode;
 
 use super::aside::make_room;
 use super::best::best;
@@ -390,5 +391,9 @@ fn same_folder(a: &Path, b: &Path) -> bool {
 }
 
 fn trouble(folder: &Path, error: &rusqlite::Error) -> Refusal {
+    if matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked)) {
+        let fact = format!("{} is locked by another program", file(folder).display());
+        return Diagnostic::new(fact).with_help("close it there, or choose another folder with --out").into();
+    }
     Refusal::Failure(format!("{}: {error}", file(folder).display()))
 }

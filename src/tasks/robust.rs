@@ -231,7 +231,7 @@ impl Rounds {
         let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
         let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, pareto, seconds: 0.0 });
         drop(run);
-        outcome.failures = last.outcome.failures;
+        (outcome.failures, outcome.methods) = (last.outcome.failures, last.outcome.methods);
         let question = Question { samples: 1, starts: 1 };
         let region = Region::new(&self.study, design, |_| true, question);
         let mut report = RobustReport {

@@ -66,6 +66,10 @@ pub struct Block {
     pub right: Vec<Id>,
 }
 
+/// Factors up to which a product within a product is taken apart; one of more is a single factor. A definition that squares
+/// the one before has `2^n` of them, and no model that is written by hand comes near.
+const TAKEN_APART: usize = 1000;
+
 /// All nodes.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
@@ -234,11 +238,12 @@ impl Graph {
         if self.constant(a).or(self.constant(b)).is_some() { self.mul(a, b) } else { self.add_op(Op::Mul(a, b)) }
     }
 
-    /// The factors of a product, in their order; what is none is its only factor.
-    fn factors(&self, id: Id) -> Vec<Id> {
-        let (mut found, mut stack) = (Vec::new(), vec![id]);
+    /// The factors of a product, in their order; what is none, or has too many, is its only factor.
+    fn factors(&self, product: Id) -> Vec<Id> {
+        let (mut found, mut stack) = (Vec::new(), vec![product]);
         while let Some(id) = stack.pop() {
             match self.op(id) {
+                Op::Mul(..) if found.len() + stack.len() > TAKEN_APART => return vec![product],
                 Op::Mul(a, b) => stack.extend([b, a]),
                 _ => found.push(id),
             }

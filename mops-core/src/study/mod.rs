@@ -159,9 +159,9 @@ pub struct JobPlan {
 }
 
 /// Where the value of a model's parameter comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum ParameterSource {
-    /// A number of the study, in the parameter's unit.
+    /// A number of the study, in the parameter's unit; not a number where the model computes it.
     Constant(f64),
     /// A tuner, times a factor that turns its unit into the parameter's.
     Tuner {
@@ -170,6 +170,17 @@ pub enum ParameterSource {
         /// Factor.
         factor: f64,
     },
+}
+
+/// Sources are equal by the bits of their numbers: one that the model computes is equal to itself.
+impl PartialEq for ParameterSource {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => a.to_bits() == b.to_bits(),
+            (Self::Tuner { tuner: a, factor: p }, Self::Tuner { tuner: b, factor: q }) => (a, p) == (b, q),
+            _ => false,
+        }
+    }
 }
 
 impl Study {

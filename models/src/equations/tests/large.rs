@@ -51,3 +51,30 @@ fn what_is_nested_within_definitions_is_refused_before_the_stack_ends() {
         assert!(mistake.message.contains("nested more than"), "{}", mistake.message);
     }
 }
+
+#[test]
+fn definitions_that_use_the_one_before_several_times_cost_no_more_than_their_texts() {
+    // All of them leave 1 as it is.
+    let kinds = [
+        "A*A",
+        "A^2",
+        "A^4",
+        "A*A/A",
+        "1/(A*A)",
+        "(A + A)/2",
+        "2*A - A*A",
+        "sqrt(A*A*A)",
+        "max(A, 2 - A)",
+        "if(A > 0, A, -A*A)",
+        "table(A, 0, 0, 2, A + A)",
+        "sin(A)^2 + cos(A)^2",
+    ];
+    for kind in kinds {
+        let level = |i: usize| format!("a{} = \"{}\"\n", i + 1, kind.replace('A', &format!("a{i}")));
+        let lets: String = (0..120).map(level).collect();
+        let tables = "states = { x = \"1\", y = \"1\" }\nstart = { x = 1.0, y = 1.0 }\nhorizon = \"1 s\"";
+        let text = format!("{tables}\nder = {{ x = \"-x*a120\", y = \"0\" }}\n[let]\na0 = \"y\"\n{lets}");
+        let end = respond(&model(&text), &[], &[], 1.0).trace("x").unwrap().last();
+        assert!((end - (-1f64).exp()).abs() < 1e-6, "{end}: {kind}");
+    }
+}
