@@ -36,7 +36,7 @@ pub(super) struct Common {
     /// Seed of all random numbers.
     #[arg(long)]
     seed: Option<u64>,
-    /// Number of threads; all cores where absent. The result is the same, bit for bit.
+    /// Number of threads; all cores where absent. The result is the same, bit for bit, with any number and on any processor.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     #[command(flatten)]
