@@ -1,5 +1,6 @@
 //! What ends, bounds or refuses a run or a file: signals, limits of time and memory, devices, long lines, control characters.
 
+use std::collections::HashSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -381,4 +382,37 @@ fn a_linearisation_ends_with_its_time_limit() {
     assert!(said(&output).contains("the time limit of 0.02 s came before it was done"), "{}", said(&output));
     assert!(!root.path().join("out").exists());
     assert_eq!(mops(&["check", "study.toml"], root.path()).status.code(), Some(0));
+}
+
+#[test]
+fn cases_that_file_names_cannot_tell_apart_have_files_of_their_own() {
+    let root = tempfile::tempdir().unwrap();
+    let names = ["load 0.5", "load 0.6", "load-0.5", "LOAD 0.5", "a/b", "a-b"];
+    let cases: String = names.iter().map(|name| format!("\"{name}\" = {{ a = 0.0, b = -4.0, c = -1.0 }}\n")).collect();
+    let text = fs::read_to_string("studies/pid-design/study.toml").unwrap();
+    let case = text.lines().find(|line| line.starts_with("nominal")).unwrap();
+    fs::write(root.path().join("study.toml"), text.replacen(case, &cases, 1)).unwrap();
+    let output = mops(&["simulate", "study.toml", "--out", "out", "--samples", "3"], root.path());
+    assert!(output.status.success(), "{}", said(&output));
+    // One table for each of the six cases, one plot for each of the five signals in each.
+    for (end, count) in [(".csv", 6), (".svg", 30), (".png", 30)] {
+        let files = fs::read_dir(root.path().join("out")).unwrap();
+        let names: HashSet<String> = files
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().to_lowercase())
+            .filter(|file| file.ends_with(end))
+            .collect();
+        assert_eq!(names.len(), count, "{end}: {names:?}");
+    }
+}
+
+#[test]
+fn a_run_that_is_refused_leaves_no_folder() {
+    let root = tempfile::tempdir().unwrap();
+    for more in
+        [&["--reuse", "nowhere"][..], &["--solver", "nonsense"], &["--set", "study.task=excitation", "--resume"]]
+    {
+        let output = mops(&[&["run", "tank-level", "--out", "out"], more].concat(), root.path());
+        assert_eq!(output.status.code(), Some(2), "{more:?}: {}", said(&output));
+        assert!(!root.path().join("out").exists(), "{more:?}");
+    }
 }

@@ -13,7 +13,7 @@ use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
 use super::{Trouble, cannot_write, print};
 use crate::files;
-use crate::report::{Curve, Ink, Plot, file_name, points};
+use crate::report::{Curve, FileNames, Ink, Plot, points};
 
 /// What is simulated.
 #[derive(Args)]
@@ -64,6 +64,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .iter()
         .filter(|(job, why)| matches!(why, Failure::Criterion(_)) && wanted(&study.cases[study.jobs[*job].case].name));
     let mut failed = here.scaled.is_none();
+    let mut names = FileNames::default();
     for (job, why) in criteria {
         print(&format!("no value in case {}: {why}\n", study.cases[study.jobs[*job].case].name))?;
     }
@@ -83,7 +84,9 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
             Ok(Analysis::Time(response)) => {
                 print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)))?;
                 if let Some(folder) = &arguments.out {
-                    write(folder, &format!("{model}-{case}"), study, plan.model, &response, arguments.samples)?;
+                    let run =
+                        Simulated { name: format!("{model}-{case}"), study, model: plan.model, response: &response };
+                    run.write(folder, arguments.samples, &mut names)?;
                 }
             }
         }
@@ -164,52 +167,59 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     text
 }
 
-fn write(
-    folder: &Path,
-    name: &str,
-    study: &Study,
+/// A simulation, and the name of its files.
+struct Simulated<'a> {
+    name: String,
+    study: &'a Study,
     model: usize,
-    response: &Response,
-    samples: u32,
-) -> Result<(), Trouble> {
-    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
-    let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
-    let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
-    let units = &study.models[model].1.interface().signals;
-    let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
-    let path = folder.join(file_name(name) + ".csv");
-    let written = files::write_csv(&path, |writer| {
-        let names = response.traces.iter().zip(units).map(|((name, _), s)| format!("{name}[{}]", s.unit));
-        writer.write_record(["t[s]".to_owned()].into_iter().chain(names))?;
-        for (i, t) in times.iter().enumerate() {
-            writer.write_record([t].into_iter().chain(columns.iter().map(|c| &c[i])).map(f64::to_string))?;
+    response: &'a Response,
+}
+
+impl Simulated<'_> {
+    /// Writes samples and plots, under names that no other simulation has.
+    fn write(&self, folder: &Path, samples: u32, names: &mut FileNames) -> Result<(), Trouble> {
+        let Self { name, study, model, response } = self;
+        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+        let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
+        let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
+        let units = &study.models[*model].1.interface().signals;
+        let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
+        let path = folder.join(names.unique(name) + ".csv");
+        let written = files::write_csv(&path, |writer| {
+            let names = response.traces.iter().zip(units).map(|((name, _), s)| format!("{name}[{}]", s.unit));
+            writer.write_record(["t[s]".to_owned()].into_iter().chain(names))?;
+            for (i, t) in times.iter().enumerate() {
+                writer.write_record([t].into_iter().chain(columns.iter().map(|c| &c[i])).map(f64::to_string))?;
+            }
+            Ok(())
+        });
+        written.map_err(cannot_write(&path))?;
+        let signals: Vec<&str> = response.traces.iter().map(|(signal, _)| signal.as_str()).collect();
+        for family in runs(&signals) {
+            let (first, last) = (family.start, family.end - 1);
+            let (signal, variable) = (spelled(signals[first], signals[last]), &units[first]);
+            let curve = |(i, place): (usize, usize)| Curve {
+                name: signals[place].to_owned(),
+                points: points(&response.traces[place].1),
+                ink: if first == last { Ink::Result } else { Ink::Series(i) },
+                ..Curve::default()
+            };
+            let plot = Plot {
+                title: if variable.about.is_empty() { signal.clone() } else { format!("{signal}: {}", variable.about) },
+                x_label: "time (s)".into(),
+                y_label: format!("{signal} ({})", variable.unit),
+                curves: spread(first, last).into_iter().enumerate().map(curve).collect(),
+                ..Plot::default()
+            };
+            let file =
+                if first == last { signal } else { signals[first].split('[').next().unwrap_or_default().to_owned() };
+            let file = names.unique(&format!("{name}-{file}"));
+            let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
+            files::write(&svg, plot.svg()).map_err(cannot_write(&svg))?;
+            plot.write_png(&png).map_err(cannot_write(&png))?;
         }
         Ok(())
-    });
-    written.map_err(cannot_write(&path))?;
-    let names: Vec<&str> = response.traces.iter().map(|(signal, _)| signal.as_str()).collect();
-    for family in runs(&names) {
-        let (first, last) = (family.start, family.end - 1);
-        let (signal, variable) = (spelled(names[first], names[last]), &units[first]);
-        let curve = |(i, place): (usize, usize)| Curve {
-            name: names[place].to_owned(),
-            points: points(&response.traces[place].1),
-            ink: if first == last { Ink::Result } else { Ink::Series(i) },
-            ..Curve::default()
-        };
-        let plot = Plot {
-            title: if variable.about.is_empty() { signal.clone() } else { format!("{signal}: {}", variable.about) },
-            x_label: "time (s)".into(),
-            y_label: format!("{signal} ({})", variable.unit),
-            curves: spread(first, last).into_iter().enumerate().map(curve).collect(),
-            ..Plot::default()
-        };
-        let file = if first == last { signal } else { names[first].split('[').next().unwrap_or_default().to_owned() };
-        let path = folder.join(file_name(&format!("{name}-{file}")));
-        files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
-        plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
     }
-    Ok(())
 }
 
 /// At most six places from `first` to `last`, evenly spread, both ends among them.

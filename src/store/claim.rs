@@ -17,6 +17,8 @@ const TRIED: Duration = Duration::from_millis(300);
 pub(crate) struct Claim {
     folder: PathBuf,
     file: File,
+    /// Whether the folder was not there before.
+    made: bool,
 }
 
 impl Claim {
@@ -25,6 +27,7 @@ impl Claim {
     /// # Errors
     /// The folder or the file cannot be made.
     pub fn take(folder: &Path) -> io::Result<Option<Self>> {
+        let made = !folder.exists();
         fs::create_dir_all(folder)?;
         let until = Instant::now() + TRIED;
         loop {
@@ -33,7 +36,9 @@ impl Claim {
                 // Who had the name before may have removed it meanwhile: then this lock keeps nobody away.
                 Ok(()) if !is_named(&file, &folder.join(FILE)) => {}
                 // A file system without locks: two runs at once are the user's care.
-                Ok(()) | Err(TryLockError::Error(_)) => return Ok(Some(Self { folder: folder.to_owned(), file })),
+                Ok(()) | Err(TryLockError::Error(_)) => {
+                    return Ok(Some(Self { folder: folder.to_owned(), file, made }));
+                }
                 Err(TryLockError::WouldBlock) if Instant::now() > until => return Ok(None),
                 Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(10)),
             }
@@ -95,6 +100,10 @@ impl Drop for Claim {
         // The name goes before the lock does, so that nobody takes a file that is about to vanish.
         if self.holds() {
             let _ = fs::remove_file(self.folder.join(FILE));
+            if self.made {
+                // A folder with something in it stays.
+                let _ = fs::remove_dir(&self.folder);
+            }
         }
     }
 }
@@ -112,8 +121,10 @@ mod tests {
         assert!(Claim::take(&folder).unwrap().is_none());
         drop(claim);
         assert!(!Claim::is_held(&folder));
-        assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+        assert!(!folder.exists());
+        fs::create_dir(&folder).unwrap();
         drop(Claim::take(&folder).unwrap().unwrap());
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
         assert!(!Claim::is_held(&root.path().join("nowhere")));
     }
 
@@ -147,6 +158,6 @@ mod tests {
         drop(claim);
         assert!(Claim::is_held(&folder));
         drop(other);
-        assert!(!folder.join(FILE).exists());
+        assert!(!folder.exists());
     }
 }

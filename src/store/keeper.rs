@@ -277,13 +277,9 @@ impl Opened {
         let Self { database, new, claim, .. } = self;
         drop(database);
         let Some(claim) = claim else { return };
-        let folder = claim.folder().to_owned();
         if new {
-            let _ = fs::remove_file(file(&folder));
+            let _ = fs::remove_file(file(claim.folder()));
         }
-        drop(claim);
-        // A folder with something in it stays.
-        let _ = fs::remove_dir(&folder);
     }
 }
 

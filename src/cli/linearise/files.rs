@@ -6,7 +6,7 @@ use mops_core::StateSpace;
 use serde_json::Value;
 
 use crate::cli::{Trouble, cannot_write, linear_plots};
-use crate::report::file_name;
+use crate::report::FileNames;
 
 /// Writes the files; returns a sentence on what is there, and notes on what is not.
 ///
@@ -17,7 +17,7 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
     let path = folder.join("linearised.json");
     let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
     crate::files::write(&path, text).map_err(cannot_write(&path))?;
-    let (mut written, mut notes) = (0, String::new());
+    let (mut written, mut notes, mut names) = (0, String::new(), FileNames::default());
     for i in 0..system.inputs.len() {
         for o in 0..system.outputs.len() {
             let channel = system.channel(i, o);
@@ -30,9 +30,10 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
                         continue;
                     }
                 };
-                let path = folder.join(file_name(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0])));
-                crate::files::write(&path.with_extension("svg"), plot.svg()).map_err(cannot_write(&path))?;
-                plot.write_png(&path.with_extension("png")).map_err(cannot_write(&path))?;
+                let file = names.unique(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0]));
+                let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
+                crate::files::write(&svg, plot.svg()).map_err(cannot_write(&svg))?;
+                plot.write_png(&png).map_err(cannot_write(&png))?;
                 written += 1;
             }
         }
