@@ -423,13 +423,13 @@ const EQUATIONS: &str = r#"[study]
 name = "rig"
 
 [models.rig.equations]
-states     = { th = "rad", w = "rad/s", T = "K" }
+states     = { th = "rad", w = "rad/s", T = "J" }
 inputs     = { u = "N m" }
 parameters = { J = "kg m2", b = "N m s/rad" }
 constants  = { g = "9.81 m/s2" }
-let        = { load = "2*sin(th)", heat = "b*w^2" }
-der        = { th = "w", w = "J*w' = u - load - b*w", T = "heat - T" }
-start      = { T = "20 K" }
+let        = { load = "2*sin(th)*1 [N m]", heat = "b*w^2" }
+der        = { th = "w", w = "J*w' = u - load - b*w", T = "heat - T/1 [s]" }
+start      = { T = "20 J" }
 friction.w = { coulomb = 0.1 }
 when.hit   = { guard = "1 - th", reset = { w = "-w" } }
 horizon    = "3 s"
@@ -460,24 +460,24 @@ fn models_from_text_that_are_wrong() {
             equations("a condition as a number", "2*sin(th)", "2*(th > 1)"),
             equations("a number as a condition", "2*sin(th)", "if(th, 1, 2)"),
             equations("an unknown unit", "kg m2", "kg mm2x"),
-            equations("a start value in another unit", "20 K", "20 V"),
+            equations("a start value in another unit", "20 J", "20 V"),
             equations("definitions in a circle", "2*sin(th)", "heat + load"),
-            equations("a state without derivative", ", T = \"heat - T\"", ""),
-            equations("a derivative of something else", "T = \"heat - T\"", "T = \"heat - T\", u = \"1\""),
+            equations("a state without derivative", ", T = \"heat - T/1 [s]\"", ""),
+            equations("a derivative of something else", "T = \"heat - T/1 [s]\"", "T = \"heat - T/1 [s]\", u = \"1\""),
             equations("the derivative of a parameter", "J*w' =", "b*J' ="),
             equations("an equation that is not linear in the derivatives", "J*w' =", "w'^2 ="),
             equations("an equation without a derivative", "J*w' =", "J ="),
-            equations("equations that leave a derivative open", "T = \"heat - T\"", "T = \"w' = T\""),
+            equations("equations that leave a derivative open", "T = \"heat - T/1 [s]\"", "T = \"w' = T\""),
             equations("an equation where none belongs", "2*sin(th)", "x = 2*sin(th)"),
             equations("a name given twice", "b = \"N m s/rad\"", "b = \"N m s/rad\", u = \"1\""),
             equations("a name with a meaning of its own", "b = \"N m s/rad\"", "b = \"N m s/rad\", time = \"s\""),
             equations("a name that is no name", "g = \"9.81", "g-n = \"9.81"),
-            equations("a start value that changes", "20 K", "2*th"),
+            equations("a start value that changes", "20 J", "2*th"),
             equations("friction of something else", "friction.w", "friction.T"),
             equations("an event that resets no state", "w = \"-w\"", "v = \"-w\""),
             equations("a mass matrix with one name", "start      =", "mass = { w = 1 }\nstart      ="),
-            equations("a family without ends", "T = \"K\"", "\"T[1..3]\" = \"K\""),
-            equations("a bracket in a key", "T = \"K\"", "\"T[1..\" = \"K\""),
+            equations("a family without ends", "T = \"J\"", "\"T[1..3]\" = \"J\""),
+            equations("a bracket in a key", "T = \"J\"", "\"T[1..\" = \"J\""),
             equations("a number that is no expression", "2*sin(th)", "2 sin(th)"),
         ],
     );

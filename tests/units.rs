@@ -194,7 +194,7 @@ fn ties_are_computed_and_checked_in_coherent_units() {
     for (tie, fact) in [
         ("2*v", "expected a quantity in s, found one in m/s"),
         ("a + v", "expected a quantity in s, found one in m/s"),
-        ("a + 5", "beside `a` in ms stands a number without a unit"),
+        ("a + 5", "a number without a unit beside `a`, which is in ms"),
         ("exp(a)", "`exp` takes a pure number, found a quantity in s"),
     ] {
         let folder = study(&text(tie), "");
@@ -218,4 +218,41 @@ fn parameters_of_linear_systems_are_converted_and_their_entries_checked() {
     let folder = study(&text("kN/m", "-(k + m)"), "");
     let (code, output) = mops(folder.path(), &["check", "study.toml"]);
     assert!(code == 2 && output.contains("expected a quantity in N/m, found one in kg"), "{output}");
+}
+
+#[test]
+fn a_frequency_in_hertz_is_one_in_rad_per_second_in_ties_and_cases_too() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = '1' }\nparameters = { f = 'rad/s', w = 'rad/s' }\n\
+                der = { x = '0' }\noutputs = { y = 'w' }\nhorizon = '1 s'\n\
+                [tuners]\nf = { start = 5, min = 1, max = 10, unit = 'Hz' }\nw = { tie = 'f' }\n\
+                [criteria]\ny = { final-value = { signal = 'y' }, demand = 1 }\n";
+    assert!((values(text, "")[0].1 - 10.0 * std::f64::consts::PI).abs() < 1e-12);
+}
+
+#[test]
+fn a_case_gives_each_model_its_parameter_in_the_unit_of_the_model() {
+    let text = |second: &str| {
+        let model = |unit: &str| {
+            format!(
+                "equations = {{ states = {{ x = '1' }}, parameters = {{ k = '{unit}' }}, der = {{ x = '0' }}, \
+                 outputs = {{ y = {{ value = 'k', unit = '{unit}' }} }}, horizon = '1 s' }}\n"
+            )
+        };
+        let criterion =
+            |model: &str| format!("{model} = {{ model = '{model}', final-value = {{ signal = 'y' }}, demand = 1 }}\n");
+        format!(
+            "[study]\nname = 'm'\n[models.a]\n{}[models.b]\n{}[tuners]\nd = {{ start = 1, min = 0, max = 2 }}\n\
+             [cases]\nc = {{ k = '8 kN/m' }}\n[criteria]\n{}{}",
+            model("N/m"),
+            model(second),
+            criterion("a"),
+            criterion("b")
+        )
+        .replace("parameters = {", "parameters = { d = '1',")
+    };
+    let found = values(&text("kN/m"), "");
+    assert!((found[0].1 - 8000.0).abs() < 1e-9 && (found[1].1 - 8.0).abs() < 1e-12, "{found:?}");
+    let folder = study(&text("s"), "");
+    let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+    assert!(code == 2 && output.contains("`k` is in N/m in one model and in s in another"), "{output}");
 }

@@ -1,6 +1,7 @@
 //! What models share that are linear systems from the start: matrices over the scalar, their tangents, expressions in them.
 
 use std::fmt;
+use std::ops::Range;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
 use mops_core::expression::{Form, Node};
@@ -193,6 +194,7 @@ impl Units<'_> {
         parameters: &[String],
         signals: &[String],
         entries: impl IntoIterator<Item = &'e Bound>,
+        delay: Option<&Bound>,
     ) -> Result<(), Mistake> {
         let known: Vec<&str> = parameters.iter().chain(signals).map(String::as_str).collect();
         for (name, unit) in self.0 {
@@ -204,8 +206,9 @@ impl Units<'_> {
             let unit =
                 Unit::parse(unit).map_err(|why| wrong(why, "as in units = { k = \"N/m\", m = \"kg\" }".to_owned()))?;
             if signals.contains(name) && !unit.is_coherent() {
-                let help = format!("declare it in {}, in which its coefficients are", unit.dimension());
-                return Err(wrong(format!("a linear system has no signal in {unit}"), help));
+                let si = if unit.is_angle() { "rad".to_owned() } else { unit.dimension().coherent() };
+                let help = format!("declare it in {si}: coefficients are in SI units");
+                return Err(wrong(format!("`{name}` of a linear system must be in an SI unit, found {unit}"), help));
             }
         }
         let mut dimensions = Dimensions::default();
@@ -214,7 +217,11 @@ impl Units<'_> {
             None => dimensions.open(name),
         };
         let mut named = Named(parameters.iter().cloned().zip(parameters.iter().map(measure)).collect());
-        entries.into_iter().try_for_each(|entry| dimensions.measure(&mut named, entry.expression.root()).map(|_| ()))
+        for entry in entries {
+            dimensions.measure(&mut named, entry.expression.root())?;
+        }
+        let second = Measure::declared("delay", &Unit::known("s"));
+        delay.map_or(Ok(()), |delay| dimensions.fits(&mut named, &second, delay.expression.root(), "a delay is a time"))
     }
 
     /// The unit of a name, as text.
@@ -243,7 +250,7 @@ impl Quantities for Named {
         None
     }
 
-    fn counts(&mut self, _: &Node, _: Open) {}
+    fn counts(&mut self, _: String, _: Range<usize>, _: Open) {}
 
     fn refuse(&self, Conflict { fact, help, .. }: Conflict) -> Mistake {
         Mistake::new("units", format!("in an entry of the system {fact}")).with_help(help)

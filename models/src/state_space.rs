@@ -84,8 +84,8 @@ impl ModelOptions for StateSpaceOptions {
         let delay = self.delay.map(|delay| Bound::new(&delay, &mut names));
         let units: Vec<(String, String)> = self.units.into_iter().collect();
         let units = Units(&units);
-        let entries = matrices.iter().flatten().flatten().chain(&delay);
-        units.check(&names, &[inputs.clone(), outputs.clone()].concat(), entries)?;
+        let entries = matrices.iter().flatten().flatten();
+        units.check(&names, &[inputs.clone(), outputs.clone()].concat(), entries, delay.as_ref())?;
         let variables = |names: &[String], about: &str| -> Vec<Variable> {
             names.iter().map(|name| Variable::new(name, units.of(name), about)).collect()
         };

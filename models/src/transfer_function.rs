@@ -105,7 +105,7 @@ impl ModelOptions for TransferFunctionOptions {
             Form::Coefficients { numerator, denominator } => numerator.iter().chain(denominator).collect(),
             Form::Roots { zeros, poles, gain } => zeros.iter().chain(poles).chain(gain).collect(),
         };
-        units.check(&names, &[input.clone(), output.clone()], entries.into_iter().chain(&delay))?;
+        units.check(&names, &[input.clone(), output.clone()], entries, delay.as_ref())?;
         let interface = Interface {
             signals: vec![Variable::new(&output, units.of(&output), "output of the system")],
             inputs: vec![Variable::new(&input, units.of(&input), "input of the system")],

@@ -33,7 +33,7 @@ impl Model for Watched {
             return Err(Failure::Cancelled);
         }
         let mut y = Trace::starting_at(0.0, 1);
-        y.push(1.0, Trace::NODES.map(|s| s + (job.parameters[0] - 1.0).powi(2) * s * (1.0 - s)));
+        y.push(1.0, Trace::NODES.map(|s| s + mops_core::math::powi(job.parameters[0] - 1.0, 2) * s * (1.0 - s)));
         Ok(Analysis::Time(Response { traces: vec![("y".into(), y)], ..Response::default() }))
     }
 }

@@ -99,9 +99,11 @@ impl TomlText {
         let path = owned(path);
         let Some(entry) = entries.iter().find(|entry| entry.path == path) else { return };
         let within = |e: &&Entry| matches!(&e.form, Form::Inline(span) if span.contains(&entry.key.start));
-        if entries.iter().filter(|e| e.path.len() < path.len()).find(within).is_some() {
+        let braces = entries.iter().filter(|e| e.path.len() < path.len()).filter(within).map(|e| e.path.len()).max();
+        if let Some(braces) = braces {
             let (Form::Value(span) | Form::Inline(span)) = &entry.form else { return };
-            let (mut start, mut end) = (entry.key.start, span.end);
+            let dotted = path.len() - braces - 1;
+            let (mut start, mut end) = (self.start_of_keys(entry.key.start, dotted), span.end);
             let rest = self.0[end..].len() - self.0[end..].trim_start().trim_start_matches(',').trim_start().len();
             if self.0[end..end + rest].contains(',') {
                 end += rest;
@@ -131,6 +133,25 @@ impl TomlText {
                 self.0.insert_str(start, &format!("# {}\n", line(why)));
             }
         }
+    }
+
+    /// Where keys joined by dots begin, of which the last one begins at `last`, with `more` before it.
+    fn start_of_keys(&self, last: usize, more: usize) -> usize {
+        (0..more).fold(last, |start, _| {
+            let key = self.0[..start].trim_end().trim_end_matches('.').trim_end();
+            match key.chars().next_back() {
+                Some(quote @ ('"' | '\'')) => {
+                    let inner = &key[..key.len() - 1];
+                    let slashes = |at: usize| at - inner[..at].trim_end_matches('\\').len();
+                    let escaped = |at: usize| quote == '"' && slashes(at) % 2 == 1;
+                    inner.rmatch_indices(quote).map(|(at, _)| at).find(|&at| !escaped(at)).unwrap_or(0)
+                }
+                _ => {
+                    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+                    key.trim_end_matches(bare).len()
+                }
+            }
+        })
     }
 
     /// The start of the line after a place.

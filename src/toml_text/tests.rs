@@ -140,6 +140,21 @@ fn inline(value: &Value) -> String {
     }
 }
 
+#[test]
+fn a_value_written_with_dots_within_braces_is_replaced_as_a_whole() {
+    for (text, path, value, expected) in [
+        ("b = { a.a = 0 }", ["b", "a"], "1", "b = { a = 1 }"),
+        ("b = { a.a = 0, c = 2 }", ["b", "a"], "1", "b = { c = 2, a = 1 }"),
+        ("b = { c = 2, a . \"x\\\" y\".'z' = 0 }", ["b", "a"], "1", "b = { c = 2, a = 1 }"),
+        ("b = { a.x = 0, a.y = 3 }", ["b", "a"], "1", "b = { a = 1 }"),
+    ] {
+        let mut edited = TomlText(text.to_owned());
+        edited.set(&path, value);
+        let parsed = |text: &str| text.parse::<Table>().unwrap();
+        assert_eq!(parsed(&edited.0), parsed(expected), "{text}: {}", edited.0);
+    }
+}
+
 /// What a study is with a setting over it.
 fn merged(into: &mut Table, from: &Table) {
     for (key, value) in from {

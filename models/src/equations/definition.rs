@@ -1,6 +1,7 @@
 //! What the tables say, with every family unrolled and every expression read.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use mops_core::expression::{Equation, Form, equation};
@@ -152,11 +153,15 @@ impl Text {
 }
 
 impl Text {
-    /// Whether it is made of numbers without units alone.
+    /// Whether it is made of numbers without units alone; pi is in rad.
     pub(super) fn is_bare(&self) -> bool {
         let mut bare = self.equation.left.is_none();
         self.equation.right.walk(&mut |node| {
-            bare &= !matches!(node.form, Form::Name(_) | Form::Member(..) | Form::Rate(_) | Form::Quantity(..));
+            bare &= match node.form {
+                Form::Number(number) => number != PI,
+                Form::Name(_) | Form::Member(..) | Form::Rate(_) | Form::Quantity(..) => false,
+                _ => true,
+            };
         });
         bare
     }
@@ -190,7 +195,11 @@ impl Definition {
         }
         for (key, parameter) in &options.parameters.0 {
             let parameter = &parameter.0;
-            for quantity in declared("parameters", key, &parameter.unit, parameter.about.as_deref())? {
+            // Without a unit of its own it has that of its values, where they have one.
+            let given = [&parameter.default, &parameter.min, &parameter.max].into_iter().flatten();
+            let given = given.filter_map(|quantity| quantity.unit.as_ref()).next().map(ToString::to_string);
+            let unit = given.filter(|_| parameter.unit.trim().is_empty()).unwrap_or_else(|| parameter.unit.clone());
+            for quantity in declared("parameters", key, &unit, parameter.about.as_deref())? {
                 let value = |name: &str, given: &Option<Quantity>| {
                     let value = given.as_ref().map(|q| q.to(&quantity.unit)).transpose();
                     value.map_err(|why| {
@@ -251,21 +260,7 @@ impl Definition {
         let states = self.state_names();
         let states: Vec<&str> = states.iter().map(String::as_str).collect();
         self.der = by_state("der", &options.der.0, &states, Text::read)?;
-        self.start = by_state("start", &options.start.0, &states, |path, formula, index| {
-            let key = path.last().and_then(|key| Key::parse(key).ok());
-            let family = |name: &str| name.split('[').next().map(str::to_owned);
-            let state = self.states.iter().find(|s| family(&s.name) == key.as_ref().map(|key| key.name.clone()));
-            let plain = state.and_then(|s| Quantity::parse(&formula.0).ok().map(|q| (s, q)));
-            match plain.filter(|_| has_unit(&formula.0)) {
-                Some((state, quantity)) => {
-                    let value = quantity
-                        .to(&state.unit)
-                        .map_err(|why| under(&path, Mistake::here(why).with_help(counts_in(&state.unit))))?;
-                    Text::expression(path, &Formula(format!("{value:?}")), index)
-                }
-                None => Text::expression(path, formula, index),
-            }
-        })?;
+        self.start = by_state("start", &options.start.0, &states, Text::expression)?;
         for state in &self.states {
             if !self.der.contains_key(&state.name) {
                 return Err(under(
@@ -337,13 +332,6 @@ impl Definition {
 
 fn counts_in(unit: &Unit) -> String {
     format!("a number without a unit counts in `{unit}`")
-}
-
-/// `3 rad` and `20 degC`, not `2*m`.
-fn has_unit(text: &str) -> bool {
-    text.trim().split_once(' ').is_some_and(|(number, unit)| {
-        number.parse::<f64>().is_ok() && unit.trim_start().starts_with(char::is_alphabetic)
-    })
 }
 
 fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, Mistake> {

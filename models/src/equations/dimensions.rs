@@ -1,6 +1,7 @@
 //! Dimensions of the whole model: every expression is measured, and what has no unit gets one.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
 use mops_core::expression::{Form, Node};
@@ -50,13 +51,13 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
     let state = |name: &String| d.states.iter().position(|s| s.name == *name).expect("names of states were checked");
     for (row, column, text) in &d.mass {
         let mass = forces[state(row)].times(&model.rate(column), -1.0);
-        model.fits(&mass, text, "a mass times a derivative measures what `der` gives")?;
+        model.fits(&mass, text, "a mass times a derivative has the dimension of the equation")?;
     }
     for (k, (_, text)) in d.outputs.iter().enumerate() {
-        model.fits(&model.outputs[k].clone(), text, "an output measures what its unit says")?;
+        model.fits(&model.outputs[k].clone(), text, "an output has the dimension of its unit")?;
     }
     for (state, text) in d.start.iter().filter(|(_, text)| !text.is_bare()) {
-        model.fits(&model.names[state].clone(), text, "a start value measures what the state measures")?;
+        model.fits(&model.names[state].clone(), text, "a start value has the dimension of its state")?;
     }
     for friction in &d.friction {
         let of = state(&friction.of);
@@ -64,7 +65,7 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
         let force = &forces[velocity];
         let viscous = force.times(&model.names[&d.states[velocity].name], -1.0);
         let wanted = [
-            (&friction.coulomb, force, "dry friction measures what the terms of the equation measure"),
+            (&friction.coulomb, force, "dry friction has the dimension of the terms of the equation"),
             (&friction.viscous, &viscous, "viscous friction times the speed is a term of the equation"),
             (&friction.peak, &Measure::pure(), "a ratio is a pure number"),
         ];
@@ -75,11 +76,7 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
     for when in &d.when {
         model.measure(&when.guard)?;
         for (state, text) in when.resets.iter().chain(&when.at_rest) {
-            model.fits(
-                &model.names[state].clone(),
-                text,
-                "the new value of a state measures what the state measures",
-            )?;
+            model.fits(&model.names[state].clone(), text, "the new value of a state has its dimension")?;
         }
     }
     Ok(model.measured(&forces))
@@ -96,11 +93,21 @@ struct Model<'d> {
     constants: HashMap<&'d str, f64>,
     time: Measure,
     /// Numbers that count in coherent units, by their places and what they are.
-    counted: BTreeMap<(String, String), Open>,
+    counted: BTreeMap<(String, usize, String), Open>,
 }
 
 /// Whether everything in the model is declared as a pure number: then time is one, too.
 fn is_dimensionless(d: &Definition) -> bool {
+    let frictions = d.friction.iter().flat_map(|f| [&f.coulomb, &f.viscous, &f.peak]).flatten();
+    let events = d
+        .when
+        .iter()
+        .flat_map(|w| std::iter::once(&w.guard).chain(w.resets.iter().chain(&w.at_rest).map(|(_, text)| text)));
+    let texts = d.lets.iter().map(|(_, text)| text).chain(d.der.values()).chain(d.start.values());
+    let texts = texts.chain(d.outputs.iter().map(|(_, text)| text)).chain(d.mass.iter().map(|(.., text)| text));
+    if texts.chain(frictions).chain(events).any(has_units) {
+        return false;
+    }
     let outputs = d.outputs.iter().map(|(output, _)| output);
     let parameters = d.parameters.iter().map(|p| &p.quantity);
     let mut declared = d.states.iter().chain(&d.inputs).chain(parameters).chain(outputs).map(|q| &q.unit);
@@ -165,7 +172,7 @@ impl<'d> Model<'d> {
         }
         let has_mass = self.definition.mass.iter().any(|(row, ..)| row == state);
         let force = if has_mass { self.dimensions.open(&format!("der.{state}")) } else { self.rate(state) };
-        self.fits(&force, text, "a derivative measures what its state measures, per time")?;
+        self.fits(&force, text, "a derivative has the dimension of its state over time")?;
         Ok(force)
     }
 
@@ -182,7 +189,7 @@ impl<'d> Model<'d> {
         let output =
             |((q, _), measure): (&(Declared, Text), &Measure)| if q.open { unit(measure) } else { q.unit.clone() };
         let measured = |unit: &Unit| !unit.dimension().is_none();
-        let numbers = self.counted.iter().map(|((place, number), open)| {
+        let numbers = self.counted.iter().map(|((place, _, number), open)| {
             (format!("{number} in {{}} ({place})"), Unit::coherent(&self.dimensions.found(open)))
         });
         let numbers =
@@ -191,8 +198,8 @@ impl<'d> Model<'d> {
             names.iter().filter(|(_, unit)| measured(unit)).map(|(name, unit)| format!("`{name}` in {unit}")).collect();
         without.sort();
         let notes = [
-            ("numbers without units count in SI units", numbers.collect::<Vec<_>>()),
-            ("quantities declared without units have those that the equations ask for", without),
+            ("numbers without a unit, read in SI units", numbers.collect::<Vec<_>>()),
+            ("units found from the equations", without),
         ];
         let notes = notes.into_iter().filter(|(_, list)| !list.is_empty());
         Measured {
@@ -242,13 +249,15 @@ impl Quantities for Within<'_, '_> {
         match &self.text.index {
             #[allow(clippy::cast_precision_loss)]
             Some((index, k)) if index == name => Some(*k as f64),
-            _ => self.model.constants.get(name).copied(),
+            _ => self.model.constants.get(name).copied().or_else(|| {
+                let text = *self.model.lets.get(name)?;
+                text.is_bare().then(|| text.equation.right.evaluate(&|_: &str| f64::NAN))
+            }),
         }
     }
 
-    fn counts(&mut self, number: &Node, dimension: Open) {
-        let value = number.evaluate(&|_: &str| f64::NAN);
-        self.model.counted.insert((self.text.path.join("."), value.to_string()), dimension);
+    fn counts(&mut self, number: String, place: Range<usize>, dimension: Open) {
+        self.model.counted.insert((self.text.path.join("."), place.start, number), dimension);
     }
 
     fn refuse(&self, Conflict { span, fact, help }: Conflict) -> Mistake {
@@ -262,4 +271,15 @@ impl Within<'_, '_> {
     fn index(&self, node: &Node) -> i64 {
         node.evaluate(&|name: &str| self.constant(name).unwrap_or(f64::NAN)) as i64
     }
+}
+
+/// Whether a number in it has a unit that is no pure number.
+fn has_units(text: &Text) -> bool {
+    let mut found = false;
+    for side in text.equation.left.iter().chain(std::iter::once(&text.equation.right)) {
+        side.walk(&mut |node| {
+            found |= matches!(&node.form, Form::Quantity(_, unit) if !unit.dimension().is_none());
+        });
+    }
+    found
 }

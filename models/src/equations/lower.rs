@@ -256,7 +256,8 @@ impl<'d> Lowering<'d> {
             Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
         };
         Ok(match &node.form {
-            Form::Number(value) | Form::Quantity(value, _) => Affine::of(self.graph.number(*value)),
+            Form::Number(value) => Affine::of(self.graph.number(*value)),
+            Form::Quantity(value, unit) => Affine::of(self.graph.number(value * unit.factor() + unit.zero())),
             Form::Name(name) => match &text.index {
                 Some((index, k)) if index == name => {
                     #[allow(clippy::cast_precision_loss)]

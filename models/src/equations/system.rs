@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mops_core::expression::Form;
 use mops_core::{Mistake, suggestion};
 
 use super::definition::{Definition, Text, under};
@@ -152,6 +153,11 @@ impl System {
         let start = |l: &mut Lowering<'_>, s: usize| {
             let (name, unit) = (&d.states[s].name, &d.states[s].unit);
             let value = d.start.get(name).map(|text| {
+                if let Form::Quantity(number, own) = &text.equation.right.form
+                    && let Some(number) = own.convert(*number, unit)
+                {
+                    return Ok(l.graph.number(number));
+                }
                 let value = l.fixed(text, &format!("the start value of `{name}`"))?;
                 // A number without a unit is in that of the state.
                 Ok(if text.is_bare() { value } else { l.declared(value, unit) })
@@ -242,6 +248,10 @@ fn friction(
 ) -> Result<Vec<Contact>, Mistake> {
     let mut contacts: Vec<Contact> = Vec::new();
     for friction in &d.friction {
+        if let (Some(peak), None) = (&friction.peak, &friction.coulomb) {
+            return Err(under(&peak.path, Mistake::here("`peak` is a ratio to `coulomb`, which is not given"))
+                .with_help("add `coulomb`, or remove `peak`"));
+        }
         let names = |s: usize| d.states[s].name.as_str();
         let joint = joints.iter().find(|&&(q, v)| names(q) == friction.of || names(v) == friction.of);
         let Some(&(position, velocity)) = joint else {

@@ -73,7 +73,8 @@ impl Node {
     pub fn evaluate<S: Scalar>(&self, lookup: &impl Fn(&str) -> S) -> S {
         let value = |node: &Self| node.evaluate(lookup);
         match &self.form {
-            Form::Number(number) | Form::Quantity(number, _) => S::from(*number),
+            Form::Number(number) => S::from(*number),
+            Form::Quantity(number, unit) => S::from(number * unit.factor() + unit.zero()),
             Form::Name(name) => lookup(name),
             Form::Negative(a) => -value(a),
             Form::Chain(first, rest) => {

@@ -119,13 +119,16 @@ fn quantity_alone(text: &str) -> Option<Node> {
         return None;
     }
     let (number, unit) = (number.parse::<f64>().ok()?, Unit::parse(unit).ok()?);
+    if is_too_large(number, &unit) {
+        return None;
+    }
     let start = text.len() - text.trim_start().len();
-    Some(Node { form: quantity(number, unit), span: start..start + text.trim().len() })
+    Some(Node { form: Form::Quantity(number, unit), span: start..start + text.trim().len() })
 }
 
-/// A number in a unit, which is kept as its value in the coherent one.
-fn quantity(number: f64, unit: Unit) -> Form {
-    Form::Quantity(number * unit.factor() + unit.zero(), unit)
+/// Whether a number in a unit is beyond all numbers.
+fn is_too_large(number: f64, unit: &Unit) -> bool {
+    !(number * unit.factor() + unit.zero()).is_finite()
 }
 
 fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<ContextError>>) -> Result<T, SyntaxError> {
@@ -154,7 +157,7 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
             && Unit::parse(word).is_ok()
             && !word.is_empty()
         {
-            let message = format!("within an expression a unit stands in brackets, as in 20 [{word}]");
+            let message = format!("expected a unit in brackets, as in 20 [{word}], or an operator");
             return SyntaxError { span: from..from + word.len(), message };
         }
         let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
@@ -193,7 +196,10 @@ fn checked(Spanned { raw, span }: Spanned) -> Result<Node, SyntaxError> {
         Raw::Number(value) => Form::Number(value),
         Raw::Quantity(number, unit, place) => {
             let unit = Unit::parse(&unit).map_err(|message| SyntaxError { span: place, message })?;
-            quantity(number, unit)
+            if is_too_large(number, &unit) {
+                return Err(SyntaxError { span, message: "the number is too large".to_owned() });
+            }
+            Form::Quantity(number, unit)
         }
         Raw::Name(name) if name == "pi" => Form::Number(std::f64::consts::PI),
         Raw::Name(name) => Form::Name(name),
@@ -264,6 +270,7 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
 fn literal(argument: &Spanned) -> Option<f64> {
     match &argument.raw {
         Raw::Number(number) => Some(*number),
+        Raw::Quantity(number, unit, _) => Unit::parse(unit).ok().map(|unit| number * unit.factor() + unit.zero()),
         Raw::Negative(of) => literal(of).map(|number| -number),
         _ => None,
     }

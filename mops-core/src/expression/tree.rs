@@ -20,7 +20,7 @@ pub struct Node {
 pub enum Form {
     /// A number, `pi` included.
     Number(f64),
-    /// A number with its unit, `20 [degC]`: its value in the coherent SI unit, and the unit.
+    /// A number with its unit, `20 [degC]`; its value is that in the coherent SI unit.
     Quantity(f64, Unit),
     /// A named quantity.
     Name(String),

@@ -12,6 +12,7 @@
 //! Source: A. Kennedy, Programming Languages and Dimensions, University of Cambridge Technical Report 391 (1996), chapter 3
 //! (inference of dimensions by linear equations).
 
+use std::f64::consts::PI;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -34,6 +35,11 @@ impl From<Dimension> for Open {
 }
 
 impl Open {
+    /// Whether it is known to be that of a pure number.
+    fn is_none(&self) -> bool {
+        self.unknown.is_empty() && self.known.is_none()
+    }
+
     fn times(mut self, other: &Self, exponent: f64) -> Self {
         self.known = self.known.times(&other.known, exponent);
         for &(unknown, power) in &other.unknown {
@@ -49,14 +55,14 @@ impl Open {
 }
 
 /// How a quantity that is made of numbers alone stands beside others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Bare {
     /// It is no such quantity.
     No,
-    /// It is 0, which is the same in all units.
+    /// It is 0, which is the same in all units but those of temperature.
     Zero,
-    /// It is a number.
-    Number,
+    /// It is a number; its value, where it is one literal.
+    Number(Option<f64>),
 }
 
 /// What an expression measures, and the unit that the units declared in it make.
@@ -65,10 +71,10 @@ pub struct Measure {
     dimension: Open,
     /// The value of the declared unit in the coherent one; `None` where the parts do not agree.
     factor: Option<f64>,
-    /// Whether it is a temperature on a scale with a zero of its own.
-    shifted: bool,
+    /// How many zeros of temperature scales it contains: 1 in a temperature in degC, 0 in a difference of two.
+    zeros: f64,
     bare: Bare,
-    /// Whether its unit was not declared.
+    /// Whether it is made of quantities without a declared unit, and of numbers.
     loose: bool,
     /// The first quantity in it whose unit is not coherent.
     foreign: Option<Rc<(String, Unit)>>,
@@ -78,35 +84,35 @@ pub struct Measure {
 const ONE: f64 = 1e-9;
 
 impl Measure {
-    /// That of a quantity declared in a unit.
+    /// Measure of a quantity declared in a unit.
     pub fn declared(name: &str, unit: &Unit) -> Self {
         let foreign = (!unit.is_coherent()).then(|| Rc::new((name.to_owned(), unit.clone())));
         Self {
             dimension: (*unit.dimension()).into(),
             factor: Some(unit.factor()),
-            shifted: unit.zero() != 0.0,
+            zeros: if unit.zero() == 0.0 { 0.0 } else { 1.0 },
             bare: Bare::No,
             loose: false,
             foreign,
         }
     }
 
-    /// That of a pure number.
+    /// Measure of a pure number.
     pub fn pure() -> Self {
         Self::number(Bare::No)
     }
 
     fn number(bare: Bare) -> Self {
         let dimension = Dimension::NONE.into();
-        Self { dimension, factor: Some(1.0), shifted: false, bare, loose: false, foreign: None }
+        Self { dimension, factor: Some(1.0), zeros: 0.0, bare, loose: false, foreign: None }
     }
 
-    /// Whether the unit of something in it was not declared.
+    /// Whether it is made of quantities without a declared unit.
     pub fn is_loose(&self) -> bool {
         self.loose
     }
 
-    /// That of the product with a power of another quantity.
+    /// Measure of the product with a power of another quantity.
     #[must_use]
     pub fn times(&self, other: &Self, exponent: f64) -> Self {
         let dimension = self.dimension.clone().times(&other.dimension, exponent);
@@ -115,28 +121,43 @@ impl Measure {
             (Bare::No, _) | (_, Bare::No) => Bare::No,
             (Bare::Zero, _) => Bare::Zero,
             (_, Bare::Zero) if exponent > 0.0 => Bare::Zero,
-            _ => Bare::Number,
+            _ => Bare::Number(None),
         };
-        Self {
-            dimension,
+        // A temperature times a pure number stays one; times anything else it is a difference.
+        let zeros = |of: &Self, by: &Self| match by.bare {
+            Bare::Number(Some(value)) => of.zeros * value,
+            _ if by.dimension.is_none() => of.zeros,
+            _ => 0.0,
+        };
+        let loose = |part: &Self| part.loose || part.bare != Bare::No;
+        let product = Self {
             factor: self.factor.zip(other.factor).map(|(a, b)| a * power(b)),
-            shifted: self.shifted && other.bare != Bare::No
-                || other.shifted && self.bare != Bare::No && exponent == 1.0,
+            zeros: zeros(self, other) + if exponent == 1.0 { zeros(other, self) } else { 0.0 },
             bare,
-            loose: self.loose || other.loose,
+            loose: bare == Bare::No && loose(self) && loose(other),
             foreign: self.foreign.clone().or_else(|| other.foreign.clone()),
+            dimension,
+        };
+        // A ratio of lengths is a number, in whatever units they are declared.
+        if product.dimension.is_none() && !self.dimension.is_none() {
+            return Self { factor: Some(1.0), foreign: None, ..product };
         }
+        product
     }
 
-    /// That of its rate.
+    /// Measure of the time derivative.
     #[must_use]
     pub fn rate(&self, time: &Self) -> Self {
-        Self { shifted: false, ..self.times(time, -1.0) }
+        Self { zeros: 0.0, ..self.times(time, -1.0) }
+    }
+
+    fn is_temperature(&self) -> bool {
+        self.zeros.abs() > ONE
     }
 
     /// Whether a number beside it could be in another unit than the coherent one.
     fn is_foreign(&self) -> bool {
-        self.shifted || self.factor.is_none_or(|factor| (factor - 1.0).abs() > ONE)
+        self.is_temperature() || self.factor.is_none_or(|factor| (factor - 1.0).abs() > ONE)
     }
 }
 
@@ -165,8 +186,8 @@ pub trait Quantities {
     /// The value of a named constant.
     fn constant(&self, name: &str) -> Option<f64>;
 
-    /// Takes note of a number that counts in the coherent unit of its neighbours.
-    fn counts(&mut self, number: &Node, dimension: Open);
+    /// Takes note of a number at its place that counts in the coherent unit of its neighbours.
+    fn counts(&mut self, number: String, place: Range<usize>, dimension: Open);
 
     /// The error for what does not fit in the present expression.
     fn refuse(&self, conflict: Conflict) -> Self::Error;
@@ -198,14 +219,15 @@ impl Dimensions {
     }
 
     fn resolved(&self, open: &Open) -> Open {
-        let mut sum = Open::from(open.known);
-        for &(unknown, power) in &open.unknown {
-            match &self.unknown[unknown].1 {
-                Some(found) => sum = sum.times(&self.resolved(found), power),
-                None => sum = sum.times(&Open { known: Dimension::NONE, unknown: vec![(unknown, 1.0)] }, power),
+        let mut resolved = open.clone();
+        // Solved ones lead to others, never in a circle: each is solved by what was unknown then.
+        while let Some(at) = resolved.unknown.iter().position(|&(unknown, _)| self.unknown[unknown].1.is_some()) {
+            let (unknown, power) = resolved.unknown.swap_remove(at);
+            if let Some(found) = &self.unknown[unknown].1 {
+                resolved = resolved.times(found, power);
             }
         }
-        sum
+        resolved
     }
 
     /// Asks for one dimension; whether that can be.
@@ -222,16 +244,32 @@ impl Dimensions {
     /// The first part that does not fit.
     pub fn measure<Q: Quantities>(&mut self, quantities: &mut Q, node: &Node) -> Result<Measure, Q::Error> {
         Ok(match &node.form {
-            Form::Number(number) => Measure::number(if *number == 0.0 { Bare::Zero } else { Bare::Number }),
-            Form::Quantity(_, unit) => Measure { dimension: (*unit.dimension()).into(), ..Measure::pure() },
+            // Beside an angle pi is in rad.
+            Form::Number(number) if *number == PI => Measure::pure(),
+            Form::Number(number) => {
+                Measure::number(if *number == 0.0 { Bare::Zero } else { Bare::Number(Some(*number)) })
+            }
+            Form::Quantity(number, unit) => Measure::declared(&format!("{number} [{unit}]"), unit),
             Form::Name(_) | Form::Member(..) | Form::Rate(_) => quantities.measure(self, node)?,
-            Form::Negative(a) => self.measure(quantities, a)?,
+            Form::Negative(a) => {
+                let of = self.measure(quantities, a)?;
+                let minus = Measure::number(Bare::Number(Some(-1.0)));
+                match of.bare {
+                    Bare::Number(value) => Measure { bare: Bare::Number(value.map(|value| -value)), ..of },
+                    Bare::Zero => of,
+                    Bare::No => Measure { loose: of.loose, ..minus.times(&of, 1.0) },
+                }
+            }
             Form::Chain(first, rest) => {
                 let sums = |operator: &Operator| matches!(operator, Operator::Add | Operator::Subtract);
                 if rest.iter().all(|(operator, _)| sums(operator)) {
-                    let parts: Vec<&Node> =
-                        std::iter::once(&**first).chain(rest.iter().map(|(_, node)| node)).collect();
-                    return self.alike(quantities, &parts, "the terms of a sum measure the same");
+                    let mut terms =
+                        vec![Part { measure: self.measure(quantities, first)?, node: Some(first), sign: 1.0 }];
+                    for (operator, node) in rest {
+                        let sign = if *operator == Operator::Add { 1.0 } else { -1.0 };
+                        terms.push(Part { measure: self.measure(quantities, node)?, node: Some(node), sign });
+                    }
+                    return self.join(quantities, &terms, true, "terms of a sum have one dimension");
                 }
                 let mut product = self.measure(quantities, first)?;
                 for (operator, factor) in rest {
@@ -243,7 +281,7 @@ impl Dimensions {
             Form::Power(base, exponent) => self.power(quantities, base, exponent)?,
             Form::Call(function, arguments) => self.call(quantities, *function, arguments)?,
             Form::Compare(_, a, b) => {
-                self.alike(quantities, &[a, b], "the sides of a comparison measure the same")?;
+                self.alike(quantities, &[a, b], "the sides of a comparison have one dimension")?;
                 Measure::pure()
             }
             Form::All(conditions) | Form::Any(conditions) => {
@@ -256,13 +294,13 @@ impl Dimensions {
         })
     }
 
-    /// What parts that measure the same measure.
+    /// Joint measure of parts of one dimension.
     fn alike<Q: Quantities>(&mut self, q: &mut Q, parts: &[&Node], rule: &str) -> Result<Measure, Q::Error> {
-        let mut measures = Vec::with_capacity(parts.len());
+        let mut measured = Vec::with_capacity(parts.len());
         for part in parts {
-            measures.push((self.measure(q, part)?, Some(*part)));
+            measured.push(Part { measure: self.measure(q, part)?, node: Some(part), sign: 1.0 });
         }
-        self.join(q, &measures, rule)
+        self.join(q, &measured, false, rule)
     }
 
     /// Asks that an expression measures what a quantity measures that is not part of it: a rate, a state that is reset.
@@ -277,7 +315,9 @@ impl Dimensions {
         rule: &str,
     ) -> Result<(), Q::Error> {
         let found = self.measure(quantities, node)?;
-        self.join(quantities, &[(what.clone(), None), (found, Some(node))], rule).map(|_| ())
+        let wanted = Part { measure: what.clone(), node: None, sign: 1.0 };
+        let found = Part { measure: found, node: Some(node), sign: 1.0 };
+        self.join(quantities, &[wanted, found], false, rule).map(|_| ())
     }
 
     /// What the two sides of an equation measure.
@@ -285,55 +325,69 @@ impl Dimensions {
     /// # Errors
     /// The part that does not fit.
     pub fn equate<Q: Quantities>(&mut self, q: &mut Q, sides: [&Node; 2]) -> Result<Measure, Q::Error> {
-        self.alike(q, &sides, "the sides of an equation measure the same")
+        self.alike(q, &sides, "the sides of an equation have one dimension")
     }
 
+    /// Joint measure of parts of one dimension: of a sum, or of things beside each other.
     fn join<Q: Quantities>(
         &mut self,
         q: &mut Q,
-        parts: &[(Measure, Option<&Node>)],
+        parts: &[Part<'_>],
+        is_sum: bool,
         rule: &str,
     ) -> Result<Measure, Q::Error> {
-        let Some((first, _)) = parts.iter().find(|(part, _)| part.bare == Bare::No) else {
-            let all_zero = parts.iter().all(|(part, _)| part.bare == Bare::Zero);
-            return Ok(Measure::number(if all_zero { Bare::Zero } else { Bare::Number }));
+        let mut quantities = parts.iter().filter(|part| part.measure.bare == Bare::No);
+        let Some(Part { measure: first, sign, .. }) = quantities.next() else {
+            let all_zero = parts.iter().all(|part| part.measure.bare == Bare::Zero);
+            return Ok(Measure::number(if all_zero { Bare::Zero } else { Bare::Number(None) }));
         };
-        let (mut joined, mut foreign) = (first.clone(), None);
-        for (part, node) in parts.iter().filter(|(part, _)| part.bare == Bare::No) {
+        let mut joined = Measure { zeros: sign * first.zeros, ..first.clone() };
+        for Part { measure: part, node, sign } in quantities {
             if !self.equal(&joined.dimension, &part.dimension) {
                 let span = node.map_or(0..0, |node| node.span.clone());
                 return Err(q.refuse(self.unlike(first, part, span, rule)));
             }
-            if !part.loose && part.is_foreign() {
-                foreign = foreign.or_else(|| part.foreign.clone());
-            }
             let agree = joined.factor.zip(part.factor).filter(|(a, b)| (a / b - 1.0).abs() < ONE);
-            joined.factor = if part.loose {
-                joined.factor
-            } else if joined.loose {
-                part.factor
-            } else {
-                agree.map(|(a, _)| a)
+            joined.factor = match (part.loose, joined.loose) {
+                (true, _) => joined.factor,
+                (_, true) => part.factor,
+                _ => agree.map(|(a, _)| a),
             };
-            joined.shifted |= part.shifted;
+            joined.zeros = if is_sum {
+                joined.zeros + sign * part.zeros
+            } else if joined.is_temperature() {
+                joined.zeros
+            } else {
+                part.zeros
+            };
             joined.loose &= part.loose;
             joined.foreign = joined.foreign.or_else(|| part.foreign.clone());
         }
-        for (part, node) in parts {
+        // One in K less one in degC is a difference: who takes a scale of temperature away has one to take it from.
+        let in_kelvin = parts.iter().any(|part| part.measure.bare == Bare::No && !part.measure.is_temperature());
+        if is_sum && joined.zeros < 0.0 && in_kelvin {
+            joined.zeros = 0.0;
+        }
+        let foreign = joined.foreign.clone().filter(|_| joined.is_foreign());
+        for Part { measure: part, node, .. } in parts {
             let Some(node) = node else { continue };
-            let Some(foreign) = &foreign else {
-                if part.bare == Bare::Number {
-                    q.counts(node, first.dimension.clone());
+            match (&foreign, part.bare) {
+                (None, Bare::Number(_)) => {
+                    for (number, place) in literals(node) {
+                        q.counts(number, place, first.dimension.clone());
+                    }
                 }
-                continue;
-            };
-            let silent = match part.bare {
-                Bare::Number => false,
-                Bare::Zero => !joined.shifted,
-                Bare::No => !(part.loose && matches!(node.form, Form::Name(_) | Form::Member(..))),
-            };
-            if !silent {
-                return Err(q.refuse(self.beside(part, node, foreign)));
+                (Some(foreign), Bare::Number(_)) => return Err(q.refuse(self.beside(&joined, node, foreign))),
+                (Some(foreign), Bare::Zero) if joined.is_temperature() => {
+                    return Err(q.refuse(self.beside(&joined, node, foreign)));
+                }
+                (Some(foreign), Bare::No) if part.loose => {
+                    let (name, unit) = &**foreign;
+                    let fact = format!("a quantity without a declared unit beside {}, which is in {unit}", named(name));
+                    let help = format!("declare its unit, such as {unit}");
+                    return Err(q.refuse(Conflict { span: node.span.clone(), fact, help }));
+                }
+                _ => {}
             }
         }
         Ok(joined)
@@ -345,7 +399,11 @@ impl Dimensions {
             let open = self.resolved(&measure.dimension);
             let unknown = open.unknown.first().map(|&(unknown, _)| self.unknown[unknown].0.clone());
             let text = open.known.coherent();
-            unknown.map_or(text.clone(), |name| format!("{text} times the unit of `{name}`"))
+            match unknown {
+                Some(name) if open.known.is_none() => format!("the unit of `{name}`"),
+                Some(name) => format!("{text} times the unit of `{name}`"),
+                None => text,
+            }
         };
         let fact = match (unit(part).as_str(), unit(first).as_str()) {
             ("1", other) => format!("expected a quantity in {other}, found a pure number"),
@@ -356,16 +414,21 @@ impl Dimensions {
     }
 
     /// A number beside a quantity that is declared in another than the coherent unit.
-    fn beside(&self, part: &Measure, node: &Node, (name, unit): &(String, Unit)) -> Conflict {
-        let span = node.span.clone();
-        let neighbour = format!("beside `{name}` in {unit} ");
-        if part.bare == Bare::No {
-            let fact = format!("{neighbour}stands a quantity that is declared without a unit");
-            return Conflict { span, fact, help: format!("declare its unit, such as {unit}") };
-        }
-        let fact = format!("{neighbour}stands a number without a unit");
-        let number = node.evaluate(&|_: &str| f64::NAN);
-        let help = format!("write its unit: {number} [{unit}]");
+    fn beside(&self, joined: &Measure, node: &Node, (name, unit): &(String, Unit)) -> Conflict {
+        let fact = format!("a number without a unit beside {}, which is in {unit}", named(name));
+        let place = literals(node).into_iter().next();
+        let (number, span) = place.unwrap_or_else(|| ("0".to_owned(), node.span.clone()));
+        let dimension = self.of(joined);
+        let help = if joined.is_temperature() {
+            let difference = unit.difference();
+            format!("write {number} [{unit}] for a temperature, {number} [{difference}] for a difference of two")
+        } else if dimension.is_none() && unit.dimension().is_none() {
+            let pure = if unit.is_angle() { "rad" } else { "1" };
+            format!("write {number} [{unit}] or {number} [{pure}]")
+        } else {
+            let unit = if *unit.dimension() == dimension { unit.to_string() } else { dimension.coherent() };
+            format!("write its unit, as in {number} [{unit}]")
+        };
         Conflict { span, fact, help }
     }
 
@@ -381,7 +444,7 @@ impl Dimensions {
             let help = "divide it by a reference value, so that the base of the power is a pure number".to_owned();
             return Err(q.refuse(Conflict { span: base.span.clone(), fact, help }));
         }
-        Ok(Measure { loose: false, ..Measure::number(of.bare) })
+        Ok(Measure::pure())
     }
 
     fn call<Q: Quantities>(&mut self, q: &mut Q, function: Function, arguments: &[Node]) -> Result<Measure, Q::Error> {
@@ -395,23 +458,25 @@ impl Dimensions {
             Function::Abs => self.measure(q, all[0])?,
             Function::Sign => {
                 let of = self.measure(q, all[0])?;
-                Measure::number(of.bare)
+                Measure::number(if of.bare == Bare::No { Bare::No } else { Bare::Number(None) })
             }
             Function::Min | Function::Max => {
-                self.alike(q, &all, &format!("the arguments of `{}` measure the same", function.name()))?
+                self.alike(q, &all, &format!("the arguments of `{}` have one dimension", function.name()))?
             }
-            Function::Clip | Function::Deadzone => {
-                self.alike(q, &all, &format!("the limits of `{}` measure what it limits", function.name()))?
-            }
+            Function::Clip | Function::Deadzone => self.alike(
+                q,
+                &all,
+                &format!("the limits of `{}` have the dimension of what it limits", function.name()),
+            )?,
             Function::Atan2 => {
-                self.alike(q, &all, "the arguments of `atan2` measure the same")?;
+                self.alike(q, &all, "the arguments of `atan2` have one dimension")?;
                 Measure::pure()
             }
             Function::Table => {
                 let places: Vec<&Node> = std::iter::once(all[0]).chain(all[1..].iter().copied().step_by(2)).collect();
-                self.alike(q, &places, "the x of a `table` measure the same")?;
+                self.alike(q, &places, "the argument and the x of a `table` have one dimension")?;
                 let values: Vec<&Node> = all[2..].iter().copied().step_by(2).collect();
-                self.alike(q, &values, "the y of a `table` measure the same")?
+                self.alike(q, &values, "the y of a `table` have one dimension")?
             }
             Function::If => {
                 let (otherwise, pairs) = all.split_last().expect("the reader asks for three arguments");
@@ -420,7 +485,7 @@ impl Dimensions {
                 }
                 let branches: Vec<&Node> =
                     pairs.iter().skip(1).step_by(2).chain(std::iter::once(otherwise)).copied().collect();
-                self.alike(q, &branches, "the branches of an `if` measure the same")?
+                self.alike(q, &branches, "the branches of an `if` have one dimension")?
             }
             _ => {
                 let of = self.measure(q, all[0])?;
@@ -430,14 +495,47 @@ impl Dimensions {
                     let help = "divide it by a reference value, or multiply a time by a frequency".to_owned();
                     return Err(q.refuse(Conflict { span: all[0].span.clone(), fact, help }));
                 }
-                Measure::number(if of.bare == Bare::No { Bare::No } else { Bare::Number })
+                Measure::number(if of.bare == Bare::No { Bare::No } else { Bare::Number(None) })
             }
         })
     }
 }
 
+/// A part of a sum, or of things of one dimension; without a node where it is no part of the expression.
+struct Part<'n> {
+    measure: Measure,
+    node: Option<&'n Node>,
+    sign: f64,
+}
+
+/// A quantity in a sentence; a number with its unit is no name.
+fn named(name: &str) -> String {
+    if name.contains('[') && name.ends_with(']') && name.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+        return "a number".to_owned();
+    }
+    format!("`{name}`")
+}
+
+/// The numbers in an expression that has no unit, as they are shown, with their places; 0 is none.
+fn literals(node: &Node) -> Vec<(String, Range<usize>)> {
+    let all = |nodes: Vec<&Node>| nodes.into_iter().flat_map(literals).collect();
+    let mut has_names = false;
+    node.walk(&mut |node| has_names |= matches!(node.form, Form::Name(_) | Form::Member(..) | Form::Rate(_)));
+    match &node.form {
+        Form::Number(number) if *number == 0.0 => Vec::new(),
+        Form::Name(name) => vec![(format!("`{name}`"), node.span.clone())],
+        Form::Call(Function::If, arguments) => {
+            let last = arguments.len() - 1;
+            all(arguments.iter().enumerate().filter(|(i, _)| i % 2 == 1 || *i == last).map(|(_, node)| node).collect())
+        }
+        Form::Call(Function::Table, arguments) => all(arguments.iter().skip(2).step_by(2).collect()),
+        _ if has_names => all(node.children()),
+        _ => vec![(node.evaluate(&|_: &str| f64::NAN).to_string(), node.span.clone())],
+    }
+}
+
 /// The value of an expression of numbers and constants.
-fn constant<Q: Quantities>(node: &Node, quantities: &Q) -> Option<f64> {
+pub fn constant<Q: Quantities>(node: &Node, quantities: &Q) -> Option<f64> {
     let mut fixed = true;
     node.walk(&mut |node| {
         fixed &= match &node.form {

@@ -52,10 +52,15 @@ impl Dimension {
     pub fn coherent(&self) -> String {
         // Masses that would have to be divided out again speak against a name: m/s2, not N/kg.
         let cost = |rest: &Self| rest.0.iter().map(|e| e.abs()).sum::<f64>() + 2.0 * rest.0[1].abs();
-        let plain = (self.0.iter().map(|e| e.abs()).sum(), "", *self);
-        let named = NAMED.iter().map(|(symbol, dimension)| {
-            let rest = self.times(&Self(*dimension), -1.0);
-            (cost(&rest) + 1.0, *symbol, rest)
+        let plain = (self.0.iter().map(|e| e.abs()).sum(), String::new(), *self);
+        let named = NAMED.iter().flat_map(|(symbol, dimension)| {
+            let of = |(power, text): (f64, &str)| {
+                let rest = self.times(&Self(*dimension), -power);
+                // Names of two symbols take no exponent.
+                let symbol = if symbol.contains(' ') && power != 1.0 { None } else { Some(format!("{symbol}{text}")) };
+                symbol.map(|symbol| (cost(&rest) + power.max(1.0), symbol, rest))
+            };
+            [(1.0, ""), (2.0, "2"), (0.5, "^0.5")].into_iter().filter_map(of).collect::<Vec<_>>()
         });
         // The first of the cheapest: base units alone where nothing is gained.
         let (_, symbol, rest) = named.fold(plain, |best, other| if other.0 < best.0 - SAME { other } else { best });
@@ -66,20 +71,23 @@ impl Dimension {
             let exponents = BASE.iter().map(|&(symbol, place)| (symbol, sign * rest.0[place]));
             exponents.filter(|(_, exponent)| *exponent > SAME).map(part).collect::<Vec<_>>()
         };
-        let above: Vec<String> =
-            (!symbol.is_empty()).then(|| symbol.to_owned()).into_iter().chain(powers(1.0)).collect();
+        let above: Vec<String> = Some(symbol).filter(|s| !s.is_empty()).into_iter().chain(powers(1.0)).collect();
         let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
         powers(-1.0).into_iter().fold(above, |text, factor| format!("{text}/{factor}"))
     }
 }
 
-/// An exponent as a unit has it: thirds with six digits.
+/// An exponent as a unit has it: `2`, `^0.5`, `^(2/3)`.
 fn rounded(exponent: f64) -> String {
     let whole = exponent.round();
     if (exponent - whole).abs() < SAME {
         return format!("{whole}");
     }
-    format!("^{}", (exponent * 1e6).round() / 1e6)
+    let over = |n: &f64| (exponent * n - (exponent * n).round()).abs() < SAME;
+    match [2.0, 4.0, 5.0, 10.0, 3.0, 6.0, 7.0, 9.0].into_iter().find(over) {
+        Some(n) if n == 3.0 || n == 6.0 || n == 7.0 || n == 9.0 => format!("^({}/{n})", (exponent * n).round()),
+        _ => format!("^{}", (exponent * 1e6).round() / 1e6),
+    }
 }
 
 impl PartialEq for Dimension {

@@ -96,9 +96,11 @@ pub(super) const SYMBOLS: &[Symbol] = &[
 ];
 
 const PREFIXES: &[(&str, f64)] = &[
+    ("p", 1e-12),
     ("n", 1e-9),
     ("u", 1e-6),
     ("\u{b5}", 1e-6),
+    ("\u{3bc}", 1e-6),
     ("m", 1e-3),
     ("c", 1e-2),
     ("d", 1e-1),
@@ -106,6 +108,7 @@ const PREFIXES: &[(&str, f64)] = &[
     ("k", 1e3),
     ("M", 1e6),
     ("G", 1e9),
+    ("T", 1e12),
 ];
 
 /// The symbol of this text, and the factor of a prefix before it. Scales of temperature take no prefix.

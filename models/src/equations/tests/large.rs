@@ -75,6 +75,6 @@ fn definitions_that_use_the_one_before_several_times_cost_no_more_than_their_tex
         let tables = "states = { x = \"1\", y = \"1\" }\nstart = { x = 1.0, y = 1.0 }\nhorizon = \"1 s\"";
         let text = format!("{tables}\nder = {{ x = \"-x*a120\", y = \"0\" }}\n[let]\na0 = \"y\"\n{lets}");
         let end = respond(&model(&text), &[], &[], 1.0).trace("x").unwrap().last();
-        assert!((end - (-1f64).exp()).abs() < 1e-6, "{end}: {kind}");
+        assert!((end - math::exp(-1.0)).abs() < 1e-6, "{end}: {kind}");
     }
 }

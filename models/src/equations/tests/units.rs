@@ -245,34 +245,46 @@ fn a_bare_number_counts_in_si_units_or_is_refused_beside_others() {
         assert!(notes[0].contains(part), "{part}: {notes:?}");
     }
     for (unit, rate, rest, name, write) in [
-        ("cm", "cm/s", "der = { x = '1 [cm/s]' }\nwhen.e = { guard = 'x - 5' }", "`x` in cm", "5 [cm]"),
-        ("deg", "deg/s", "der = { x = 'clip(r, -3, 0)' }", "`r` in deg/s", "-3 [deg/s]"),
-        ("degC", "K/s", "constants = { k = '1 1/s' }\nder = { x = 'k*(20 - x)' }", "`x` in degC", "20 [degC]"),
+        ("cm", "cm/s", "der = { x = '1 [cm/s]' }\nwhen.e = { guard = 'x - 5' }", "`x`, which is in cm", "5 [cm]"),
+        ("deg", "deg/s", "der = { x = 'clip(r, -3, 0)' }", "`r`, which is in deg/s", "-3 [deg/s]"),
+        (
+            "degC",
+            "K/s",
+            "constants = { k = '1 1/s' }\nder = { x = 'k*(20 - x)' }",
+            "`x`, which is in degC",
+            "20 [degC]",
+        ),
         (
             "degC",
             "K/s",
             "constants = { k = '1 1/s' }\nder = { x = 'k*(20 [degC] - max(x, 0))' }",
-            "`x` in degC",
+            "`x`, which is in degC",
             "0 [degC]",
         ),
-        ("rad", "rpm", "der = { x = 'if(r > 100, r, 0)' }", "`r` in rpm", "100 [rpm]"),
-        ("m", "m/min", "der = { x = 'r + 1' }", "`r` in m/min", "1 [m/min]"),
-        ("cm", "m/s", "der = { x = '5' }", "`x` in cm", "cm"),
-        ("%", "1/s", "der = { x = 'r' }\nwhen.e = { guard = 'x - 1', reset = { x = 5 } }", "`x` in %", "%"),
-        ("deg", "deg/s", "der = { x = 'table(x, -10, r, 10, -r)' }", "`x` in deg", "-10 [deg]"),
+        ("rad", "rpm", "der = { x = 'if(r > 100, r, 0)' }", "`r`, which is in rpm", "100 [rpm]"),
+        ("m", "m/min", "der = { x = 'r + 1' }", "`r`, which is in m/min", "1 [m/min]"),
+        ("cm", "m/s", "der = { x = '5' }", "`x`, which is in cm", "5 [m/s]"),
+        ("%", "1/s", "der = { x = 'r' }\nwhen.e = { guard = 'x - 1', reset = { x = 5 } }", "`x`, which is in %", "%"),
+        ("deg", "deg/s", "der = { x = 'table(x, -10, r, 10, -r)' }", "`x`, which is in deg", "-10 [deg]"),
         (
             "degC",
             "K/s",
             "der = { x = 'r' }\nwhen.e = { guard = 'x - 1 [degC]', reset = { x = 5 } }",
-            "`x` in degC",
+            "`x`, which is in degC",
             "5 [degC]",
         ),
-        ("cm", "cm/s", "constants = { c = 5 }\nder = { x = 'if(x > c, r, 0)' }", "`x` in cm", "declare its unit"),
+        (
+            "cm",
+            "cm/s",
+            "constants = { c = 5 }\nder = { x = 'if(x > c, r, 0)' }",
+            "`x`, which is in cm",
+            "declare its unit",
+        ),
         (
             "cm",
             "cm/s",
             "parameters = { c = '', r = 'cm/s' }\nder = { x = 'if(x > c, r, 0)' }",
-            "`x` in cm",
+            "`x`, which is in cm",
             "declare its unit",
         ),
     ] {
@@ -302,7 +314,7 @@ fn numbers_take_units_in_brackets() {
     assert!((at(&response, "x", 2.0) - 20.0).abs() < 1e-9);
     assert!((at(&response, "T", 2.0) + 5.0).abs() < 1e-9);
     let (mistake, _) = wrong("states = { x = 'm' }\nder = { x = '3 m/s + 1' }");
-    assert!(mistake.contains("a unit stands in brackets, as in 20 [m]"), "{mistake}");
+    assert!(mistake.contains("expected a unit in brackets, as in 20 [m]"), "{mistake}");
     assert!(wrong("states = { x = 'm' }\nder = { x = '3 [mars]' }").0.contains("`mars` is not a known unit"));
     // A whole text is a quantity, as everywhere in a study.
     let text =
@@ -326,4 +338,81 @@ fn a_joint_in_degrees_and_rpm_has_friction_as_one_in_si_units() {
         assert!((a - b).abs() < 1e-5 * a.abs(), "{t}: {a} {b}");
     }
     assert_eq!(at(&own, "w", 30.0), 0.0);
+}
+
+#[test]
+fn differences_ratios_and_angles_stand_beside_numbers() {
+    for rest in [
+        // A difference of temperatures is in K, and 0 is none of degC.
+        "states = { T = 'degC' }\nparameters = { k = '1/s', To = 'degC' }\nder = { T = 'k*max(To - T, 0)' }",
+        "states = { T = 'degC' }\nparameters = { k = '1/s' }\nder = { T = 'if(T - 20 [degC] > 1, -k*(T - 20 [degC]), 0)' }",
+        "states = { T = 'degC' }\nparameters = { k = 's', To = 'K' }\nder = { T = \"0 = To - T - k*T'\" }",
+        "states = { T = 'degC' }\nparameters = { k = 's', To = 'K' }\nder = { T = '(0.5*(T + To) - T)/k' }",
+        // Ratios are pure numbers, in whatever units.
+        "states = { x = 'cm' }\nparameters = { v = 'm/s', L = 'm' }\nder = { x = 'v*(1 - x/L)' }",
+        "states = { x = 'cm' }\nparameters = { v = 'm/s', tau = 'min' }\nder = { x = 'v*(1 - time/tau)' }",
+        "states = { x = 'cm' }\nparameters = { v = 'm/s' }\nder = { x = 'v*ln(1 + x/1 [cm])' }",
+        "states = { th = 'deg' }\nparameters = { w = 'rpm' }\nder = { th = 'w*sin(th - pi/2)' }",
+        "states = { x = '%' }\nparameters = { k = '1/s' }\nder = { x = 'k*(1 [1] - x)' }",
+        // Literals with units say that time is one.
+        "states = { x = '1' }\nparameters = { k = '1/s' }\nder = { x = '-k*x + 1 [1/s]' }",
+        "states = { x = '' }\nparameters = { k = '' }\nder = { x = '-k*x + 1 [m/s]' }",
+        // Branches, tables, members and definitions of numbers alone.
+        "states = { 'x[1..3]' = '1' }\nparameters = { k = '1' }\nder = { 'x[i]' = 'if(x[i] > 0, 1, 2) - k*x[i]' }",
+        "states = { 'x[1..2]' = 'm' }\nder = { 'x[i]' = 'table(x[i], 0, 1, 1, 2)' }",
+        "states = { 'v[1..2]' = 'm/s' }\nlet = { 'g[1..2]' = '9.81' }\nder = { 'v[i]' = '-g[i]' }",
+        "states = { v = 'm/s' }\nlet = { n = '2' }\nparameters = { k = '1/m' }\nder = { v = '-k*v^n' }",
+        "states = { v = 'm/s' }\nparameters = { k = { unit = '', default = '2 1/s' } }\nder = { v = '-k*v' }",
+    ] {
+        read_ok(rest);
+    }
+    for (rest, fact, help) in [
+        (
+            "states = { T = 'degC' }\nparameters = { k = '1/s', a = '1' }\nder = { T = 'if(a*T > 20, -k*(T - 1 [K]), 0)' }",
+            "beside `T`",
+            "20 [degC]",
+        ),
+        ("states = { x = 'm' }\nparameters = { k = '1/s' }\nder = { x = '2^(k*time)' }", "found a pure number", ""),
+        (
+            "states = { x = 'm' }\nparameters = { k = 'm/s' }\nder = { x = 'if(max(5 [cm], 3) > x, k, 0)' }",
+            "beside a number, which is in cm",
+            "3 [cm]",
+        ),
+        (
+            "states = { x = 'cm' }\nparameters = { c = '', k = 'm/s' }\nder = { x = 'if(x > 2*abs(c), k, 0)' }",
+            "beside `x`, which is in cm",
+            "declare",
+        ),
+        ("states = { x = 'cm' }\nparameters = { k = '1/s' }\nder = { x = '-k*x + 5' }", "beside `x`", "5 [m/s]"),
+        ("states = { x = '%' }\nparameters = { k = '1/s' }\nder = { x = 'k*(1 - x)' }", "beside `x`", "1 [%] or 1 [1]"),
+        (
+            "states = { th = 'deg' }\nparameters = { w = 'rpm' }\nder = { th = 'w*sin(th - 1)' }",
+            "beside `th`",
+            "1 [deg] or 1 [rad]",
+        ),
+        (
+            "states = { x = 'm' }\nparameters = { k = '12 m' }\nder = { x = 'k' }",
+            "expected a unit, found the number",
+            "",
+        ),
+        ("states = { x = 'm' }\nder = { x = '1e400 [m/s]' }", "too large", ""),
+        (
+            "states = { x = 'm', v = 'm/s' }\nparameters = { b = '1/s' }\nder = { x = 'v', v = '0' }\nfriction.x = { viscous = 'b', peak = 'foo' }",
+            "`coulomb`, which is not given",
+            "",
+        ),
+    ] {
+        let (mistake, found) = wrong(rest);
+        assert!(mistake.contains(fact) && found.contains(help), "{rest}\n{mistake}\n{found}");
+    }
+}
+
+#[test]
+fn start_values_are_in_the_unit_of_their_own_state() {
+    let text = "states = { 'T[1]' = 'K', 'T[2]' = 'degC', th = 'deg', y = '' }\nder = { 'T[i]' = '0', th = '0', y = '0 [m/s]' }\n\
+                start = { 'T[1]' = '20 degC', 'T[2]' = '20 degC', th = 'pi/2', y = '0.1 m' }";
+    let response = respond(&read_ok(text), &[], &[], 1.0);
+    for (signal, value) in [("T[1]", 293.15), ("T[2]", 20.0), ("th", 90.0), ("y", 0.1)] {
+        assert!((at(&response, signal, 1.0) - value).abs() < 1e-12, "{signal}");
+    }
 }

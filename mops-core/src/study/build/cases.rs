@@ -53,6 +53,7 @@ fn build_input(
             .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
             .within("inputs")
     })?;
+    same_unit(name, &variable.unit, &known).map_err(|m| m.within("inputs"))?;
     let mut input = input.clone();
     if let Some(unit) = unit {
         let difference = unit.factor_to(&variable.unit).ok_or_else(|| {
@@ -78,6 +79,17 @@ fn build_input(
             .within("inputs"));
     }
     Ok((name.clone(), input))
+}
+
+/// What is recorded once for all models has one unit in them.
+fn same_unit(name: &str, unit: &Unit, known: &[&Variable]) -> Result<(), Mistake> {
+    match known.iter().find(|variable| variable.name == name && variable.unit != *unit) {
+        Some(other) => {
+            let fact = format!("`{name}` is in {unit} in one model and in {} in another", other.unit);
+            Err(Mistake::new(name, fact).with_help("declare it in one unit in all models"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Recordings without a unit where the model has one, each signal or input with the experiments in which it is so.
@@ -123,6 +135,7 @@ fn build_experiment(
                 .with_help(suggestion(&channel.signal, known.iter().map(|v| v.name.as_str())))
                 .within("channels")
         })?;
+        same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;
         let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
         warnings.extend(suspicious_start(name, &built));
         channels.push(built);

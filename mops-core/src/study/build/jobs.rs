@@ -5,6 +5,7 @@ use crate::diagnostic::suggestion;
 use crate::model::{AnalysisKind, Interface, Variable};
 use crate::study::draft::Mistake;
 use crate::study::{JobPlan, ParameterSource, Study};
+use crate::unit::Unit;
 
 /// The job of a model in a case, made at the first need and still to be completed; the signals are added to those it
 /// computes.
@@ -54,6 +55,12 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
     Ok(())
 }
 
+/// A parameter that measures one thing in one model and another in another.
+fn apart(name: &str, unit: &Unit, other: &Unit) -> Mistake {
+    Mistake::here(format!("`{name}` is in {unit} in one model and in {other} in another"))
+        .with_help("give them different names, or one unit")
+}
+
 /// Where each parameter comes from: a tuner of the case, a value in the case, a tuner of the study, the model's table,
 /// the default.
 fn sources(
@@ -71,17 +78,20 @@ fn sources(
             let tuner = |of: Option<usize>| study.tuners.iter().position(|t| t.parameter == *name && t.case == of);
             let by = |tuner: usize| {
                 let unit = &study.tuners[tuner].unit;
-                if unit.zero() != p.variable.unit.zero() {
-                    let fact = format!("`{name}` is in {unit} in one model and in {} in another", p.variable.unit);
-                    return Err(Mistake::here(fact).with_help("declare it on one scale of temperature in all models"));
+                match unit.factor_to(&p.variable.unit).filter(|_| unit.zero() == p.variable.unit.zero()) {
+                    Some(factor) => Ok(ParameterSource::Tuner { tuner, factor }),
+                    None => Err(apart(name, unit, &p.variable.unit)),
                 }
-                let factor = unit.factor_to(&p.variable.unit).unwrap_or(1.0);
-                Ok(ParameterSource::Tuner { tuner, factor })
             };
             if let Some(tuner) = tuner(Some(case)) {
                 return by(tuner);
             }
             if let Some(value) = find(&study.cases[case].parameters, name) {
+                // Values of a case are in the unit of the first model that has the parameter.
+                let models = study.models.iter().flat_map(|(_, model)| &model.interface().parameters);
+                let first = models.map(|p| &p.variable).find(|variable| variable.name == *name);
+                let unit = first.map_or(&p.variable.unit, |variable| &variable.unit);
+                let value = unit.convert(value, &p.variable.unit).ok_or_else(|| apart(name, unit, &p.variable.unit))?;
                 return Ok(ParameterSource::Constant(value));
             }
             if let Some(tuner) = tuner(None) {

@@ -1,5 +1,7 @@
 //! Dimensions of the expressions of tied tuners.
 
+use std::ops::Range;
+
 use crate::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
 use crate::expression::{Expression, Form, Node};
 use crate::study::draft::Mistake;
@@ -20,7 +22,7 @@ pub(super) fn check(
     };
     let mut tied = Tied(tuners.iter().map(|tuner| (tuner.parameter.clone(), measure(tuner))).collect());
     let Some(wanted) = tied.of(name) else { return Ok(()) };
-    dimensions.fits(&mut tied, &wanted, expression.root(), "a tied tuner measures what its expression measures")
+    dimensions.fits(&mut tied, &wanted, expression.root(), "a tied tuner has the dimension of its expression")
 }
 
 /// Tuners by name, and what they measure.
@@ -44,7 +46,7 @@ impl Quantities for Tied {
         None
     }
 
-    fn counts(&mut self, _: &Node, _: Open) {}
+    fn counts(&mut self, _: String, _: Range<usize>, _: Open) {}
 
     fn refuse(&self, Conflict { span, fact, help }: Conflict) -> Mistake {
         Mistake::here(fact).with_help(help).at(span)

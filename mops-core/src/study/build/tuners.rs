@@ -30,8 +30,13 @@ pub(super) fn build_tuner(
             )
             .with_help("give a unit that converts to it, or leave `unit` out"));
         }
-        // A tuner is its parameter times a factor: a temperature on another scale has that of the parameter.
-        (Some(unit), Some(p)) if unit.zero() != p.variable.unit.zero() => p.variable.unit.clone(),
+        // A tuner is its parameter times a factor, in ties too: a temperature on another scale, or a frequency in Hz of a
+        // parameter in rad/s, is in the unit of the parameter.
+        (Some(unit), Some(p))
+            if unit.zero() != p.variable.unit.zero() || unit.counts_cycles() != p.variable.unit.counts_cycles() =>
+        {
+            p.variable.unit.clone()
+        }
         (Some(unit), _) => unit.clone(),
         (None, Some(p)) => p.variable.unit.clone(),
         (None, None) => Unit::one(),
