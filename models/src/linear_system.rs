@@ -1,10 +1,8 @@
 //! What models share that are linear systems from the start: matrices over the scalar, their tangents, expressions in them.
 
 use std::fmt;
-use std::ops::Range;
 
-use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
-use mops_core::expression::{Form, Node};
+use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
 use mops_core::{Analysis, Dual, Expression, Failure, Job, Mistake, Parameter, Scalar, StateSpace, Unit, WithTangents};
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -217,11 +215,15 @@ impl Units<'_> {
             None => dimensions.open(name),
         };
         let mut named = Named(parameters.iter().cloned().zip(parameters.iter().map(measure)).collect());
+        let wrong = |Conflict { fact, help, .. }: Conflict| {
+            Mistake::new("units", format!("in an entry of the system {fact}")).with_help(help)
+        };
         for entry in entries {
-            dimensions.measure(&mut named, entry.expression.root())?;
+            dimensions.measure(&mut named, entry.expression.root()).map_err(wrong)?;
         }
+        let Some(delay) = delay else { return Ok(()) };
         let second = Measure::declared("delay", &Unit::known("s"));
-        delay.map_or(Ok(()), |delay| dimensions.fits(&mut named, &second, delay.expression.root(), "a delay is a time"))
+        dimensions.fits(&mut named, &second, delay.expression.root(), "a delay is a time").map_err(wrong)
     }
 
     /// The unit of a name, as text.
@@ -232,27 +234,5 @@ impl Units<'_> {
     /// Parameters of these names.
     pub fn parameters(&self, names: &[String]) -> Vec<Parameter> {
         names.iter().map(|name| Parameter::new(name, self.of(name), "parameter of the system")).collect()
-    }
-}
-
-/// Parameters by name, and what they measure.
-struct Named(Vec<(String, Measure)>);
-
-impl Quantities for Named {
-    type Error = Mistake;
-
-    fn measure(&mut self, _: &mut Dimensions, node: &Node) -> Result<Measure, Mistake> {
-        let Form::Name(name) = &node.form else { unreachable!("the reader takes names only") };
-        Ok(self.0.iter().find(|(known, _)| known == name).expect("all names are parameters").1.clone())
-    }
-
-    fn constant(&self, _: &str) -> Option<f64> {
-        None
-    }
-
-    fn counts(&mut self, _: String, _: Range<usize>, _: Open) {}
-
-    fn refuse(&self, Conflict { fact, help, .. }: Conflict) -> Mistake {
-        Mistake::new("units", format!("in an entry of the system {fact}")).with_help(help)
     }
 }

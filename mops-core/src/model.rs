@@ -139,7 +139,7 @@ pub trait Model: Send + Sync {
     /// What it offers and takes.
     fn interface(&self) -> &Interface;
 
-    /// How it was read where its declaration leaves a choice, one sentence each: `mops check` tells.
+    /// Assumptions made in reading the model, one sentence each; `mops check` prints them.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }

@@ -54,7 +54,7 @@ impl Open {
     }
 }
 
-/// How a quantity that is made of numbers alone stands beside others.
+/// Whether an expression is a number without a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Bare {
     /// It is no such quantity.
@@ -193,6 +193,30 @@ pub trait Quantities {
     fn refuse(&self, conflict: Conflict) -> Self::Error;
 }
 
+/// Quantities by name, for expressions without derivatives, families and constants.
+pub struct Named(pub Vec<(String, Measure)>);
+
+impl Quantities for Named {
+    type Error = Conflict;
+
+    /// # Panics
+    /// At a name that is not one of them.
+    fn measure(&mut self, _: &mut Dimensions, node: &Node) -> Result<Measure, Conflict> {
+        let Form::Name(name) = &node.form else { unreachable!("the reader takes names only") };
+        Ok(self.0.iter().find(|(known, _)| known == name).expect("names were checked").1.clone())
+    }
+
+    fn constant(&self, _: &str) -> Option<f64> {
+        None
+    }
+
+    fn counts(&mut self, _: String, _: Range<usize>, _: Open) {}
+
+    fn refuse(&self, conflict: Conflict) -> Conflict {
+        conflict
+    }
+}
+
 /// The dimensions of quantities that were declared without a unit, as they are found.
 #[derive(Debug, Clone, Default)]
 pub struct Dimensions {
@@ -201,7 +225,7 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// A quantity without a unit; its dimension is found by what it stands beside.
+    /// Measure of a quantity without a declared unit; its dimension follows from the terms that it is used with.
     pub fn open(&mut self, name: &str) -> Measure {
         self.unknown.push((name.to_owned(), None));
         let dimension = Open { known: Dimension::NONE, unknown: vec![(self.unknown.len() - 1, 1.0)] };
@@ -535,7 +559,7 @@ fn literals(node: &Node) -> Vec<(String, Range<usize>)> {
 }
 
 /// The value of an expression of numbers and constants.
-pub fn constant<Q: Quantities>(node: &Node, quantities: &Q) -> Option<f64> {
+fn constant<Q: Quantities>(node: &Node, quantities: &Q) -> Option<f64> {
     let mut fixed = true;
     node.walk(&mut |node| {
         fixed &= match &node.form {
