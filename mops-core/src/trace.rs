@@ -302,6 +302,12 @@ fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
 /// Between the roots of its derivative a cubic is monotone, so that bisection there finds every sign change and needs
 /// no special case for vanishing leading coefficients.
 fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
+    let mut roots = [f64::NAN; 3];
+    let inside = |roots: [f64; 3]| roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0);
+    // Most segments are short beside the curvature of the signal: their slope keeps its sign.
+    if c[0].abs() > c[1].abs() + c[2].abs() + c[3].abs() {
+        return inside(roots);
+    }
     let f = |s: f64| ((c[3] * s + c[2]) * s + c[1]) * s + c[0];
     // Roots of c1 + 2 c2 s + 3 c3 s^2, in the form that does not cancel.
     let (qa, qb, qc) = (3.0 * c[3], c[2], c[1]);
@@ -313,14 +319,13 @@ fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
         turning.sort_by(f64::total_cmp);
     }
     let ends = [0.0, turning[0], turning[1], 1.0];
-    let mut roots = [f64::NAN; 3];
     for i in 0..3 {
         let (from, to) = (ends[i], ends[i + 1]);
         if from < to && f(from) * f(to) < 0.0 {
             roots[i] = bisect(from, to, f);
         }
     }
-    roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0)
+    inside(roots)
 }
 
 /// A zero of `f` between `a` and `b`, where `f` has opposite signs or is zero: the Illinois variant of false position,

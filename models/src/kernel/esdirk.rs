@@ -241,8 +241,9 @@ impl<X: Clone> Esdirk<X> {
         self.contraction = math::powf(self.contraction.max(1e-16), 0.8);
         for iteration in 0..ITERATIONS {
             self.newton_step(f, time, h, z, work);
-            let sizes = x.as_ref().iter().zip(z.as_ref()).map(|(x, z)| [x.value().abs().max(z.value().abs()), 0.0]);
-            let size = weights.norm(h, self.update.as_ref().iter().map(|d| d.value()).zip(sizes));
+            let abs = |x: &X, j: usize| x.as_ref()[j].value().abs();
+            let update = |j: usize| (self.update.as_ref()[j].value(), [abs(x, j), abs(z, j), 0.0]);
+            let size = weights.norm(h, n, update);
             if !size.is_finite() {
                 return false;
             }
@@ -332,11 +333,8 @@ impl<X: Clone> Esdirk<X> {
             *error = h * (0..6).map(|i| (weight(i) - EMBEDDED[i]) * self.k[i].as_ref()[j].value()).sum::<f64>();
         }
         self.factors.solve(&mut self.column);
-        let sizes = (0..self.column.len()).map(|j| {
-            let size = |x: &X| x.as_ref()[j].value().abs();
-            [size(x).max(size(next)), size(&self.k[5])]
-        });
-        weights.norm(h, self.column.iter().copied().zip(sizes))
+        let abs = |x: &X, j: usize| x.as_ref()[j].value().abs();
+        weights.norm(h, self.column.len(), |j| (self.column[j], [abs(x, j), abs(next, j), abs(&self.k[5], j)]))
     }
 }
 

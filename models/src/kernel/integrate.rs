@@ -1,16 +1,12 @@
-//! Integration from step to step: step sizes, breaks, events.
-//!
-//! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
-//! II.4 (step size, initial step); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
-//! section IV.2 (PI control).
+//! Integration from step to step: breaks, events.
 
-use mops_core::math;
 use mops_core::{Failure, Scalar, Work};
 
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
 use super::events::{Events, delay, shift};
 use super::step::Step;
+use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
 use super::{Dynamics, IntegrationMethod, Simulated, Sink, Tolerance};
 
@@ -84,9 +80,9 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
     dynamics.pass_break(t, &mut x);
     events.settle(dynamics, t, &mut x, sink)?;
     method.restart(dynamics, t, &x, &mut work);
-    let mut proposed = initial_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
+    let mut proposed = first_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
     work.derivatives += 1;
-    let mut last_log_error = LOG_SMALL_ERROR;
+    let mut sizes = StepSizes::new(M::ERROR_ORDER);
     // Attempts at the present step that were rejected.
     let mut rejected = 0;
     let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
@@ -113,9 +109,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
             if !error.is_finite() && (h < 1e-12 * span || !all_finite::<S>(x.as_ref())) {
                 return Err(Failure::Diverged(t));
             }
-            // Hairer's factors: 0.9 as safety, at most a fifth at once.
-            proposed =
-                h * if error.is_finite() { (0.9 * math::powf(error, -1.0 / M::ERROR_ORDER)).max(0.2) } else { 0.1 };
+            proposed = h * sizes.after_rejection(error);
             work.rejected += 1;
             rejected += 1;
             continue;
@@ -132,7 +126,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         if dynamics.remembers() {
             dynamics.accepted(&step);
         }
-        let factor = step_factor::<S, D, M>(error, &mut last_log_error, rejected > 0);
+        let factor = sizes.after_acceptance(error, rejected > 0);
         proposed = if reaches { proposed.max(h * factor) } else { h * factor };
         rejected = 0;
         let Some(index) = event else {
@@ -175,65 +169,14 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
     if all_finite::<S>(x.as_ref()) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
-/// PI step-size control with beta = 0.04, as in the authors' DOPRI5: `0.9 error^-(1/q - 0.75 beta) last_error^beta`.
-fn step_factor<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(error: f64, last: &mut f64, was_rejected: bool) -> f64 {
-    let log_error = math::ln(error.max(1e-10));
-    let factor = 0.9 * math::exp(0.04 * *last - (1.0 / M::ERROR_ORDER - 0.04 * 0.75) * log_error);
-    *last = log_error.max(LOG_SMALL_ERROR);
-    factor.clamp(0.2, if was_rejected { 1.0 } else { 10.0 })
-}
-
-/// `ln 1e-4`: the error that an earlier step counts as having had at least.
-const LOG_SMALL_ERROR: f64 = -9.210_340_371_976_182;
-
 fn all_finite<S: Scalar>(x: &[S]) -> bool {
     x.iter().all(|x| x.value().is_finite())
-}
-
-/// A first guess of the step size (algorithm II.4.14 of the source), with times in units of the interval and each state in
-/// units of its size, or where it starts at 0 of what it becomes at its first rate in a thousandth of the interval: so that the
-/// guess depends on no unit.
-fn initial_step<S: Scalar, D: Dynamics<S>>(
-    f: &D,
-    (t, end): (f64, f64),
-    x: &D::State,
-    slope: &D::State,
-    order: f64,
-) -> f64 {
-    let span = end - t;
-    let slope = slope.as_ref();
-    let size = |i: usize| match x.as_ref()[i].value().abs() {
-        0.0 => 1e-3 * span * slope[i].value().abs(),
-        size => size,
-    };
-    // Sizes over the tolerance of the default; the guess goes with its fifth root.
-    let scaled = |v: &[S]| {
-        let ratio = |i: usize| if size(i) > 0.0 { v[i].value() / (1e-8 * size(i)) } else { 0.0 };
-        #[allow(clippy::cast_precision_loss)]
-        let n = v.len().max(1) as f64;
-        ((0..v.len()).map(|i| ratio(i) * ratio(i)).sum::<f64>() / n).sqrt()
-    };
-    let (mut stage, mut derivative) = (x.clone(), x.clone());
-    let (d0, d1) = (scaled(x.as_ref()), span * scaled(slope));
-    let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { (0.01 * d0 / d1).min(1.0) };
-    for (i, s) in stage.as_mut().iter_mut().enumerate() {
-        *s = x.as_ref()[i] + slope[i] * (h0 * span);
-    }
-    f.derivative(t + h0 * span, &stage, &mut derivative);
-    for (i, s) in stage.as_mut().iter_mut().enumerate() {
-        *s = derivative.as_ref()[i] - slope[i];
-    }
-    let d2 = span * scaled(stage.as_ref()) / h0;
-    let largest = d1.max(d2);
-    let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { math::powf(0.01 / largest, 1.0 / order) };
-    let h = (100.0 * h0).min(h1).min(1.0) * span;
-    if h.is_finite() && h > 0.0 { h } else { 1e-6 * span }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::Dual;
+    use mops_core::{Dual, math};
 
     /// `x'' = -x`.
     struct Oscillator;

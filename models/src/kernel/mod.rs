@@ -13,6 +13,7 @@ pub mod mechanism;
 mod opened;
 mod record;
 mod step;
+mod step_size;
 mod weights;
 mod written;
 

@@ -18,7 +18,8 @@ use super::Dynamics;
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
     relative: f64,
-    absolute: Option<f64>,
+    /// A floor is the first number, plus the second times the scale of its state.
+    floor: [f64; 2],
     /// Simulated time, s.
     span: f64,
     /// Largest absolute value so far, or what is declared.
@@ -27,6 +28,8 @@ pub(super) struct Weights {
     floors: Vec<f64>,
     /// How far rounding of the states moves each rate, per s.
     roughness: Vec<f64>,
+    /// No rate is rough in shorter steps than this, s.
+    smooth: f64,
     /// Attempts since the roughness was felt.
     attempts: usize,
 }
@@ -51,11 +54,14 @@ impl Weights {
         let scales = (0..n).map(|i| f.scale(i).unwrap_or(0.0)).collect();
         let mut weights = Self {
             relative: tolerance.relative,
-            absolute: tolerance.absolute,
+            floor: tolerance
+                .absolute
+                .map_or([f64::MIN_POSITIVE, SHARE * tolerance.relative], |a| [a.max(f64::MIN_POSITIVE), 0.0]),
             span,
             scales,
             floors: vec![0.0; n],
             roughness: vec![0.0; n],
+            smooth: f64::INFINITY,
             attempts: 0,
         };
         weights.follow(x.as_ref());
@@ -65,9 +71,10 @@ impl Weights {
     /// Takes the sizes of an accepted state into account.
     #[inline]
     pub(super) fn follow<S: Scalar>(&mut self, x: &[S]) {
-        for ((scale, floor), x) in self.scales.iter_mut().zip(&mut self.floors).zip(x) {
-            *scale = scale.max(x.value().abs());
-            *floor = self.absolute.unwrap_or(SHARE * self.relative * *scale).max(f64::MIN_POSITIVE);
+        let (scales, floors) = (&mut self.scales[..x.len()], &mut self.floors[..x.len()]);
+        for (j, x) in x.iter().enumerate() {
+            scales[j] = larger(scales[j], x.value().abs());
+            floors[j] = self.floor[0] + self.floor[1] * scales[j];
         }
     }
 
@@ -92,23 +99,27 @@ impl Weights {
         for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
             *roughness = if difference.is_finite() { difference } else { 0.0 };
         }
+        // Floors do not fall.
+        let limits = self.floors.iter().zip(&self.roughness);
+        self.smooth = limits.fold(f64::INFINITY, |least, (floor, roughness)| least.min(floor / roughness));
         true
     }
 
-    /// Root mean square of errors over their weights in a step of length `h`; each comes with the size of its state and with the
-    /// size of its rate at the end of the step.
-    #[inline]
+    /// Root mean square of the errors of `n` states over their weights in a step of length `h`; each comes with the sizes of
+    /// its state at both ends of the step, and of its rate at the end.
+    #[inline(always)] // With the number of states known, the divisions go in pairs.
     #[allow(clippy::cast_precision_loss)]
-    pub(super) fn norm(&self, h: f64, errors: impl ExactSizeIterator<Item = (f64, [f64; 2])>) -> f64 {
-        let n = errors.len().max(1) as f64;
-        let limits = self.floors.iter().zip(&self.roughness);
+    pub(super) fn norm(&self, h: f64, n: usize, error: impl Fn(usize) -> (f64, [f64; 3])) -> f64 {
+        let (floors, roughness) = (&self.floors[..n], &self.roughness[..n]);
         let brief = BRIEF * self.span;
-        let sum = errors.zip(limits).fold(0.0, |sum, ((error, [size, rate]), (floor, roughness))| {
-            let size = size.max(brief * rate);
-            let ratio = error / (floor + self.relative * size + h * roughness);
-            sum + ratio * ratio
-        });
-        (sum / n).sqrt()
+        let mut sum = 0.0;
+        for j in 0..n {
+            let (error, [before, after, rate]) = error(j);
+            let size = larger(larger(before, after), brief * rate);
+            let ratio = error / (floors[j] + self.relative * size + h * roughness[j]);
+            sum += ratio * ratio;
+        }
+        (sum / n.max(1) as f64).sqrt()
     }
 
     /// The relative tolerance.
@@ -124,6 +135,15 @@ impl Weights {
     /// Whether in a step of length `h` rounding decides over the error of a state of these sizes more than its tolerance.
     pub(super) fn is_rough<S: Scalar>(&self, h: f64, x: &[S]) -> bool {
         let limits = self.floors.iter().zip(&self.roughness);
-        x.iter().zip(limits).any(|(x, (floor, roughness))| h * roughness > floor + self.relative * x.value().abs())
+        h > self.smooth
+            && x.iter()
+                .zip(limits)
+                .any(|(x, (floor, roughness))| h * roughness > floor + self.relative * x.value().abs())
     }
+}
+
+/// The larger of two numbers, one of the processor's instructions: `f64::max` looks for NaN besides, which is in the errors too.
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }

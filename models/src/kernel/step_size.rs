@@ -1,0 +1,138 @@
+//! The lengths of steps: the first one, and how the next follows from the error of the last.
+//!
+//! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
+//! II.4 (step size, first step); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
+//! section IV.2 (PI control).
+
+use mops_core::{Scalar, math};
+
+use super::Dynamics;
+
+/// PI control of the step size: the next length is `0.9 error^-(1/q - 0.75 beta) last_error^beta` times the last, with
+/// `beta = 0.04` as in the authors' DOPRI5, and `q` the order of the error in the length.
+pub(super) struct StepSizes {
+    order: f64,
+    /// `log2` of the error of the step before.
+    last: f64,
+}
+
+const SAFETY: f64 = 0.9;
+const BETA: f64 = 0.04;
+
+/// A step is at most this much shorter and longer than the one before it.
+const SHORTEST: f64 = 0.2;
+const LONGEST: f64 = 10.0;
+
+/// How much shorter a step is where the last had no error that is a number.
+const WITHOUT_ERROR: f64 = 0.1;
+
+/// `log2 1e-4`: the error that an earlier step counts as having had at least.
+const SMALL: f64 = -13.287_712_379_549_449;
+
+impl StepSizes {
+    pub(super) fn new(order: f64) -> Self {
+        Self { order, last: SMALL }
+    }
+
+    /// Ratio of the next length to that of the step accepted with this error.
+    #[inline]
+    pub(super) fn after_acceptance(&mut self, error: f64, was_rejected: bool) -> f64 {
+        let error = log2(error.max(1e-10));
+        let factor = SAFETY * exp2(BETA * self.last - (1.0 / self.order - 0.75 * BETA) * error);
+        self.last = error.max(SMALL);
+        factor.clamp(SHORTEST, if was_rejected { 1.0 } else { LONGEST })
+    }
+
+    /// Ratio of the next length to that of the step rejected with this error, above 1 or no number.
+    pub(super) fn after_rejection(&self, error: f64) -> f64 {
+        if error.is_finite() { (SAFETY * exp2(-log2(error) / self.order)).max(SHORTEST) } else { WITHOUT_ERROR }
+    }
+}
+
+/// Logarithm to base 2 of a normal positive number, to 0.0011: its exponent, and a cubic of its mantissa that is exact at powers
+/// of 2. A step size needs no more, and every step needs it.
+#[inline]
+fn log2(x: f64) -> f64 {
+    const MANTISSA: u64 = (1 << 52) - 1;
+    let bits = x.to_bits();
+    #[allow(clippy::cast_precision_loss)]
+    let exponent = (bits >> 52) as f64 - 1023.0;
+    let m = f64::from_bits(bits & MANTISSA | 1.0f64.to_bits()) - 1.0;
+    exponent + m * (1.42 + m * (-0.5717 + m * 0.1517))
+}
+
+/// Power of 2, to 0.012 %: that of the floor of `x`, times a cubic of the rest that is exact at both its ends. `x` lies within the
+/// exponents of normal numbers.
+#[inline]
+fn exp2(x: f64) -> f64 {
+    #[allow(clippy::cast_possible_truncation)]
+    let biased = (x + 1023.0) as i32;
+    let m = x + 1023.0 - f64::from(biased);
+    let power = f64::from_bits(u64::from(biased.unsigned_abs()) << 52);
+    power * (1.0 + m * (0.695 + m * (0.2275 + m * 0.0775)))
+}
+
+/// A first guess of the step size (algorithm II.4.14 of the source), with times in units of the interval and each state in
+/// units of its size, or where it starts at 0 of what it becomes at its first rate in a thousandth of the interval: so that the
+/// guess depends on no unit.
+pub(super) fn first_step<S: Scalar, D: Dynamics<S>>(
+    f: &D,
+    (t, end): (f64, f64),
+    x: &D::State,
+    slope: &D::State,
+    order: f64,
+) -> f64 {
+    let span = end - t;
+    let slope = slope.as_ref();
+    let size = |i: usize| match x.as_ref()[i].value().abs() {
+        0.0 => 1e-3 * span * slope[i].value().abs(),
+        size => size,
+    };
+    // Sizes over the tolerance of the default; the guess goes with its fifth root.
+    let scaled = |v: &[S]| {
+        let ratio = |i: usize| if size(i) > 0.0 { v[i].value() / (1e-8 * size(i)) } else { 0.0 };
+        #[allow(clippy::cast_precision_loss)]
+        let n = v.len().max(1) as f64;
+        ((0..v.len()).map(|i| ratio(i) * ratio(i)).sum::<f64>() / n).sqrt()
+    };
+    let (mut stage, mut derivative) = (x.clone(), x.clone());
+    let (d0, d1) = (scaled(x.as_ref()), span * scaled(slope));
+    let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { (0.01 * d0 / d1).min(1.0) };
+    for (i, s) in stage.as_mut().iter_mut().enumerate() {
+        *s = x.as_ref()[i] + slope[i] * (h0 * span);
+    }
+    f.derivative(t + h0 * span, &stage, &mut derivative);
+    for (i, s) in stage.as_mut().iter_mut().enumerate() {
+        *s = derivative.as_ref()[i] - slope[i];
+    }
+    let d2 = span * scaled(stage.as_ref()) / h0;
+    let largest = d1.max(d2);
+    let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { math::powf(0.01 / largest, 1.0 / order) };
+    let h = (100.0 * h0).min(h1).min(1.0) * span;
+    if h.is_finite() && h > 0.0 { h } else { 1e-6 * span }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logarithm_and_power_are_as_near_as_they_say() {
+        for k in -3000..3000 {
+            let x = f64::from(k) / 97.0;
+            let power = math::exp2(x);
+            assert!((exp2(x) / power - 1.0).abs() < 1.2e-4, "{x}");
+            assert!((log2(power) - x).abs() < 1.1e-3, "{x}");
+        }
+    }
+
+    #[test]
+    fn an_error_of_the_tolerance_leaves_the_safety_and_a_rejection_stays_within_its_bounds() {
+        let mut sizes = StepSizes { order: 5.0, last: 0.0 };
+        assert_eq!(sizes.after_acceptance(1.0, false), SAFETY);
+        assert_eq!(sizes.after_acceptance(0.0, false), LONGEST);
+        assert_eq!(sizes.after_acceptance(1e-3, true), 1.0);
+        assert!((sizes.after_rejection(32.0) - SAFETY / 2.0).abs() < 1e-12);
+        assert_eq!((sizes.after_rejection(1e300), sizes.after_rejection(f64::NAN)), (SHORTEST, WITHOUT_ERROR));
+    }
+}
