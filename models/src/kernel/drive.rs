@@ -93,6 +93,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
         let value = Enclosure::from(self.value.value());
         match &self.curve {
             Some(curve) => value + curve.enclose(time),
+            None if self.slope == 0.0 => value,
             None => value + (time - Enclosure::from(self.since)) * Enclosure::from(self.slope),
         }
     }

@@ -1,7 +1,7 @@
 //! An accepted step and its dense output.
 
 use mops_core::Scalar;
-use mops_core::enclosure::Enclosure;
+use mops_core::enclosure::{Enclosure, Interval};
 
 /// An accepted step from `start` to `start + taken`, with its dense output.
 pub struct Step<X> {
@@ -83,19 +83,13 @@ impl<X> Step<X> {
         X: AsRef<[S]>,
     {
         let (m, radius) = (0.5 * (from + to), 0.5 * (to - from));
-        let length = self.length;
+        let per_second = Interval::point(1.0 / self.length);
         let [r0, r1, r2, r3, r4] = &self.dense;
         bounds.clear();
         bounds.extend((0..r0.as_ref().len()).map(|i| {
             let r = [r0, r1, r2, r3, r4].map(|r| r.as_ref()[i].value());
-            let taylor = taylor(r, m);
-            let mut scale = 1.0;
-            let per_second = taylor.map(|c| {
-                let scaled = c * scale;
-                scale /= length;
-                scaled
-            });
-            Enclosure::of_polynomial(&per_second, radius * length)
+            let Enclosure { value, rate } = Enclosure::of_polynomial(&taylor(r, m), radius);
+            Enclosure { value, rate: rate * per_second }
         }));
     }
 }
@@ -130,7 +124,7 @@ mod tests {
             for k in 0..=20 {
                 let theta = from + (to - from) * f64::from(k) / 20.0;
                 let slope = (at(theta + 1e-6) - at(theta - 1e-6)) / (2e-6 * step.length);
-                let wider = |i: mops_core::enclosure::Interval| (i.low - 1e-7, i.high + 1e-7);
+                let wider = |i: Interval| (i.low - 1e-7, i.high + 1e-7);
                 let (value, rate) = (wider(bounds[0].value), wider(bounds[0].rate));
                 assert!(value.0 <= at(theta) && at(theta) <= value.1, "{bounds:?} {theta}");
                 assert!(rate.0 <= slope && slope <= rate.1, "{bounds:?} {theta} {slope}");

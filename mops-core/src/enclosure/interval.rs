@@ -22,10 +22,29 @@ impl Interval {
     /// Every number.
     pub const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
+    /// 0 alone.
+    pub const ZERO: Self = Self { low: 0.0, high: 0.0 };
+
     /// The interval between two bounds in any order; every number if one of them is NaN.
     #[must_use]
+    #[inline]
     pub fn between(a: f64, b: f64) -> Self {
-        if a.is_nan() || b.is_nan() { Self::ALL } else { Self { low: a.min(b), high: a.max(b) } }
+        if a <= b { Self { low: a, high: b } } else { Self::ordered(b, a) }
+    }
+
+    /// The interval between two bounds; every number if one of them is NaN.
+    #[inline]
+    fn ordered(low: f64, high: f64) -> Self {
+        if low <= high { Self { low, high } } else { Self::ALL }
+    }
+
+    /// The least interval that contains all of these numbers.
+    #[inline]
+    fn spanning(numbers: [f64; 4]) -> Self {
+        // Comparisons are single instructions, `f64::min` looks for NaN besides; a NaN would be left by them here and there.
+        let pick = |first: fn(f64, f64) -> bool| numbers.into_iter().reduce(|a, b| if first(b, a) { b } else { a });
+        let [low, high] = [pick(|b, a| b < a), pick(|b, a| b > a)].map(|bound| bound.expect("there are four"));
+        if numbers.iter().any(|n| n.is_nan()) { Self::ALL } else { Self { low, high } }
     }
 
     /// One number; every number for NaN.
@@ -145,25 +164,27 @@ impl Add for Interval {
     type Output = Self;
     #[inline]
     fn add(self, o: Self) -> Self {
-        Self::between(self.low + o.low, self.high + o.high)
+        Self::ordered(self.low + o.low, self.high + o.high)
     }
 }
 impl Sub for Interval {
     type Output = Self;
     #[inline]
     fn sub(self, o: Self) -> Self {
-        Self::between(self.low - o.high, self.high - o.low)
+        Self::ordered(self.low - o.high, self.high - o.low)
     }
 }
 impl Mul for Interval {
     type Output = Self;
     #[inline]
     fn mul(self, o: Self) -> Self {
+        let pairs = [(self.low, o.low), (self.low, o.high), (self.high, o.low), (self.high, o.high)];
+        let products = pairs.map(|(a, b)| a * b);
+        if products.iter().sum::<f64>().is_finite() {
+            return Self::spanning(products);
+        }
         // 0 times a bound that is infinite is 0: the numbers themselves are finite.
-        let times = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
-        let [a, b, c, d] =
-            [times(self.low, o.low), times(self.low, o.high), times(self.high, o.low), times(self.high, o.high)];
-        Self::between(a.min(b).min(c).min(d), a.max(b).max(c).max(d))
+        Self::spanning(pairs.map(|(a, b)| if a == 0.0 || b == 0.0 { 0.0 } else { a * b }))
     }
 }
 impl Div for Interval {
@@ -173,8 +194,7 @@ impl Div for Interval {
         if o.contains(0.0) {
             return Self::ALL;
         }
-        let [a, b, c, d] = [self.low / o.low, self.low / o.high, self.high / o.low, self.high / o.high];
-        Self::between(a.min(b).min(c).min(d), a.max(b).max(c).max(d))
+        Self::spanning([self.low / o.low, self.low / o.high, self.high / o.low, self.high / o.high])
     }
 }
 impl Neg for Interval {

@@ -25,7 +25,7 @@ pub struct Enclosure {
 
 impl From<f64> for Enclosure {
     fn from(x: f64) -> Self {
-        Self { value: Interval::point(x), rate: Interval::point(0.0) }
+        Self { value: Interval::point(x), rate: Interval::ZERO }
     }
 }
 
@@ -42,18 +42,27 @@ impl Enclosure {
     /// The polynomial `sum_k c_k d^k` of the distance `d` from the middle of the interval, `|d| <= radius` in s.
     #[must_use]
     pub fn of_polynomial(coefficients: &[f64], radius: f64) -> Self {
-        let Some((&centre, rest)) = coefficients.split_first() else { return Self::from(0.0) };
-        let mut value = Interval::point(centre);
-        let mut rate = Interval::point(0.0);
-        let (mut power, mut order) = (1.0, 1.0);
-        for (k, &c) in (1..).zip(rest) {
-            let slope = order * c * power;
-            rate = rate + if k % 2 == 1 && k > 1 { Interval::between(0.0, slope) } else { symmetric(k == 1, slope) };
-            power *= radius;
-            value = value + if k % 2 == 0 { Interval::between(0.0, c * power) } else { symmetric(false, c * power) };
+        // Middles and radii: even powers of `d` lie between 0 and that of the radius, odd ones between both signs of it.
+        let (mut value, mut rate) = ([0.0; 2], [0.0; 2]);
+        let add = |sum: &mut [f64; 2], term: f64, power: usize| match power {
+            0 => sum[0] += term,
+            power if power % 2 == 0 => {
+                sum[0] += 0.5 * term;
+                sum[1] += 0.5 * term.abs();
+            }
+            _ => sum[1] += term.abs(),
+        };
+        let (mut power, mut order) = (1.0, 0.0);
+        for (k, &c) in coefficients.iter().enumerate() {
+            if k > 0 {
+                add(&mut rate, order * c * power, k - 1);
+                power *= radius;
+            }
+            add(&mut value, c * power, k);
             order += 1.0;
         }
-        Self { value, rate }
+        let around = |[middle, radius]: [f64; 2]| Interval::around(middle, radius);
+        Self { value: around(value), rate: around(rate) }
     }
 
     /// A function of it, from the bounds of the function and of its derivative.
@@ -176,11 +185,6 @@ impl Enclosure {
     }
 }
 
-/// `[-|c|, |c|]`; the point `c` itself where it is `constant`.
-fn symmetric(constant: bool, c: f64) -> Interval {
-    if constant { Interval::point(c) } else { Interval::between(-c, c) }
-}
-
 /// The results of an even function that rises with the absolute value.
 fn even(x: Interval, f: impl Fn(f64) -> f64) -> Interval {
     let least = if x.contains(0.0) { 0.0 } else { x.low.abs().min(x.high.abs()) };
@@ -205,7 +209,15 @@ impl Mul for Enclosure {
     type Output = Self;
     #[inline]
     fn mul(self, o: Self) -> Self {
-        Self { value: self.value * o.value, rate: self.rate * o.value + self.value * o.rate }
+        let value = self.value * o.value;
+        // Most factors are constants.
+        let rate = match [self.rate, o.rate].map(|rate| rate == Interval::ZERO) {
+            [true, true] => Interval::ZERO,
+            [true, false] => self.value * o.rate,
+            [false, true] => self.rate * o.value,
+            [false, false] => self.rate * o.value + self.value * o.rate,
+        };
+        Self { value, rate }
     }
 }
 impl Div for Enclosure {
