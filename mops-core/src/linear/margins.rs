@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
-use super::enclosure::{Enclosure, Span};
+use super::bounded_response::{BoundedResponse, Span};
 use super::search::passes;
 use super::{Complex, StateSpace};
 use crate::math::{self, complex};
@@ -31,7 +31,7 @@ pub struct Crossing {
 #[derive(Debug, Clone)]
 pub struct Loop {
     pub(super) system: StateSpace,
-    pub(super) response: Enclosure,
+    pub(super) response: BoundedResponse,
     /// Where `|L| = 1`, by rising frequency.
     pub gain_crossovers: Vec<Crossing>,
     /// Number of closed-loop poles with a real part of 0 or more; none where it is infinite.
@@ -50,7 +50,7 @@ impl Loop {
         if !(system.delay >= 0.0 && system.delay.is_finite()) {
             return Err(format!("a delay must not be negative, but is {} s", system.delay));
         }
-        let response = Enclosure::new(&system)?;
+        let response = BoundedResponse::new(&system)?;
         let mut found = Self { system, response, gain_crossovers: Vec::new(), unstable: None };
         found.gain_crossovers = found.level(1.0)?;
         found.unstable = found.unstable_with(1.0, &found.gain_crossovers)?;

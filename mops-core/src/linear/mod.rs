@@ -2,10 +2,10 @@
 //!
 //! Pure computation on small dense matrices. What a user can ask for and has no answer is an error of one sentence.
 
+mod bounded_response;
 mod components;
 mod controllability;
 mod eigen;
-mod enclosure;
 mod equilibrium;
 mod lyapunov;
 mod margins;

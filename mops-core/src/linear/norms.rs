@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::enclosure::{Enclosure, Span};
+use super::bounded_response::{BoundedResponse, Span};
 use super::search::{highest, maximise};
 use super::system::{above, beside};
 use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, undecided, zeros};
@@ -64,7 +64,7 @@ pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
     let system = StateSpace { delay: 0.0, ..system.clone() };
     let end = Peak { gain: largest_singular_value(&system.d.map(|d| Complex::new(d, 0.0))), frequency: f64::INFINITY };
     if system.b.ncols() == 1 && system.c.nrows() == 1 {
-        let (gain, frequency) = highest(&Enclosure::new(&system)?, complex::norm, Span::gain)?;
+        let (gain, frequency) = highest(&BoundedResponse::new(&system)?, complex::norm, Span::gain)?;
         return Ok(if end.gain > gain { end } else { Peak { gain, frequency } });
     }
     let response = system.response()?;

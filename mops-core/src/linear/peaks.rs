@@ -1,6 +1,6 @@
 //! Peaks of the sensitivities of a feedback loop, and bandwidths.
 
-use super::enclosure::{Closed, Enclosure, Span};
+use super::bounded_response::{BoundedResponse, Closed, Span};
 use super::search::{highest, passes};
 use super::{Complex, Loop, StateSpace};
 use crate::math::{self, complex};
@@ -55,7 +55,7 @@ impl Loop {
 /// A gain at frequency 0 that is 0 or infinite, or that is never so far below.
 pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
     // A delay changes no gain.
-    let response = Enclosure::new(&StateSpace { delay: 0.0, ..system.clone() })?;
+    let response = BoundedResponse::new(&StateSpace { delay: 0.0, ..system.clone() })?;
     let level = three_decibels_below(complex::norm(response.at(0.0)))?;
     first_below(&response, level, |l| math::ln(complex::norm(l)), Span::gain)
 }
@@ -71,7 +71,7 @@ fn three_decibels_below(start: f64) -> Result<f64, String> {
 
 /// The lowest frequency at which a value falls below a level.
 fn first_below(
-    of: &Enclosure,
+    of: &BoundedResponse,
     level: f64,
     value: impl Fn(Complex) -> f64,
     bounds: impl Fn(&Span) -> [f64; 2],

@@ -4,7 +4,7 @@
 //! and 8.
 
 use super::Complex;
-use super::enclosure::{Enclosure, Span};
+use super::bounded_response::{BoundedResponse, Span};
 use crate::math;
 
 /// Ranges looked at until a search counts as hopeless: a delay that turns the response a hundred thousand times.
@@ -26,7 +26,7 @@ const SURE: f64 = 1e-6;
 /// # Errors
 /// More ranges than can be looked at.
 pub(super) fn passes(
-    of: &Enclosure,
+    of: &BoundedResponse,
     value: impl Fn(Complex) -> f64,
     bounds: impl Fn(&Span) -> [f64; 2],
     mut found: impl FnMut(f64, bool) -> bool,
@@ -70,7 +70,7 @@ pub(super) fn passes(
 /// # Errors
 /// More ranges than can be looked at.
 pub(super) fn highest(
-    of: &Enclosure,
+    of: &BoundedResponse,
     value: impl Fn(Complex) -> f64,
     bounds: impl Fn(&Span) -> [f64; 2],
 ) -> Result<(f64, f64), String> {

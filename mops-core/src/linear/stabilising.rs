@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::f64::consts::TAU;
 
 use super::Loop;
-use super::enclosure::Span;
+use super::bounded_response::Span;
 use super::margins::{Crossing, STRONG};
 use crate::math::{self, complex};
 

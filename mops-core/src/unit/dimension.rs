@@ -29,9 +29,9 @@ const NAMED: [(&str, [f64; 7]); 10] = [
 const SAME: f64 = 1e-9;
 
 impl Dimension {
-    /// That of a pure number.
+    /// Dimension of a pure number.
     pub const NONE: Self = Self([0.0; 7]);
-    /// That of a time.
+    /// Dimension of a time.
     pub const TIME: Self = Self([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
 
     /// Whether it is that of a pure number.
@@ -39,7 +39,7 @@ impl Dimension {
         *self == Self::NONE
     }
 
-    /// That of the product with the power `exponent` of a quantity of dimension `other`.
+    /// Dimension of the product with the power `exponent` of a quantity of dimension `other`.
     #[must_use]
     pub fn times(mut self, other: &Self, exponent: f64) -> Self {
         for (sum, power) in self.0.iter_mut().zip(other.0) {

@@ -19,7 +19,7 @@ const LOST: f64 = 1e-10;
 /// A response `L(j w)` of one input and output with its poles and zeros, which bound how much it changes from one frequency
 /// to another.
 #[derive(Debug, Clone)]
-pub(super) struct Enclosure {
+pub(super) struct BoundedResponse {
     response: FrequencyResponse,
     /// Zeros with 1, poles with -1.
     roots: Vec<(Complex, f64)>,
@@ -28,7 +28,7 @@ pub(super) struct Enclosure {
     corners: [f64; 2],
 }
 
-impl Enclosure {
+impl BoundedResponse {
     /// The response of a system with one input and one output.
     ///
     /// # Errors
@@ -210,7 +210,7 @@ impl Span {
     }
 
     /// Two halves: of the logarithm where the ends are far apart.
-    pub fn split(&self, of: &Enclosure) -> [Self; 2] {
+    pub fn split(&self, of: &BoundedResponse) -> [Self; 2] {
         let middle = match () {
             () if self.low == 0.0 => 0.1 * self.high,
             () if self.high > 4.0 * self.low => (self.low * self.high).sqrt(),
