@@ -32,6 +32,9 @@ pub(super) fn passes(
     mut found: impl FnMut(f64, bool) -> bool,
 ) -> Result<(), String> {
     let lowest = 1e-12 * of.corners()[0];
+    // A value that passes 0 at an end of a range may lie on either side of the bounds of both its neighbours.
+    let inaccuracy = of.inaccuracy();
+    let touching = TOUCHING.max(inaccuracy);
     let mut open = of.spans();
     open.reverse();
     let mut looked = 0;
@@ -41,7 +44,7 @@ pub(super) fn passes(
             return Err(too_many());
         }
         let [low, high] = bounds(&span);
-        if low > 0.0 || high < 0.0 || span.high <= lowest {
+        if low > inaccuracy || high < -inaccuracy || span.high <= lowest {
             continue;
         }
         let change = high - low;
@@ -56,7 +59,7 @@ pub(super) fn passes(
             }
         }
         // Where nothing is known yet the change is not a number.
-        if (change.is_nan() || change > TOUCHING) && span.high - span.low > 1e-13 * span.high {
+        if (change.is_nan() || change > touching) && span.high - span.low > 1e-13 * span.high {
             let [first, second] = span.split(of);
             open.extend([second, first]);
         }

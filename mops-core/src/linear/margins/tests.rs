@@ -235,3 +235,32 @@ fn undamped_and_lightly_damped_loops_are_searched_in_little_time() {
     let all_pass = loop_of(&[-0.5, 0.5], &[1.0, 1.0], 0.5);
     assert!(all_pass.is_stable() && all_pass.gain_margin(false).unwrap() > 0.0);
 }
+
+/// Frequencies at which the search divides the axis: corners, and powers of ten beside them.
+#[test]
+fn what_happens_at_a_corner_is_found() {
+    let mut stream = crate::random::stream(7, "corners");
+    let mut corners = vec![0.1, 0.5, 1.0, 2.0, 10.0, 1.0 / 3.0, 51.0, 2127.659_574_468_085];
+    corners.extend((0..200).map(|_| math::powf(10.0, rand::Rng::random_range(&mut stream, -3.0..4.0))));
+    for a in corners {
+        let system = |numerator: &[f64], denominator: &[f64]| loop_of(numerator, denominator, 0.0).system;
+        let crossover = |l: &Loop| l.gain_crossovers.iter().map(|c| c.frequency).collect::<Vec<_>>();
+        assert_near(bandwidth(&system(&[a], &[1.0, a])).unwrap(), a, 1e-12 * a);
+        assert_near(bandwidth(&system(&[1.0], &[1.0 / a, 1.0])).unwrap(), a, 1e-12 * a);
+        let butterworth = [1.0, 2.0f64.sqrt() * a, a * a];
+        assert_near(bandwidth(&system(&[a * a], &butterworth)).unwrap(), a, 1e-10 * a);
+        assert_near(loop_of(&[a], &[1.0, 0.0], 0.0).closed_loop_bandwidth().unwrap(), a, 1e-12 * a);
+        // sqrt(2) a/(s + a) and sqrt(2) a^2/(s (s + a)) have the gain 1 at a; a phase of -45 and of -135 degrees.
+        let lag = loop_of(&[2.0f64.sqrt() * a], &[1.0, a], 0.0);
+        assert_near(crossover(&lag)[0], a, 1e-12 * a);
+        assert_near(lag.phase_margin().unwrap(), 0.75 * PI, 1e-12);
+        let servo = loop_of(&[2.0f64.sqrt() * a * a], &[1.0, a, 0.0], 0.0);
+        assert_near(crossover(&servo)[0], a, 1e-12 * a);
+        assert_near(servo.phase_margin().unwrap(), 0.25 * PI, 1e-12);
+        assert_near(servo.delay_margin().unwrap(), 0.25 * PI / a, 1e-12 / a);
+        assert_near(crossover(&loop_of(&[a * a], &[1.0, 0.0, 0.0], 0.0))[0], a, 1e-12 * a);
+        // K/(s (s^2 + 0.8 a s + a^2)) is real at a, where it is -K/(0.8 a^3).
+        let resonant = loop_of(&[0.4 * a * a * a], &[1.0, 0.8 * a, a * a, 0.0], 0.0);
+        assert_near(resonant.gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-9);
+    }
+}
