@@ -38,7 +38,7 @@ impl CriterionSpec for CrossoverFrequency {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let value = |system: StateSpace| {
             let still = complex::norm(system.response()?.scalar(0.0));
             match feedback(system)?.gain_crossovers.last() {

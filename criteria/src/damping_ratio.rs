@@ -37,7 +37,7 @@ impl CriterionSpec for DampingRatio {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.read_as(self.of)?;
         let of = self.of;
         let damping = |p: &Complex| if complex::norm(*p) == 0.0 { 0.0 } else { -p.re / complex::norm(*p) };
         let value = move |system| Ok(poles(&system, of)?.iter().map(damping).fold(1.0, f64::min).into());

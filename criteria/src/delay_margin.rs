@@ -37,7 +37,7 @@ impl CriterionSpec for DelayMargin {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let value = |system| Ok(capped(feedback(system)?.delay_margin()?, 1e6));
         Ok(LinearCriterion::boxed(channel, Values::of(second(), Sense::More), value))
     }

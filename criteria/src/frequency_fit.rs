@@ -102,7 +102,7 @@ mod tests {
     use mops_core::{Experiment, ResponseData};
 
     use super::*;
-    use crate::common::testing::{assert_near, bound, linear, mistake, undefined_in, value_in};
+    use crate::common::testing::{assert_near, channel, linear, mistake, undefined_in, value_in};
 
     fn measured(response: impl Fn(f64) -> Complex) -> Case {
         let frequencies: Vec<f64> = (1..=20).map(|i| 0.3 * f64::from(i)).collect();
@@ -141,7 +141,7 @@ mod tests {
         let absolute = FrequencyFit { absolute: true, ..fit() };
         let off = value_in(&measured(|w| lag(w) + 0.2), &absolute, &linear(&[3.0], &[1.0, 2.0]));
         assert_near(off.number, 0.04, 1e-14);
-        assert_eq!(bound(&absolute).unit(), Unit::known("m2/V2"));
+        assert_eq!(absolute.bind(&channel("V", "m")).unwrap().unit(), Unit::known("m2/V2"));
         assert_eq!(
             undefined_in(&Case::default(), &fit(), &linear(&[3.0], &[1.0, 2.0])),
             "`` does not measure the response of `y`"

@@ -40,7 +40,7 @@ impl CriterionSpec for GainMargin {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let both = self.either_way;
         let value = move |system| Ok(capped(feedback(system)?.gain_margin(both)?, 200.0));
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("dB"), Sense::More), value))

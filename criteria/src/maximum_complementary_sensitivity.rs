@@ -34,7 +34,7 @@ impl CriterionSpec for MaximumComplementarySensitivity {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::one(), Sense::Less).within(0.0, f64::INFINITY), |system| {
             Ok(feedback(system)?.peak_complementary()?.into())
         }))

@@ -10,9 +10,10 @@ use crate::common::{NOT_NEGATIVE, signal, trace};
 
 /// `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
 ///
-/// Which values are better depends on the signal: `demand` asks for at most that value, the pair `good` and `bad` for either
-/// side. Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A minimum, and
-/// any value that may be zero or negative, is demanded by the pair `good` and `bad` rather than by `demand`.
+/// Which values are better depends on the signal: `demand` asks for a maximum or an absolute peak of at most that value, the
+/// pair `good` and `bad` for either side. A minimum takes no `demand`, as it may be meant either way: it takes the pair, or
+/// `usage = "equality"`. Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A
+/// value that may be zero or negative is demanded by the pair.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (the peak norm of a signal).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -63,7 +64,12 @@ impl Criterion for Bound {
     }
 
     fn sense(&self) -> Sense {
-        if self.of == Extremum::Absolute { Sense::Less } else { Sense::Open }
+        match self.of {
+            Extremum::Absolute => Sense::Less,
+            Extremum::Maximum => Sense::Open,
+            // A demand of 5 degC on the least temperature may be meant either way.
+            Extremum::Minimum => Sense::Target,
+        }
     }
 
     fn range(&self) -> [f64; 2] {

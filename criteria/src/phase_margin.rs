@@ -40,7 +40,7 @@ impl CriterionSpec for PhaseMargin {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let value = |system| Ok(capped(feedback(system)?.phase_margin()?, PI));
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("rad"), Sense::More).within(-PI, PI), value))
     }

@@ -52,6 +52,13 @@ impl CriterionSpec for SettlingTime {
         let step = options.bind(signals)?;
         let absolute = positive("band", self.band.as_ref(), &step.unit)?;
         let relative = positive("relative-band", self.relative_band.as_ref(), &Unit::one())?;
+        if let Some(relative) = relative.filter(|relative| *relative >= 1.0) {
+            let fact =
+                format!("a band of {relative} times the step holds its start: what never moves would be settled");
+            return Err(Mistake::new("relative-band", fact).with_help(format!(
+                "a fraction of the step is expected; if these are percent, write \"{relative} %\""
+            )));
+        }
         let band = match (absolute, relative) {
             (Some(_), Some(_)) => {
                 return Err(Mistake::new("relative-band", "`band` and `relative-band` exclude each other")

@@ -35,7 +35,7 @@ impl CriterionSpec for SlowestPole {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
-        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.read_as(self.of)?;
         let of = self.of;
         let value = move |system| {
             let poles = poles(&system, of)?;

@@ -26,6 +26,10 @@ pub struct Channel {
     signal: String,
     /// Unit of the output over that of the input.
     pub unit: Unit,
+    /// Names and units of the input and the output.
+    ends: [Variable; 2],
+    /// Factor of the output: 1 but for a loop whose ends have different units of one dimension.
+    factor: f64,
 }
 
 impl Channel {
@@ -39,12 +43,52 @@ impl Channel {
             (to, from) if to == from => Unit::one(),
             (to, from) => Unit::known(&format!("({to})/({from})")),
         };
-        Ok(Self { input, output, signal: model.signals[output].name.clone(), unit })
+        let signal = model.signals[output].name.clone();
+        let ends = [model.inputs[input].clone(), model.signals[output].clone()];
+        Ok(Self { input, output, signal, unit, ends, factor: 1.0 })
+    }
+
+    /// The channel as a loop transfer function: the output is fed back to the input, so that it is counted in the unit of the
+    /// input.
+    ///
+    /// # Errors
+    /// An output that has not the dimension of the input.
+    pub fn in_loop(self) -> Result<Self, Mistake> {
+        let [from, to] = &self.ends;
+        if !to.unit.is_compatible(&from.unit) {
+            let fact = format!(
+                "unity feedback cannot close a loop from `{}` in {} to `{}` in {}",
+                from.name, from.unit, to.name, to.unit
+            );
+            return Err(Mistake::here(fact).with_help(
+                "a loop begins and ends in the same dimension: add the controller and the sensor to the model, or read \
+                 another input or output",
+            ));
+        }
+        let factor = to.unit.factor() / from.unit.factor();
+        Ok(Self { factor, ..self })
+    }
+
+    /// The channel as a system, or as a loop transfer function.
+    ///
+    /// # Errors
+    /// See [`Channel::in_loop`].
+    pub fn read_as(self, of: Of) -> Result<Self, Mistake> {
+        match of {
+            Of::System => Ok(self),
+            Of::ClosedLoop => self.in_loop(),
+        }
     }
 
     /// The system from the input to the output.
     pub fn system(&self, analysis: &Analysis) -> StateSpace {
-        analysis.linear().expect("checked when the study is built").channel(self.input, self.output)
+        let linear = analysis.linear().expect("checked when the study is built");
+        let mut system = linear.channel(self.input, self.output);
+        if self.factor != 1.0 {
+            system.c *= self.factor;
+            system.d *= self.factor;
+        }
+        system
     }
 }
 
@@ -141,4 +185,33 @@ pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_core::linear::Compl
 /// The loop with this transfer function.
 pub fn feedback(system: StateSpace) -> Result<Loop, String> {
     Loop::new(system)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, channel, linear};
+    use crate::phase_margin::PhaseMargin;
+    use mops_core::CriterionSpec;
+
+    #[test]
+    fn a_loop_is_closed_in_one_dimension_and_counted_in_one_unit() {
+        let margin = |from: &str, to: &str, gain: f64| {
+            let criterion = PhaseMargin::default().bind(&channel(from, to))?;
+            Ok::<f64, Mistake>(criterion.value(&Case::default(), &linear(&[gain], &[1.0, 1.0, 0.0])).unwrap().number)
+        };
+        let exact = margin("rad", "rad", 3.0).unwrap();
+        for (from, to, gain) in
+            [("V", "mV", 3e3), ("mV", "V", 3e-3), ("degC", "K", 3.0), ("rad", "deg", 540.0 / std::f64::consts::PI)]
+        {
+            assert_near(margin(from, to, gain).unwrap(), exact, 1e-12);
+        }
+        for (from, to) in [("V", "rad/s"), ("1", "m"), ("N", "1")] {
+            let mistake = margin(from, to, 1.0).unwrap_err().to_string();
+            assert!(
+                mistake.contains(&format!("unity feedback cannot close a loop from `u` in {from} to `y` in {to}")),
+                "{mistake}"
+            );
+        }
+    }
 }

@@ -12,16 +12,21 @@ pub fn signals() -> Vec<Variable> {
     [("y", "m"), ("u", "V"), ("phi", "rad")].map(|(name, unit)| Variable::new(name, unit, "")).to_vec()
 }
 
-/// The model of all tests of a criterion: signals over time, or a system from `u` in V to `y` in m.
+/// The model of all tests of a criterion: signals over time, or a system from `u` in V to `y` in V.
 fn model(reads: AnalysisKind) -> Interface {
     match reads {
         AnalysisKind::Time => Interface { signals: signals(), ..Interface::default() },
-        AnalysisKind::Linear => Interface {
-            signals: vec![Variable::new("y", "m", "")],
-            inputs: vec![Variable::new("u", "V", "")],
-            analysis: AnalysisKind::Linear,
-            ..Interface::default()
-        },
+        AnalysisKind::Linear => channel("V", "V"),
+    }
+}
+
+/// A linear model from `u` to `y`, in these units.
+pub fn channel(from: &str, to: &str) -> Interface {
+    Interface {
+        signals: vec![Variable::new("y", to, "")],
+        inputs: vec![Variable::new("u", from, "")],
+        analysis: AnalysisKind::Linear,
+        ..Interface::default()
     }
 }
 

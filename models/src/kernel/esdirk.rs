@@ -237,12 +237,19 @@ impl<X: Clone> Esdirk<X> {
         let time = t + C[stage] * h;
         let mut last = f64::NAN;
         let mut converged = false;
-        // How much is left of the error when the iteration begins is known from the steps before.
-        self.contraction = math::powf(self.contraction.max(1e-16), 0.8);
+        // How much an iteration leaves of the error is known from the steps before; factors of another step length leave up to
+        // the relative difference of the lengths.
+        let mismatch = (h / self.factors_for - 1.0).abs();
+        self.contraction = math::powf(self.contraction.max(1e-16), 0.8).max(mismatch);
         for iteration in 0..ITERATIONS {
             self.newton_step(f, time, h, z, work);
             let abs = |x: &X, j: usize| x.as_ref()[j].value().abs();
-            let update = |j: usize| (self.update.as_ref()[j].value(), [abs(x, j), abs(z, j), 0.0]);
+            // A state that leaves 0 counts as what the iteration makes of it.
+            let update = |j: usize| {
+                let update = self.update.as_ref()[j].value();
+                let moved = (z.as_ref()[j].value() + update).abs();
+                (update, [abs(x, j), abs(z, j).max(moved), 0.0])
+            };
             let size = weights.norm(h, n, update);
             if !size.is_finite() {
                 return false;
@@ -441,6 +448,35 @@ mod tests {
             let slope = (high[i] - low[i]) / 2e-3;
             assert!((x[i].tangent[0] - slope).abs() < 1e-5 * slope.abs().max(1e-2), "{:?} {slope}", x[i]);
         }
+    }
+
+    #[test]
+    fn what_rests_at_zero_is_pushed() {
+        /// `x1' = x2`, ..., `xn' = push(t)`, all 0 at the start.
+        struct Chain<const N: usize>(fn(f64) -> f64);
+        impl<const N: usize> Dynamics<f64> for Chain<N> {
+            type State = [f64; N];
+            fn derivative(&self, t: f64, x: &[f64; N], dx: &mut [f64; N]) {
+                dx.copy_from_slice(x);
+                dx.rotate_left(1);
+                dx[N - 1] = self.0(t);
+            }
+        }
+        fn end<const N: usize>(push: fn(f64) -> f64) -> f64 {
+            integrate(&mut Chain::<N>(push), 0.0, 1.0, [0.0; N], &stiff(1e-8), &mut ()).unwrap().0[0]
+        }
+        for unit in [1.0, 1e-30, 1e30] {
+            let near = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-6 * exact.abs(), "{found} {exact}");
+            let push: fn(f64) -> f64 = match unit {
+                1.0 => |_| 1.0,
+                1e-30 => |_| 1e-30,
+                _ => |_| 1e30,
+            };
+            let found = [end::<1>(push), end::<2>(push), end::<3>(push), end::<4>(push)];
+            found.into_iter().zip([1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0]).for_each(|(x, exact)| near(x, exact * unit));
+        }
+        let driven = end::<2>(|t| math::sin(t));
+        assert!((driven - (1.0 - math::sin(1.0))).abs() < 1e-7, "{driven}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use csv::{ByteRecord, ReaderBuilder};
 
 use super::Variable;
 use crate::diagnostic::{Diagnostic, Source};
+use crate::unit::Unit;
 
 /// Where the cells stand in the text.
 #[derive(Debug, Clone, Default)]
@@ -98,7 +99,8 @@ impl Header {
         }
         refuse_long_quotes(source, start, separator)?;
         let name = |(cell, k): (&Range<usize>, usize)| name_and_unit(&text[cell.clone()], k);
-        let names: Vec<_> = spans.iter().zip(1..).map(name).collect();
+        let mut names: Vec<_> = spans.iter().zip(1..).map(name).collect();
+        keep_labels_that_differ(&mut names);
         refuse_duplicates(source, &names, &spans)?;
         Ok(Self { separator, names, body: span.end, span })
     }
@@ -122,16 +124,41 @@ fn separator(text: &str, start: usize) -> u8 {
     [b';', b'\t'].into_iter().find(|separator| separates(*separator)).unwrap_or(b',')
 }
 
-/// `u [N*m]` is the name `u` with the unit `N*m`; a column without a name is called by its number.
+/// The name and the unit of a label: `u [N*m]`, or `u (N*m)` where the parentheses hold a unit.
+pub(super) fn label(text: &str) -> Option<(&str, &str)> {
+    let text = text.trim();
+    let within = |open: char, close: char| {
+        let (name, unit) = text.strip_suffix(close)?.rsplit_once(open)?;
+        Some((name.trim(), unit.trim()))
+    };
+    // `trial (2)` and `motor (left)` have none.
+    let is_unit = |text: &str| text.contains(|c: char| c.is_alphabetic() || c == '%') && Unit::parse(text).is_ok();
+    within('[', ']').or_else(|| within('(', ')').filter(|(name, unit)| !name.is_empty() && is_unit(unit)))
+}
+
+/// A cell of the header as name and unit; a column without a name is called by its number.
 fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
     let cell = cell.trim();
     let unquoted = cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"'));
     let cell = unquoted.map_or(cell.to_owned(), |cell| cell.replace("\"\"", "\""));
-    let bracket = cell.trim().strip_suffix(']').and_then(|cell| cell.rsplit_once('['));
-    let (name, unit) = bracket.unwrap_or((&cell, ""));
+    let (name, unit) = label(&cell).unwrap_or((&cell, ""));
     let (name, unit) = (name.trim(), unit.trim());
     let name = if name.is_empty() { k.to_string() } else { name.to_owned() };
     (name, (!unit.is_empty()).then(|| unit.to_owned()))
+}
+
+/// Columns such as `motor (V)` and `motor (A)`, which only their units tell apart, are called by the whole label.
+fn keep_labels_that_differ(names: &mut [(String, Option<String>)]) {
+    let count = |is_one: &dyn Fn(&(String, Option<String>)) -> bool| names.iter().filter(|other| is_one(other)).count();
+    let differs = |(name, unit): &(String, Option<String>)| {
+        unit.is_some()
+            && count(&|other| other.0 == *name) > 1
+            && count(&|other| other.0 == *name && other.1 == *unit) == 1
+    };
+    let differs: Vec<bool> = names.iter().map(differs).collect();
+    for ((name, unit), _) in names.iter_mut().zip(differs).filter(|(_, differs)| *differs) {
+        *name = format!("{name} ({})", unit.as_deref().unwrap_or_default());
+    }
 }
 
 fn refuse_duplicates(

@@ -198,6 +198,15 @@ impl DataFile {
         if let Some(variable) = index_of(name).filter(|&i| self.variables[i].columns == 1) {
             return Some((variable, 0));
         }
+        // The label of a column, as it stands in the header: `t [ms]`.
+        let labelled = csv::label(name).and_then(|(name, unit)| {
+            let has_unit =
+                |&i: &usize| self.variables[i].columns == 1 && self.variables[i].unit.as_deref() == Some(unit);
+            index_of(name).or_else(|| index_of(&format!("{name} ({unit})"))).filter(has_unit)
+        });
+        if let Some(variable) = labelled {
+            return Some((variable, 0));
+        }
         let (name, k) = name.rsplit_once(':')?;
         let variable = index_of(name).filter(|&i| self.variables[i].columns > 1)?;
         let k = k.parse::<usize>().ok()?.checked_sub(1)?;

@@ -45,6 +45,26 @@ mod csv {
     }
 
     #[test]
+    fn parentheses_with_a_unit_are_brackets_and_a_column_answers_to_its_label() {
+        let file = read("t (ms),T (\u{b0}C),speed (deg/s),trial (2),motor (left)\n0,1,2,3,4\n");
+        assert_eq!(file.column_names(), ["t", "T", "speed", "trial (2)", "motor (left)"]);
+        let units: Vec<_> = file.column_names().iter().map(|name| file.column(name).unwrap().unit).collect();
+        assert_eq!(units, [Some("ms"), Some("\u{b0}C"), Some("deg/s"), None, None]);
+        assert_eq!(file.time_column().as_deref(), Some("t"));
+        for label in ["t", "t (ms)", "t [ms]", " t(ms)"] {
+            assert_eq!(file.column(label).unwrap().unit, Some("ms"), "{label}");
+        }
+        assert!(file.column("t (s)").is_err());
+        for header in ["motor (V),motor (A)", "motor[V],motor[A]"] {
+            let motor = read(format!("{header}\n0,1\n").as_str());
+            assert_eq!(motor.column_names(), ["motor (V)", "motor (A)"]);
+            for label in ["motor (A)", "motor [A]"] {
+                assert_eq!(motor.column(label).unwrap().unit, Some("A"), "{header}");
+            }
+        }
+    }
+
+    #[test]
     fn separator_is_found_in_the_header() {
         for text in ["a,b\n1.5,2\n", "a;b\n1.5;2\n", "a;b\n1,5;2\n", "a\tb\n1.5\t2\n", "a[N,m];b\n1,5;2\n"] {
             let file = read(text);
@@ -132,9 +152,9 @@ mod csv {
             ("t,y\n0,1\n1\n", &format!("data:3:1: the row has 1 cell, the first line has 2; {cells}"), "1"),
             ("t,y\n0,1,5\n", &format!("data:2:1: the row has 3 cells, the first line has 2; {comma}"), "0,1,5"),
             (
-                "t[s],t[ms]\n0,1\n",
+                "t[s],t[s]\n0,1\n",
                 "data:1:6: two columns are called `t`: 1 and 2; rename one of them in the header",
-                "t[ms]",
+                "t[s]",
             ),
             (
                 "t y\n0 1\n",

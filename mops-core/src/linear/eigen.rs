@@ -1,5 +1,8 @@
 //! Eigenvalues of a real matrix.
 
+mod deflation;
+
+use deflation::Rounded;
 use nalgebra::DMatrix;
 
 use super::Complex;
@@ -9,8 +12,8 @@ use crate::math;
 
 /// The eigenvalues of a square matrix, complex ones as exact conjugate pairs, the one above the real axis first.
 ///
-/// The matrix is split into its strong components, each of them balanced, brought to Hessenberg form and treated by QR
-/// steps. An eigenvalue of a component of one state is its diagonal entry, exactly.
+/// The matrix is split into its strong components, each of them balanced, freed from eigenvalues that are 0, brought to
+/// Hessenberg form and treated by QR steps. An eigenvalue of a component of one state is its diagonal entry, exactly.
 ///
 /// # Errors
 /// An entry that is not finite, or, hardly ever, no convergence.
@@ -19,11 +22,13 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     for part in balanced_blocks(a)? {
         roots.extend(part.eigenvalues()?);
     }
+    roots.resize(a.nrows(), Complex::new(0.0, 0.0));
     Ok(roots)
 }
 
 /// The eigenvalues that rounding cannot tell from numbers on the imaginary axis: a perturbation of the size of the rounding
-/// errors moves them there. Those of a component of one state are exact, so that they are never among them.
+/// errors moves them there. Those of a component of one state are exact, and so are those that are 0 as rows depend on one
+/// another: they are never among them.
 ///
 /// An eigenvalue `z` is among them where the smallest singular value of `A - s` is at most `n eps |A|` all the way from
 /// `s = z` to `s = i Im z`. Source: L. N. Trefethen, M. Embree, Spectra and Pseudospectra (2005), section 2.
@@ -66,20 +71,32 @@ impl Block {
     }
 }
 
+/// The strong components but for eigenvalues that are 0, which are left out.
 fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
     if a.iter().any(|x| !x.is_finite()) {
         return Err("a matrix with an entry that is not finite has no eigenvalues".to_owned());
     }
-    let blocks = strong_components(a).into_iter().map(|indices| {
-        let mut matrix = block(a, &indices);
-        // A power of two, so that nothing is rounded; squares of entries then stay within the range of numbers.
-        let scale = math::exp2(math::log2(matrix.amax()).floor());
-        let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
-        matrix.unscale_mut(scale);
-        balance(&mut matrix);
-        Block { matrix, scale }
-    });
-    Ok(blocks.collect())
+    let mut blocks = Vec::new();
+    let mut open = vec![Rounded::given(a.clone())];
+    while let Some(a) = open.pop() {
+        for indices in strong_components(&a.entries) {
+            let mut part = a.map(|m| block(m, &indices));
+            // A power of two, so that nothing is rounded; squares of entries then stay within the range of numbers.
+            let scale = math::exp2(math::log2(part.entries.amax()).floor());
+            let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
+            part = part.map(|m| m / scale);
+            let scales = balance(&mut part.entries);
+            for (i, scale) in scales.into_iter().enumerate() {
+                part.errors.row_mut(i).unscale_mut(scale);
+                part.errors.column_mut(i).scale_mut(scale);
+            }
+            match part.without_zero() {
+                Some(rest) => open.push(rest.map(|m| m * scale)),
+                None => blocks.push(Block { matrix: part.entries, scale }),
+            }
+        }
+    }
+    Ok(blocks)
 }
 
 /// Scales rows and columns by powers of two, so that their norms agree: a similarity, without rounding. Returns the factors

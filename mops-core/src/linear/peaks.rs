@@ -64,6 +64,9 @@ pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
 fn three_decibels_below(start: f64) -> Result<f64, String> {
     if start > 0.0 && start.is_finite() {
         Ok(math::ln(start) - 0.5 * std::f64::consts::LN_2)
+    } else if !start.is_finite() {
+        let way_out = "a system with an integrator has no bandwidth, but its closed loop has: of = \"closed-loop\"";
+        Err(format!("the gain at frequency 0 is infinite: {way_out}"))
     } else {
         Err(format!("the gain at frequency 0 is {start}: there is no bandwidth"))
     }

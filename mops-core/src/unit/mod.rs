@@ -236,7 +236,7 @@ fn factor(text: &str) -> Option<(Unit, &str)> {
     let (mut unit, rest) = if let Some((inner, rest)) = parenthesis(text) {
         (Unit::parse(inner).ok()?, rest)
     } else {
-        let end = text.find(|c: char| !(c.is_alphabetic() || c == '%')).unwrap_or(text.len());
+        let end = text.find(|c: char| !(c.is_alphabetic() || "%\u{b0}".contains(c))).unwrap_or(text.len());
         let is_one = text.strip_prefix('1').is_some_and(|rest| rest.is_empty() || rest.trim_start().starts_with('/'));
         let end = if end == 0 && is_one { 1 } else { end };
         (symbol(&text[..end])?, &text[end..])
@@ -263,8 +263,15 @@ fn parenthesis(text: &str) -> Option<(&str, &str)> {
     Some((&inner[..end], &inner[end + 1..]))
 }
 
-/// The exponent with which a text begins, 1 where there is none, and the rest: `2`, `^-1`, `^0.5`, `^(1/2)`.
+/// The exponent with which a text begins, 1 where there is none, and the rest: `2`, `^-1`, `^0.5`, `^(1/2)`, superscripts.
 fn exponent(text: &str) -> Option<(f64, &str)> {
+    const SUPERSCRIPTS: &str = "\u{207b}\u{2070}\u{b9}\u{b2}\u{b3}\u{2074}\u{2075}\u{2076}\u{2077}\u{2078}\u{2079}";
+    let end = text.find(|c: char| !SUPERSCRIPTS.contains(c)).unwrap_or(text.len());
+    if end > 0 {
+        let plain = |c: char| SUPERSCRIPTS.chars().zip("-0123456789".chars()).find(|(raised, _)| *raised == c);
+        let digits: String = text[..end].chars().filter_map(plain).map(|(_, digit)| digit).collect();
+        return Some((limited(digits.parse().ok()?)?, &text[end..]));
+    }
     let (text, raised) = text.strip_prefix('^').map_or((text, false), |text| (text, true));
     if raised && let Some((inner, rest)) = parenthesis(text) {
         let (above, below) = inner.split_once('/').unwrap_or((inner, "1"));

@@ -33,6 +33,10 @@ impl Quantity {
             .ok_or_else(|| format!("`{text}` does not begin with a number, as in \"15 s\""))?;
         let number: f64 = text[..end].trim_end().parse().expect("checked in the search");
         let unit = text[end..].trim();
+        if let Some(rest) = unit.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+            let whole = text[..end].trim_end();
+            return Err(format!("`{text}` has a comma for its decimal point; write \"{whole}.{rest}\""));
+        }
         Ok(Self { number, unit: if unit.is_empty() { None } else { Some(Unit::parse(unit)?) } })
     }
 

@@ -264,3 +264,31 @@ fn what_happens_at_a_corner_is_found() {
         assert_near(resonant.gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-9);
     }
 }
+
+/// Two masses that are free to move, coupled by a spring and a damper, driven and measured (position and speed) at the first.
+#[test]
+fn loops_around_free_masses_have_the_margins_of_their_transfer_function() {
+    let mut stream = crate::random::stream(11, "masses");
+    for _ in 0..100 {
+        let mut of = |low: f64, high: f64| math::powf(10.0, rand::Rng::random_range(&mut stream, low..high));
+        let ([m, n], [k, d], [gain, lead]) =
+            ([of(-1.0, 1.0), of(-1.0, 1.0)], [of(1.0, 5.0), of(-2.0, 1.0)], [of(-1.0, 1.0), of(-1.0, 1.0)]);
+        let a = nalgebra::DMatrix::from_row_slice(
+            4,
+            4,
+            &[0.0, 1.0, 0.0, 0.0, -k / m, -d / m, k / m, d / m, 0.0, 0.0, 0.0, 1.0, k / n, d / n, -k / n, -d / n],
+        );
+        let b = nalgebra::DMatrix::from_row_slice(4, 1, &[0.0, gain / m, 0.0, 0.0]);
+        let c = nalgebra::DMatrix::from_row_slice(1, 4, &[1.0, lead, 0.0, 0.0]);
+        let free = Loop::new(StateSpace::new(a, b, c, nalgebra::DMatrix::zeros(1, 1))).unwrap();
+        // gain (1 + lead s)(n s^2 + d s + k)/(s^2 (m n s^2 + (m + n)(d s + k))).
+        let numerator = [lead * n, n + lead * d, d + lead * k, k].map(|x| gain * x);
+        let same = loop_of(&numerator, &[m * n, (m + n) * d, (m + n) * k, 0.0, 0.0], 0.0);
+        assert_eq!(free.is_stable(), same.is_stable());
+        let margins =
+            |l: &Loop| [l.phase_margin().unwrap(), l.delay_margin().unwrap(), l.peak_sensitivity().unwrap_or(0.0)];
+        for (found, expected) in margins(&free).into_iter().zip(margins(&same)) {
+            assert_near(found, expected, 1e-6 * expected.abs());
+        }
+    }
+}

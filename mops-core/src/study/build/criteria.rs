@@ -137,7 +137,8 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
 fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, Mistake> {
     let value = |key: &str, given: &Option<Quantity>| {
         let value = given.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose()?;
-        value.map(|value| in_range(key, value, unit, criterion.range())).transpose()
+        let is_bare = given.as_ref().is_some_and(|q| q.unit.is_none());
+        value.map(|value| in_range(key, value, is_bare, unit, criterion.range())).transpose()
     };
     let (demand, good, bad) = (value("demand", &draft.demand)?, value("good", &draft.good)?, value("bad", &draft.bad)?);
     let equal = draft.usage == Usage::Equality;
@@ -202,7 +203,7 @@ fn impossible(demand: f64, sense: Sense) -> Mistake {
 }
 
 /// Refuses a value that the kind can never have.
-fn in_range(key: &str, value: f64, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
+fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
     if value.is_nan() || (low..=high).contains(&value) {
         return Ok(value);
     }
@@ -210,7 +211,7 @@ fn in_range(key: &str, value: f64, unit: &Unit, [low, high]: [f64; 2]) -> Result
     let range = format!("{} to {}", amount(low), amount(high));
     let fact = format!("{} is outside of the range of this kind, {range}", unit.amount(value));
     let degrees = Unit::known("deg");
-    let as_degrees = degrees.factor_to(unit).map(|factor| value * factor);
+    let as_degrees = degrees.factor_to(unit).filter(|_| is_bare).map(|factor| value * factor);
     let way_out = match as_degrees.filter(|angle| (low..=high).contains(angle)) {
         Some(_) => format!("if these are degrees, write {key} = \"{value} deg\""),
         None => "give a value within the range".to_owned(),

@@ -1,0 +1,173 @@
+//! Eigenvalues that are 0 as rows of a matrix depend on one another: those of free bodies and of integrators.
+//!
+//! QR steps find a simple one to rounding, `eps |A|`, and the double one of a free body to the root of that, on either side of
+//! the imaginary axis. Whether a number is 0 is decided by bounds of its error. Source (running error analysis): N. J. Higham,
+//! Accuracy and Stability of Numerical Algorithms, 2nd edition (2002), section 3.3.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::math;
+
+/// Roundings that the entries of a given matrix come with: they are computed from parameters in a few operations.
+const ROUNDINGS: f64 = 4.0;
+
+/// Bounds of errors above this part of the terms decide nothing, as they add up faster than errors do: the root of the machine
+/// precision, to which QR steps find double eigenvalues.
+const CLEAR: f64 = 1e-8;
+
+/// A matrix whose entries are known up to rounding.
+#[derive(Debug, Clone)]
+pub(super) struct Rounded {
+    pub entries: DMatrix<f64>,
+    /// Bounds of the absolute errors of the entries.
+    pub errors: DMatrix<f64>,
+}
+
+impl Rounded {
+    /// A matrix as it is given.
+    pub fn given(entries: DMatrix<f64>) -> Self {
+        let errors = entries.map(|x| ROUNDINGS * f64::EPSILON * x.abs());
+        Self { entries, errors }
+    }
+
+    /// Both parts treated alike.
+    pub fn map(&self, f: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
+        Self { entries: f(&self.entries), errors: f(&self.errors) }
+    }
+
+    /// A matrix with the same eigenvalues but one that is 0; `None` where the rows are independent.
+    ///
+    /// A combination `z = y'x` of the states has no rate where `y'A = 0`. It takes the place of the state with the largest
+    /// share: the others then have the rates of `A` with that state replaced.
+    pub fn without_zero(&self) -> Option<Self> {
+        let n = self.entries.nrows();
+        let (y, dy) = Elimination::of(self).dependency()?;
+        let out = y.iamax();
+        let kept = |i: usize| if i < out { i } else { i + 1 };
+        let share = |j: usize| y[kept(j)] / y[out];
+        let doubt = |j: usize| (dy[kept(j)] + share(j).abs() * dy[out]) / y[out].abs();
+        let entries = DMatrix::from_fn(n - 1, n - 1, |i, j| {
+            self.entries[(kept(i), kept(j))] - self.entries[(kept(i), out)] * share(j)
+        });
+        let errors = DMatrix::from_fn(n - 1, n - 1, |i, j| {
+            let (taken, error) = (self.entries[(kept(i), out)].abs(), self.errors[(kept(i), out)]);
+            let rounding = f64::EPSILON * (taken * share(j).abs() + entries[(i, j)].abs());
+            self.errors[(kept(i), kept(j))] + error * share(j).abs() + taken * doubt(j) + rounding
+        });
+        let cleared = DMatrix::from_fn(n - 1, n - 1, |i, j| {
+            let (entry, error) = (entries[(i, j)], errors[(i, j)]);
+            let terms = self.entries[(kept(i), kept(j))].abs();
+            if entry.abs() <= error && error <= CLEAR * terms { 0.0 } else { entry }
+        });
+        Some(Self { entries: cleared, errors })
+    }
+}
+
+/// The elimination of the transposed matrix, whose columns are the rows of the matrix, with complete pivoting.
+struct Elimination {
+    m: DMatrix<f64>,
+    errors: DMatrix<f64>,
+    /// The row of the matrix that each column is.
+    order: Vec<usize>,
+    /// What the rows of the matrix were divided by, so that a row of small entries is no dependent one.
+    sizes: Vec<f64>,
+}
+
+impl Elimination {
+    fn of(a: &Rounded) -> Self {
+        let n = a.entries.nrows();
+        let Rounded { entries: mut m, mut errors } = a.map(DMatrix::transpose);
+        let sizes: Vec<f64> = (0..n).map(|j| power_of_two(m.column(j).amax())).collect();
+        for j in 0..n {
+            m.column_mut(j).unscale_mut(sizes[j]);
+            errors.column_mut(j).unscale_mut(sizes[j]);
+        }
+        for i in 0..n {
+            let size = power_of_two(m.row(i).amax());
+            m.row_mut(i).unscale_mut(size);
+            errors.row_mut(i).unscale_mut(size);
+        }
+        Self { m, errors, order: (0..n).collect(), sizes }
+    }
+
+    /// Factors `y` with `y'A = 0`, and bounds of their errors; `None` where there are none.
+    fn dependency(mut self) -> Option<(DVector<f64>, DVector<f64>)> {
+        let n = self.order.len();
+        for k in 0..n {
+            let Some((i, j)) = self.pivot(k) else {
+                let doubt = self.errors.view((k, k), (n - k, n - k)).amax();
+                return (doubt <= CLEAR).then(|| self.combination(k));
+            };
+            self.m.swap_rows(k, i);
+            self.m.swap_columns(k, j);
+            self.errors.swap_rows(k, i);
+            self.errors.swap_columns(k, j);
+            self.order.swap(k, j);
+            self.eliminate(k);
+        }
+        None
+    }
+
+    /// The largest entry that is not 0, from row and column `k` on.
+    fn pivot(&self, k: usize) -> Option<(usize, usize)> {
+        let n = self.order.len();
+        let mut best = (0.0, None);
+        for j in k..n {
+            for i in k..n {
+                let size = self.m[(i, j)].abs();
+                if size > self.errors[(i, j)] && size > best.0 {
+                    best = (size, Some((i, j)));
+                }
+            }
+        }
+        best.1
+    }
+
+    fn eliminate(&mut self, k: usize) {
+        let n = self.order.len();
+        let (pivot, own) = (self.m[(k, k)], self.errors[(k, k)]);
+        for i in k + 1..n {
+            let factor = self.m[(i, k)] / pivot;
+            let doubt = (self.errors[(i, k)] + factor.abs() * own) / pivot.abs() + f64::EPSILON * factor.abs();
+            if factor == 0.0 && doubt == 0.0 {
+                continue;
+            }
+            for j in k + 1..n {
+                let (above, error) = (self.m[(k, j)], self.errors[(k, j)]);
+                self.m[(i, j)] -= factor * above;
+                let rounding = f64::EPSILON * ((factor * above).abs() + self.m[(i, j)].abs());
+                self.errors[(i, j)] += factor.abs() * error + doubt * above.abs() + rounding;
+            }
+        }
+    }
+
+    /// The combination of columns by which column `rank` depends on those before it.
+    fn combination(&self, rank: usize) -> (DVector<f64>, DVector<f64>) {
+        let n = self.order.len();
+        let (mut y, mut dy) = (vec![0.0; n], vec![0.0; n]);
+        y[rank] = 1.0;
+        for i in (0..rank).rev() {
+            let (mut sum, mut error) = (0.0, 0.0);
+            for j in i + 1..=rank {
+                let (m, e) = (self.m[(i, j)], self.errors[(i, j)]);
+                sum += m * y[j];
+                error += e * y[j].abs() + m.abs() * dy[j] + f64::EPSILON * (m * y[j]).abs();
+            }
+            let pivot = self.m[(i, i)];
+            y[i] = -sum / pivot;
+            dy[i] = (error + self.errors[(i, i)] * y[i].abs()) / pivot.abs() + f64::EPSILON * y[i].abs();
+        }
+        let own = |y: &[f64]| {
+            let mut own = DVector::zeros(n);
+            for (k, &row) in self.order.iter().enumerate() {
+                own[row] = y[k] / self.sizes[row];
+            }
+            own
+        };
+        (own(&y), own(&dy))
+    }
+}
+
+fn power_of_two(size: f64) -> f64 {
+    if size > 0.0 { math::exp2(math::log2(size).floor()) } else { 1.0 }
+}
