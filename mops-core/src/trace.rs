@@ -6,11 +6,13 @@
 ///
 /// On segment `i`, from `knots[i]` to `knots[i + 1]`, the value at `t = knots[i] + s (knots[i + 1] - knots[i])`, `s` in
 /// [0, 1], is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order Runge-Kutta step.
-/// At a jump the trace has the later value, at its end the last one.
+/// At a jump the trace has the later value, also at one that falls on its end.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     knots: Vec<f64>,
     segments: Vec<[f64; 5]>,
+    /// The value at the end, where it differs from that of the last segment.
+    jumped: Option<f64>,
 }
 
 /// A part of a trace on which it is monotone: times and values at both ends.
@@ -32,7 +34,7 @@ impl Trace {
     pub fn starting_at(start: f64, segments: usize) -> Self {
         let mut knots = Vec::with_capacity(segments + 1);
         knots.push(start);
-        Self { knots, segments: Vec::with_capacity(segments) }
+        Self { knots, segments: Vec::with_capacity(segments), jumped: None }
     }
 
     /// Adds the segment from the last knot to `end` that passes through `samples` at [`Trace::NODES`].
@@ -58,6 +60,11 @@ impl Trace {
             self.knots.push(end);
             self.segments.push(coefficients);
         }
+    }
+
+    /// The trace jumps to this value at its end.
+    pub fn jump_at_end(&mut self, value: f64) {
+        self.jumped = Some(value);
     }
 
     /// Time at which the trace begins, s.
@@ -136,7 +143,7 @@ impl Trace {
 
     /// The value at the end.
     pub fn last(&self) -> f64 {
-        self.segments.last().map_or(f64::NAN, |c| c.iter().sum())
+        self.jumped.unwrap_or_else(|| self.segments.last().map_or(f64::NAN, |c| c.iter().sum()))
     }
 
     /// The monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
@@ -250,7 +257,7 @@ impl Trace {
                 [c[1] / h, 2.0 * c[2] / h, 3.0 * c[3] / h, 4.0 * c[4] / h, 0.0]
             })
             .collect();
-        Self { knots: self.knots.clone(), segments }
+        Self { knots: self.knots.clone(), segments, jumped: None }
     }
 
     /// `y + distance tangent`, for a tangent on the same segments.
@@ -258,7 +265,9 @@ impl Trace {
     pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
         debug_assert_eq!(self.knots, tangent.knots, "a tangent has the segments of its trace");
         let add = |(c, d): (&[f64; 5], &[f64; 5])| std::array::from_fn(|i| c[i] + distance * d[i]);
-        Self { knots: self.knots.clone(), segments: self.segments.iter().zip(&tangent.segments).map(add).collect() }
+        let segments = self.segments.iter().zip(&tangent.segments).map(add).collect();
+        let jumped = self.jumped.map(|value| value + distance * tangent.last());
+        Self { knots: self.knots.clone(), segments, jumped }
     }
 
     /// The largest jump between consecutive segments, in absolute value.
@@ -273,6 +282,9 @@ impl Trace {
     fn value_on(&self, segment: usize, t: f64) -> f64 {
         let Some(c) = self.segments.get(segment) else { return f64::NAN };
         let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
+        if let Some(value) = self.jumped.filter(|_| t >= self.end()) {
+            return value;
+        }
         polynomial(c, ((t - t0) / (t1 - t0)).clamp(0.0, 1.0))
     }
 }
@@ -426,6 +438,21 @@ mod tests {
         step.push(1.0, [0.0; 5]);
         step.push(2.0, [3.0; 5]);
         assert_eq!((step.largest_jump(), step.at(0.999), step.at(1.0), step.at(9.0)), (3.0, 0.0, 3.0, 3.0));
+    }
+
+    #[test]
+    fn a_jump_at_the_end_has_the_later_value() {
+        let ramp = |slope: f64, end: f64| {
+            let mut trace = Trace::starting_at(0.0, 1);
+            trace.push_polynomial(2.0, [1.0, 2.0 * slope, 0.0, 0.0, 0.0]);
+            trace.jump_at_end(end);
+            trace
+        };
+        let (trace, tangent) = (ramp(1.0, 7.0), ramp(0.5, -3.0));
+        assert_eq!((trace.at(2.0), trace.last(), trace.at(3.0)), (7.0, 7.0, 7.0));
+        assert_eq!(trace.sample(&[1.0, 2.0]), [2.0, 7.0]);
+        assert_eq!(trace.at(1.999_999), 2.999_999);
+        assert_eq!(trace.moved(&tangent, 0.1).last(), 6.7);
     }
 
     #[test]

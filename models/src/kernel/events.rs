@@ -58,8 +58,9 @@ const RESOLUTION: f64 = 16.0 * f64::EPSILON;
 const BRACKET: f64 = 0.25;
 
 /// Bounds that are computed for one guard in one step at most; what is undecided then is decided by the ends of its parts. A
-/// guard that crosses zero is found with some 20 bounds, one that touches it with some 100.
-const MOST_BOUNDS: usize = 500;
+/// guard that crosses zero is found with some 20 bounds, one that touches it with some 100; each place before its first zero
+/// where it has no bounds, such as a jump of `atan2` or a pole of `tan`, takes some 60.
+const MOST_BOUNDS: usize = 2000;
 
 /// Halvings of a step at most: a part of 1e-9 of it.
 const HALVINGS: u32 = 30;
@@ -176,9 +177,7 @@ impl Events {
             let ends = [(0.0, start), (end, last)];
             let bracket = if whole.value.low >= 0.0 {
                 None
-            } else if whole.value.low == f64::NEG_INFINITY {
-                looks(&mut value, ends)
-            } else {
+            } else if has_bounds {
                 let bounds = &mut self.bounds;
                 let mut enclose = |from: f64, to: f64| {
                     step.enclose(from, to, bounds);
@@ -186,6 +185,8 @@ impl Events {
                 };
                 Search { value: &mut value, enclose: &mut enclose, length: step.length, left: MOST_BOUNDS }
                     .first(ends, whole, HALVINGS)
+            } else {
+                looks(&mut value, ends)
             };
             // Most steps end without an event; the values at their end are those at the start of the next.
             if first.is_none() {

@@ -138,6 +138,9 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
                 continue;
             }
             dynamics.pass_break(t, &mut x);
+            if t >= end {
+                sink.end(t, &x, dynamics);
+            }
             events.settle(dynamics, t, &mut x, sink)?;
             if t < end {
                 method.restart(dynamics, t, &x, &mut work);
@@ -158,6 +161,9 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         shift(dynamics, t, &mut x, &mut spare, delay);
         if at_stop {
             dynamics.pass_break(t, &mut x);
+            if t >= end {
+                sink.end(t, &x, dynamics);
+            }
         }
         dynamics.delay_events(delay);
         events.settle(dynamics, t, &mut x, sink)?;

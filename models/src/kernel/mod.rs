@@ -155,6 +155,8 @@ pub trait Sink<S: Scalar, D: Dynamics<S>> {
     fn ends(&self, _t: f64) -> Option<Failure> {
         None
     }
+    /// The end was reached: inputs have their values of that instant.
+    fn end(&mut self, _t: f64, _x: &D::State, _dynamics: &D) {}
     /// The mode changed.
     fn event(&mut self, _t: f64, _what: &str) {}
 }

@@ -271,6 +271,23 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
         }
     }
 
+    fn end(&mut self, t: f64, x: &D::State, dynamics: &D) {
+        for (i, (signal, _)) in self.signals.iter().enumerate() {
+            if dynamics.shows(*signal).is_some() {
+                continue;
+            }
+            // An input that jumps at the end is seen in what follows it at once.
+            let value = (self.output)(dynamics, *signal, t, x);
+            let before = self.traces[0][i].last();
+            if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {
+                self.traces[0][i].jump_at_end(value.value());
+                for direction in 0..S::DIRECTIONS {
+                    self.traces[1 + direction][i].jump_at_end(value.tangents()[direction]);
+                }
+            }
+        }
+    }
+
     fn event(&mut self, t: f64, what: &str) {
         // Events without a name are between branches of an expression, nothing that happens to the plant.
         if !what.is_empty() {

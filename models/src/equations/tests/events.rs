@@ -227,3 +227,45 @@ fn slopes_jump_at_guards_on_time_as_the_closed_form_does() {
         );
     }
 }
+
+#[test]
+fn an_output_sees_every_sample_of_an_input_the_last_one_too() {
+    for hold in [Hold::Zero, Hold::First] {
+        for period in [0.1, 0.25, 0.3, 1.0, 7.0] {
+            let text = "states = { q = '1' }\ninputs = { u = '1' }\nparameters = { g = '1' }\nder = { q = 'u*1[1/s]' }\n\
+                        outputs = { y = { value = 'g*u' } }";
+            let sampled: Vec<f64> = (0..5).map(|k| f64::from(k) * period).collect();
+            let values = vec![1.0, 2.0, 1.0, 3.0, 10.0];
+            let input = Input::Sampled { times: sampled.clone(), values: values.clone(), hold };
+            let end = sampled[4];
+            let response = respond(&read(text).unwrap(), &[("u", input)], &[("g", 2.0)], end);
+            for (t, u) in sampled.iter().zip(&values) {
+                let y = at(&response, "y", *t);
+                assert!((y - 2.0 * u).abs() < 1e-12, "{hold:?} {period}: y({t}) = {y}");
+            }
+        }
+    }
+}
+
+#[test]
+fn conditions_that_jump_or_have_poles_are_found_in_long_steps() {
+    // Time for which a condition of period T holds, from its share of a period; the model rests, so that steps are long.
+    let atan2 = "atan2(sin(2*pi*time/T), cos(2*pi*time/T))";
+    for (condition, share) in [
+        (format!("{atan2} > 0"), 0.5),
+        (format!("{atan2} > 3"), (PI - 3.0) / TAU),
+        (format!("{atan2} < -1"), (PI - 1.0) / TAU),
+        ("tan(pi*time/T) > 10".to_owned(), 0.5 - math::atan(10.0) / PI),
+        ("tan(pi*time/T) < 0".to_owned(), 0.5),
+        ("1/cos(2*pi*time/T) > 5".to_owned(), math::asin(0.2) / PI),
+    ] {
+        for period in [1.0, 0.37, 7.0] {
+            let text =
+                format!("states = {{ E = 's' }}\nparameters = {{ T = 's' }}\nder = {{ E = 'if({condition}, 1, 0)' }}");
+            let periods = 40.0;
+            let response = respond(&read(&text).unwrap(), &[], &[("T", period)], periods * period);
+            let (found, exact) = (at(&response, "E", periods * period), share * periods * period);
+            assert!((found - exact).abs() < 1e-6 * exact, "{condition}, {period}: {found} {exact}");
+        }
+    }
+}
