@@ -79,7 +79,7 @@ impl Criterion for Bound {
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
         let answer = self.step.answer(analysis)?;
         match answer.first_reaching(self.level)? {
-            Some(time) => Ok(time.into()),
+            Some(time) => Ok(answer.note(time.into())),
             None => answer.not_reached(answer.length(), self.level, "level not reached"),
         }
     }

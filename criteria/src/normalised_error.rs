@@ -45,6 +45,11 @@ impl CriterionSpec for NormalisedError {
     }
 }
 
+/// A mean square below which noise is not what is left: a tenth of its standard deviation. Of 20 samples or more it comes by
+/// chance in less than one of 1e9 records, ten estimated parameters included.
+const FAR_BELOW: f64 = 0.01;
+const SAMPLES: usize = 20;
+
 struct Bound {
     signal: String,
     noise: Option<f64>,
@@ -89,7 +94,10 @@ impl Criterion for Bound {
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal)?;
         let scale = self.scale(comparison.channel)?;
-        Ok(Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect()))
+        let value = Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect());
+        let is_far_below = value.number < FAR_BELOW && value.residuals.len() >= SAMPLES;
+        let note = is_far_below.then_some("far below the noise: is the noise in the unit of the signal?");
+        Ok(Value { note: value.note.or(note), ..value })
     }
 
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {

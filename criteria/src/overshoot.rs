@@ -80,7 +80,7 @@ impl Criterion for Bound {
         let answer = self.step.answer(analysis)?;
         let beyond = answer.farthest_ahead() - answer.target;
         let overshoot = if self.absolute { answer.upwards(beyond) } else { beyond / answer.height()? };
-        Ok(overshoot.max(0.0).into())
+        Ok(answer.note(overshoot.max(0.0).into()))
     }
 
     fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {

@@ -88,7 +88,7 @@ impl Criterion for Bound {
         let answer = self.step.answer(analysis)?;
         let begin = answer.first_reaching(self.low)?.unwrap_or(0.0);
         Ok(match answer.first_reaching(self.high)? {
-            Some(end) => (end - begin).into(),
+            Some(end) => answer.note((end - begin).into()),
             None => return answer.not_reached(answer.length(), self.high, "not risen at the end"),
         })
     }

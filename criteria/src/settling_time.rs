@@ -16,8 +16,9 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions, positive, second};
 /// edge, not where a sample lies outside; it jumps where an extremum comes to touch the edge.
 ///
 /// Less is better. Range: from 0 to the length of the simulation. A signal that is outside at the end has no settling time
-/// and meets no demand, noted `not settled at the end`. Without a `target` the signal settles at its own last value, whatever that is:
-/// give one wherever it is known.
+/// and meets no demand, noted `not settled at the end`; neither has one whose motion at the end leads out of the band again, noted
+/// `it crosses the band at the end`: simulate longer. Without a `target` the signal settles at its own last value, and not at
+/// all where that still moves: give a target wherever it is known. A signal that never leaves the band has a settling time of 0 with a note.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -110,12 +111,18 @@ impl Criterion for Bound {
             Band::Absolute(band) => band,
             Band::Relative(fraction) => fraction * answer.height()?.abs(),
         };
-        let left = last_outside(&answer.trace, answer.target - band, answer.target + band).unwrap_or(answer.time);
-        if left < answer.trace.end() {
-            Ok((left - answer.time).into())
-        } else {
-            Ok(answer.missed(answer.length(), answer.target, band, "not settled at the end"))
+        let missed = |note| Ok(answer.missed(answer.length(), answer.target, band, note));
+        let Some(left) = answer.last_outside(band) else {
+            return Ok(Value::noted(0.0, "it never leaves the band"));
+        };
+        if left >= answer.trace.end() {
+            return missed("not settled at the end");
         }
+        if !answer.stays_within(band, left) {
+            let note = if answer.is_assumed { "still moving at the end" } else { "it crosses the band at the end" };
+            return missed(note);
+        }
+        Ok((left - answer.time).into())
     }
 
     fn marks(&self, _: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
@@ -127,19 +134,6 @@ impl Criterion for Bound {
         let edges = [("band", answer.target + band), ("", answer.target - band)];
         edges.into_iter().flat_map(|(label, level)| self.step.mark(label, level)).collect()
     }
-}
-
-/// The last time at which the trace is below `low` or above `high`; `None` if it never is.
-fn last_outside(trace: &Trace, low: f64, high: f64) -> Option<f64> {
-    let is_outside = |y: f64| y < low || y > high;
-    let pieces = trace.pieces();
-    let last = pieces.iter().rev().find(|piece| piece.value.into_iter().any(is_outside))?;
-    if is_outside(last.value[1]) {
-        return Some(last.time[1]);
-    }
-    // The piece is monotone: it comes in across the edge it was beyond.
-    let edge = if last.value[0] > high { high } else { low };
-    Some(trace.crossing(last, edge).unwrap_or(last.time[0]))
 }
 
 #[cfg(test)]
@@ -209,7 +203,40 @@ mod tests {
         assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(4.0) }), Some("not settled at the end")));
         let later = SettlingTime { step_time: Some(1.0.into()), ..settling(0.01) };
         assert_near(value(&later, &lag).number, exact(3.0), 1e-9);
-        assert_eq!(value(&settling(2.0), &lag), Value::from(0.0));
+        assert_eq!(value(&settling(2.0), &lag), Value::noted(0.0, "it never leaves the band"));
+    }
+
+    #[test]
+    fn a_response_that_crosses_the_band_at_the_end_has_not_settled() {
+        let noted = |end: f64, damping: f64| value(&settling(0.05), &simulated(end, second_order(damping))).note;
+        // The first crossing of the target is at 1.9 s and 3.2 s, the peaks at 3.2 s and 3.6 s are 1.53 and 1.16.
+        for (end, damping) in [(1.75, 0.2), (1.8, 0.2), (1.85, 0.2), (2.4, 0.5), (2.45, 0.5)] {
+            assert_eq!(noted(end, damping), Some("it crosses the band at the end"), "{end} {damping}");
+        }
+        assert_eq!(noted(1.6, 0.2), Some("not settled at the end"));
+        // Motions that end within: an approach, a decay with turns, a peak that stays inside, a slow ramp.
+        let approach = simulated(3.1, |t| 1.0 - math::exp(-t));
+        assert_near(value(&settling(0.05), &approach).number, math::ln(20.0), 1e-9);
+        for damping in [0.05, 0.2, 0.7, 0.9] {
+            for end in [70.0, 71.3, 72.6, 80.0] {
+                assert_eq!(noted(end, damping), None, "{end} {damping}");
+            }
+        }
+        let creeping = simulated(10.0, |t| if t < 1.0 { 0.0 } else { 1.0 + 1e-3 * t });
+        assert_eq!(value(&settling(0.05), &creeping).note, None);
+    }
+
+    #[test]
+    fn a_response_that_still_moves_has_no_settling_time_of_its_own() {
+        let own = |end: f64| {
+            value(&SettlingTime { target: None, band: None, ..settling(1.0) }, &simulated(end, |t| 1.0 - math::exp(-t)))
+        };
+        for end in [0.1, 1.0, 3.0] {
+            assert!(own(end).missed.is_some(), "{end}");
+        }
+        assert!(own(5.0).missed.is_none() && own(20.0).missed.is_none());
+        let growing = value(&SettlingTime { target: None, band: None, ..settling(1.0) }, &simulated(5.0, math::exp));
+        assert_eq!(growing.note, Some("still moving at the end"));
     }
 
     #[test]

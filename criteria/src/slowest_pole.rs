@@ -10,8 +10,9 @@ use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 /// mode dies out. With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
 /// Poles that neither input nor output touches count too.
 ///
-/// Less is better. Range: any number. It is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay
-/// has no finite number of poles, and no value.
+/// Less is better. Range: up to 0 for a demand, as an unstable system meets any above; an unstable system has a positive value. It
+/// is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay has no finite number of
+/// poles, and no value.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 7.4 (stability degree).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -41,7 +42,11 @@ impl CriterionSpec for SlowestPole {
             let poles = poles(&system, of)?;
             Ok(poles.iter().map(|p| p.re).fold(f64::NEG_INFINITY, f64::max).into())
         };
-        Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("1/s"), Sense::Less), value))
+        Ok(LinearCriterion::boxed(
+            channel,
+            Values::of(Unit::known("1/s"), Sense::Less).within(f64::NEG_INFINITY, 0.0),
+            value,
+        ))
     }
 }
 

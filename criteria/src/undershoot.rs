@@ -79,7 +79,7 @@ impl Criterion for Bound {
         let answer = self.step.answer(analysis)?;
         let behind = answer.from - answer.farthest_behind();
         let undershoot = if self.absolute { answer.upwards(behind) } else { behind / answer.height()? };
-        Ok(undershoot.max(0.0).into())
+        Ok(answer.note(undershoot.max(0.0).into()))
     }
 
     fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {

@@ -87,7 +87,7 @@ impl Demand {
     pub fn of(number: f64, sense: Sense, equal: bool) -> Option<Self> {
         match sense {
             _ if !number.is_finite() || number == 0.0 => None,
-            Sense::More => Some(Self::AtLeast(number)),
+            Sense::More if !equal || number < 0.0 => Some(Self::AtLeast(number)),
             Sense::Target if !equal => None,
             _ if number > 0.0 => Some(Self::AtMost(number)),
             _ => None,

@@ -146,6 +146,15 @@ impl Trace {
         self.jumped.unwrap_or_else(|| self.segments.last().map_or(f64::NAN, |c| c.iter().sum()))
     }
 
+    /// Value, rate (per s) and curvature (per s^2) at the end, of the last segment.
+    pub fn motion_at_end(&self) -> [f64; 3] {
+        let Some(c) = self.segments.last() else { return [f64::NAN; 3] };
+        let h = self.knots[self.segments.len()] - self.knots[self.segments.len() - 1];
+        let rate = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4];
+        let curvature = 2.0 * c[2] + 6.0 * c[3] + 12.0 * c[4];
+        [c.iter().sum(), rate / h, curvature / (h * h)]
+    }
+
     /// The monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
     pub fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::with_capacity(self.segments.len());

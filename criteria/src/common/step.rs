@@ -9,6 +9,9 @@ use super::{optional, part, signal, step_time, trace};
 /// Share of a step that counts as near a level.
 const NEAR: f64 = 0.01;
 
+/// Share of a band below which a motion is no turn.
+const TURN: f64 = 1e-3;
+
 /// The options that say which step is looked at.
 pub struct StepOptions<'a> {
     pub signal: &'a str,
@@ -36,6 +39,8 @@ pub struct Answer<'a> {
     pub target: f64,
     /// Time of the step, s.
     pub time: f64,
+    /// Whether the target is the last value, as none was given.
+    pub is_assumed: bool,
 }
 
 impl StepOptions<'_> {
@@ -77,6 +82,7 @@ impl Step {
             from: self.from.unwrap_or_else(|| whole.first()),
             target: self.target.unwrap_or_else(|| whole.last()),
             time,
+            is_assumed: self.target.is_none(),
         })
     }
 
@@ -138,6 +144,53 @@ impl Answer<'_> {
     pub fn not_reached(&self, horizon: f64, fraction: f64, note: &'static str) -> Result<Value, String> {
         let height = self.height()?;
         Ok(self.missed(horizon, self.from + fraction * height, NEAR * height.abs(), note))
+    }
+
+    /// The last time at which the response is not within `band` of the target; `None` if it always is.
+    pub fn last_outside(&self, band: f64) -> Option<f64> {
+        let (low, high) = (self.target - band, self.target + band);
+        let is_outside = |y: f64| y < low || y > high;
+        let pieces = self.trace.pieces();
+        let last = pieces.iter().rev().find(|piece| piece.value.into_iter().any(is_outside))?;
+        if is_outside(last.value[1]) {
+            return Some(last.time[1]);
+        }
+        // The piece is monotone: it comes in across the edge it was beyond.
+        let edge = if last.value[0] > high { high } else { low };
+        Some(self.trace.crossing(last, edge).unwrap_or(last.time[0]))
+    }
+
+    /// Whether the response, which is within `band` of the target since `time` (s), looks as if it stayed there after the end.
+    ///
+    /// It does where it has turned since then, or would not leave the band at its final rate within as much time as was
+    /// simulated, or slows down to a value within: with the rate and the curvature of the end an exponential approach ends at
+    /// `y - y'^2/y''`. What it does not do is cross the band when the simulation ends.
+    pub fn stays_within(&self, band: f64, time: f64) -> bool {
+        let [value, rate, curvature] = self.trace.motion_at_end();
+        let is_within = |y: f64| (y - self.target).abs() <= band;
+        if is_within(value + rate * self.length())
+            || is_within(value - rate * rate / curvature) && rate * curvature < 0.0
+        {
+            return true;
+        }
+        let moves = self.trace.pieces().into_iter().filter(|piece| piece.time[1] > time).map(|piece| {
+            let [from, to] = piece.value;
+            // What is left of a turn by rounding is none.
+            if (to - from).abs() <= TURN * band { 0.0 } else { (to - from).signum() }
+        });
+        let moves: Vec<f64> = moves.filter(|direction| *direction != 0.0).collect();
+        moves.windows(2).any(|pair| pair[0] != pair[1])
+    }
+
+    /// A note where the target is the last value, and the response does not look as if it stayed within 2 % of the step there.
+    pub fn note(&self, value: Value) -> Value {
+        let moves = || {
+            let band = 0.02 * self.height().unwrap_or(0.0).abs();
+            !self.stays_within(band, self.last_outside(band).unwrap_or(self.time))
+        };
+        let note =
+            (self.is_assumed && moves()).then_some("it still moves at the end, whose value counts as the target");
+        Value { note: value.note.or(note), ..value }
     }
 
     /// Time from the step to the end of the simulation, s.

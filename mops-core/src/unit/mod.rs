@@ -55,6 +55,9 @@ impl Unit {
     /// # Errors
     /// An unknown symbol, or a text that is not a product of powers: one sentence that says which.
     pub fn parse(text: &str) -> Result<Self, String> {
+        if text.len() > LONGEST {
+            return Err(format!("a unit of {} characters; units are at most {LONGEST} long", text.chars().count()));
+        }
         let mut rest = text.trim();
         let mut unit = Self { text: if rest.is_empty() { "1".into() } else { rest.into() }, ..Self::one() };
         let mut divide = false;
@@ -230,6 +233,9 @@ impl Unit {
         Self::known(&text).difference()
     }
 }
+
+/// Characters of a unit at most: its parentheses are read one within the other.
+const LONGEST: usize = 200;
 
 /// Reads one factor: a symbol or a parenthesis, with its exponent. Returns it and the rest of the text.
 fn factor(text: &str) -> Option<(Unit, &str)> {

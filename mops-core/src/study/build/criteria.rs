@@ -136,6 +136,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
 /// The demand of a criterion in its unit, in the sense and the range of its kind.
 fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, Mistake> {
     let value = |key: &str, given: &Option<Quantity>| {
+        given.as_ref().map_or(Ok(()), |q| refuse_mixed_angles(key, q, unit))?;
         let value = given.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose()?;
         let is_bare = given.as_ref().is_some_and(|q| q.unit.is_none());
         value.map(|value| in_range(key, value, is_bare, unit, criterion.range())).transpose()
@@ -202,6 +203,23 @@ fn impossible(demand: f64, sense: Sense) -> Mistake {
     Mistake::new("demand", fact).with_help(way_out)
 }
 
+/// Refuses an angle for a value that is none, and a share for an angle: both are pure numbers, but nobody means that.
+fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<(), Mistake> {
+    let Some(given) = quantity.unit.as_ref().filter(|given| given.dimension().is_none() && given.to_string() != "1")
+    else {
+        return Ok(());
+    };
+    if !unit.dimension().is_none() || given.is_angle() == unit.is_angle() {
+        return Ok(());
+    }
+    let fact = match given.is_angle() {
+        true => format!("the values of this kind are pure numbers, not angles in {given}"),
+        false => format!("the values of this kind are angles, not shares in {given}"),
+    };
+    let way_out = if given.is_angle() { "write a pure number" } else { "write an angle, such as \"45 deg\"" };
+    Err(Mistake::new(key, fact).with_help(way_out))
+}
+
 /// Refuses a value that the kind can never have.
 fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
     if value.is_nan() || (low..=high).contains(&value) {
@@ -211,7 +229,7 @@ fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64
     let range = format!("{} to {}", amount(low), amount(high));
     let fact = format!("{} is outside of the range of this kind, {range}", unit.amount(value));
     let degrees = Unit::known("deg");
-    let as_degrees = degrees.factor_to(unit).filter(|_| is_bare).map(|factor| value * factor);
+    let as_degrees = degrees.factor_to(unit).filter(|_| is_bare && unit.is_angle()).map(|factor| value * factor);
     let way_out = match as_degrees.filter(|angle| (low..=high).contains(angle)) {
         Some(_) => format!("if these are degrees, write {key} = \"{value} deg\""),
         None => "give a value within the range".to_owned(),
