@@ -7,7 +7,7 @@
 //! give bounds of a guard over a part of the step, and of its rate ([`Dynamics::enclose_guard`]), the first place where it is
 //! negative is found by branch and bound: a part whose bounds exclude negative values is done, one over which the guard is
 //! monotone is decided by its ends, any other is halved, the earlier half first. A guard that is negative for a moment only is
-//! found this way however long the step is, be it a guard on states, on inputs or on time. Where there are no bounds (models
+//! found this way however long the step is, be it a guard on states, on inputs or on time. Where there are no bounds at all (models
 //! written in Rust, whose guards vary as smoothly as their states), the guard is looked at in four places of a step and where
 //! the quartic through these looks has a minimum below 0.
 //!
@@ -175,14 +175,14 @@ impl Events {
                 false => Enclosure::UNKNOWN,
             };
             let ends = [(0.0, start), (end, last)];
+            let bounds = &mut self.bounds;
+            let mut enclose = |from: f64, to: f64| {
+                step.enclose(from, to, bounds);
+                dynamics.enclose_guard(index, time(from, to), bounds)
+            };
             let bracket = if whole.value.low >= 0.0 {
                 None
-            } else if has_bounds {
-                let bounds = &mut self.bounds;
-                let mut enclose = |from: f64, to: f64| {
-                    step.enclose(from, to, bounds);
-                    dynamics.enclose_guard(index, time(from, to), bounds)
-                };
+            } else if whole.value.low > f64::NEG_INFINITY || (has_bounds && is_bounded(&mut enclose)) {
                 Search { value: &mut value, enclose: &mut enclose, length: step.length, left: MOST_BOUNDS }
                     .first(ends, whole, HALVINGS)
             } else {
@@ -206,6 +206,13 @@ impl Events {
         }
         first
     }
+}
+
+/// Whether a guard without bounds over the whole step has some over parts of it: it is a jump or a pole that takes them away.
+fn is_bounded(enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
+    // Off any regular division of the step, and far shorter than the time between jumps.
+    const WIDTH: f64 = 1e-6;
+    [0.137, 0.457, 0.829].into_iter().any(|place| enclose(place, place + WIDTH).value.low > f64::NEG_INFINITY)
 }
 
 /// A place in a step, as a share of its length, and the value of a guard there.
