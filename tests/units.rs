@@ -256,3 +256,60 @@ fn a_case_gives_each_model_its_parameter_in_the_unit_of_the_model() {
     let (code, output) = mops(folder.path(), &["check", "study.toml"]);
     assert!(code == 2 && output.contains("`k` is in N/m in one model and in s in another"), "{output}");
 }
+
+#[test]
+fn a_temperature_that_nothing_drives_is_named() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { T = 'degC' }\ninputs = { Ta = 'degC', Q = 'W' }\n\
+                parameters = { k = '1/s' }\nconstants = { C = '1 J/K' }\nder = { T = 'k*(Ta - T) + Q/C' }\nhorizon = '1 s'\n\
+                [tuners]\nk = { start = 1, min = 0.1, max = 2 }\n[cases]\ncold = { }\nwarm = { inputs.Ta.constant = '18 degC' }\n\
+                [criteria]\ny = { final-value = { signal = 'T' }, demand = 1 }\n";
+    let folder = study(text, "");
+    let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+    assert!(
+        code == 0 && output.contains("warning: nothing drives `Ta`, which is 0 degC throughout, in cold\n"),
+        "{output}"
+    );
+    assert_eq!(output.matches("nothing drives").count(), 1, "{output}");
+}
+
+#[test]
+fn a_loop_of_equations_is_closed_in_one_dimension_whatever_the_unit_of_its_speed() {
+    let text = |unit: &str, input: &str, law: &str| {
+        format!(
+            "[study]\nname = 'loop'\n[models.m]\nlinearise = {{ inputs = ['u'], outputs = ['w'] }}\n[models.m.equations]\n\
+             states = {{ w = '{unit}' }}\ninputs = {{ u = '{input}' }}\nparameters = {{ T = 's' }}\nder = {{ w = \"{law}\" }}\nhorizon = '1 s'\n\
+             [tuners]\nT = {{ start = 0.5, min = 0.1, max = 2 }}\n\
+             [criteria]\nw = {{ crossover-frequency = {{}}, usage = 'monitor' }}\n"
+        )
+    };
+    for (unit, input) in
+        [("rad/s", "rad/s"), ("rpm", "rad/s"), ("deg/s", "rpm"), ("mm", "m"), ("V", "mV"), ("K", "degC")]
+    {
+        // 2/(T s + 1) has the gain 1 at sqrt(3)/T, T = 0.5 s.
+        let found = values(&text(unit, input, "T*w' = 2*u - w"), "")[0].1;
+        assert!((found - 2.0 * 3.0f64.sqrt()).abs() < 1e-9, "{unit} {input}: {found}");
+    }
+    for (unit, input, gain) in [("rad/s", "V", "1 [rad/s/V]"), ("rpm", "V", "1 [rpm/V]"), ("m", "N", "1 [mm/N]")] {
+        let folder = study(&text(unit, input, &format!("T*w' = {gain}*u - w")), "");
+        let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+        assert!(code == 2 && output.contains("unity feedback cannot close a loop from `u` in"), "{output}");
+    }
+}
+
+#[test]
+fn units_are_read_as_engineers_type_them() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'J' }\nparameters = { E = 'J' }\nder = { x = 'E/1[s]' }\nhorizon = '1 s'\n\
+                [tuners]\nE = { start = '2 Wh', min = '1 Wh', max = '1 kWh' }\n[criteria]\ny = { final-value = { signal = 'x' }, demand = 'DEMAND' }\n";
+    assert!((values(&text.replace("DEMAND", "1 Wh"), "")[0].1 - 7200.0).abs() < 1e-6);
+    let refused = |demand: &str| {
+        let folder = study(&text.replace("DEMAND", demand), "");
+        mops(folder.path(), &["check", "study.toml"])
+    };
+    for (demand, message) in [
+        ("0,8 kJ", "`0,8 kJ` has a comma for its decimal point; write \"0.8 kJ\""),
+        (&format!("1 {}m{}", "(".repeat(30_000), ")".repeat(30_000)), "a unit of 60001 characters"),
+    ] {
+        let (code, output) = refused(demand);
+        assert!(code == 2 && output.contains(message), "{}", &output[..output.len().min(2000)]);
+    }
+}

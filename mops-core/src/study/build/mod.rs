@@ -108,6 +108,8 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         complete(&mut study, index, &fixed[model])
             .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
     }
+    let cold = temperatures_of_nothing(&study);
+    study.warnings.extend(cold);
     let solved = matches!(study.task, Task::Design | Task::Calibration);
     if solved && study.rows.iter().all(|row| row.usage == Usage::Monitor) {
         let fact = "nothing to minimise: every criterion is a monitor, so that the tuners stay at their start values";
@@ -130,4 +132,24 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         study.notes.push(fact.to_owned());
     }
     Ok(study)
+}
+
+/// Inputs on a scale of temperature that nothing drives: they are at the zero of the scale, which is seldom meant.
+fn temperatures_of_nothing(study: &Study) -> Vec<String> {
+    let mut found: Vec<(String, Vec<&str>)> = Vec::new();
+    for job in &study.jobs {
+        let case = &study.cases[job.case];
+        for input in &study.models[job.model].1.interface().inputs {
+            if input.unit.zero() == 0.0 || case.input(&input.name).is_some() {
+                continue;
+            }
+            let fact = format!("nothing drives `{}`, which is 0 {} throughout", input.name, input.unit);
+            match found.iter_mut().find(|(known, _)| *known == fact) {
+                Some((_, cases)) if cases.contains(&case.name.as_str()) => {}
+                Some((_, cases)) => cases.push(&case.name),
+                None => found.push((fact, vec![&case.name])),
+            }
+        }
+    }
+    found.into_iter().map(|(fact, cases)| format!("{fact}, in {}", cases.join(", "))).collect()
 }
