@@ -1,8 +1,7 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Trace, Unit,
-    Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -138,8 +137,8 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::Missed;
     use mops_core::math;
+    use mops_core::{Missed, Trace};
 
     use super::*;
     use crate::common::testing::{analysis, assert_near, mistake, quantity, second_order, simulated, value};

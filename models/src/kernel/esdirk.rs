@@ -475,7 +475,7 @@ mod tests {
             let found = [end::<1>(push), end::<2>(push), end::<3>(push), end::<4>(push)];
             found.into_iter().zip([1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0]).for_each(|(x, exact)| near(x, exact * unit));
         }
-        let driven = end::<2>(|t| math::sin(t));
+        let driven = end::<2>(math::sin);
         assert!((driven - (1.0 - math::sin(1.0))).abs() < 1e-7, "{driven}");
     }
 

@@ -149,11 +149,14 @@ fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
 
 /// Columns such as `motor (V)` and `motor (A)`, which only their units tell apart, are called by the whole label.
 fn keep_labels_that_differ(names: &mut [(String, Option<String>)]) {
-    let count = |is_one: &dyn Fn(&(String, Option<String>)) -> bool| names.iter().filter(|other| is_one(other)).count();
     let differs = |(name, unit): &(String, Option<String>)| {
-        unit.is_some()
-            && count(&|other| other.0 == *name) > 1
-            && count(&|other| other.0 == *name && other.1 == *unit) == 1
+        let count = |unit: Option<&String>| {
+            names
+                .iter()
+                .filter(|other| other.0 == *name && unit.is_none_or(|unit| other.1.as_ref() == Some(unit)))
+                .count()
+        };
+        unit.is_some() && count(unit.as_ref()) < count(None)
     };
     let differs: Vec<bool> = names.iter().map(differs).collect();
     for ((name, unit), _) in names.iter_mut().zip(differs).filter(|(_, differs)| *differs) {

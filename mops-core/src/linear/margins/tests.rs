@@ -240,7 +240,7 @@ fn undamped_and_lightly_damped_loops_are_searched_in_little_time() {
 #[test]
 fn what_happens_at_a_corner_is_found() {
     let mut stream = crate::random::stream(7, "corners");
-    let mut corners = vec![0.1, 0.5, 1.0, 2.0, 10.0, 1.0 / 3.0, 51.0, 2127.659_574_468_085];
+    let mut corners = vec![0.1, 0.5, 1.0, 2.0, 10.0, 1.0 / 3.0, 51.0, 2_127.659_574_468_085];
     corners.extend((0..200).map(|_| math::powf(10.0, rand::Rng::random_range(&mut stream, -3.0..4.0))));
     for a in corners {
         let system = |numerator: &[f64], denominator: &[f64]| loop_of(numerator, denominator, 0.0).system;
