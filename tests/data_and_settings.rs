@@ -84,3 +84,36 @@ fn a_setting_that_is_wrong_in_any_reading_is_refused_with_its_place() {
         assert!(refused(setting).contains(part), "{setting}: {}", refused(setting));
     }
 }
+
+#[test]
+fn a_start_value_is_not_read_off_samples_that_come_later() {
+    let text = |free: &str| {
+        format!(
+            "[study]\nname = 'late'\ntask = 'calibration'\n[models.m.equations]\nstates = {{ x = '1' }}\nparameters = {{ k = '1/s' }}\n\
+             der = {{ x = 'k' }}\n[tuners]\nk = {{ start = 1, min = 0.1, max = 5 }}\n[experiments.e]\nfile = 'data.csv'\n\
+             reset-time = false\nfrom = '3 s'\nchannels = {{ x = {{ column = 'x', noise = 0.01 }} }}\nfree = {free}\n\
+             [criteria]\nx = {{ normalised-error = {{ signal = 'x' }} }}\n"
+        )
+    };
+    // x = 0.5 + 2 t.
+    let rows: String = (0..=20).map(|k| format!("{},{}\n", 0.5 * f64::from(k), 0.5 + f64::from(k))).collect();
+    let run = |free: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("study.toml"), text(free)).unwrap();
+        std::fs::write(folder.path().join("data.csv"), format!("t,x\n{rows}")).unwrap();
+        let mut command = assert_cmd::Command::cargo_bin("mops").unwrap();
+        let output =
+            command.current_dir(folder.path()).args(["run", "study.toml", "--json", "--out", "out"]).output().unwrap();
+        (output.status.code().unwrap(), [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()))
+    };
+    let (code, [_, refused]) = run("['x']");
+    assert!(
+        code == 2 && refused.contains("the first sample of `x` comes at 3 s and does not tell where it starts at 0 s"),
+        "{refused}"
+    );
+    let (code, [json, errors]) = run("{ x = { start = 0, min = -5, max = 5 } }");
+    assert!(code <= 1, "{errors}");
+    let result: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let tuner = |k: usize| result["tuners"][k]["value"].as_f64().unwrap();
+    assert!((tuner(0) - 2.0).abs() < 1e-4 && (tuner(1) - 0.5).abs() < 1e-3, "{json}");
+}

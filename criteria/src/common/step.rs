@@ -188,8 +188,7 @@ impl Answer<'_> {
             let band = 0.02 * self.height().unwrap_or(0.0).abs();
             !self.stays_within(band, self.last_outside(band).unwrap_or(self.time))
         };
-        let note =
-            (self.is_assumed && moves()).then_some("it still moves at the end, whose value counts as the target");
+        let note = (self.is_assumed && moves()).then_some("still moving at the end");
         Value { note: value.note.or(note), ..value }
     }
 

@@ -4,7 +4,7 @@ use super::Models;
 use super::values::{check_range, converted, names, parameter};
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::experiment::Experiment;
+use crate::experiment::{Channel, Experiment};
 use crate::expression::Expression;
 use crate::math;
 use crate::model::Parameter;
@@ -275,7 +275,16 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
             (start.unwrap_or(0.5 * (min.unwrap_or(0.0) + max.unwrap_or(0.0))), 0.0)
         }
         _ => {
-            return Err(Mistake::new(&free.state, format!("nothing measured tells where `{}` starts", free.state))
+            let late =
+                state.signal.as_deref().and_then(|s| experiment.channel(s)).filter(|channel| begins_late(channel));
+            let fact = match late {
+                Some(channel) => format!(
+                    "the first sample of `{}` comes at {} s and does not tell where it starts at 0 s",
+                    channel.signal, channel.times[0]
+                ),
+                None => format!("nothing measured tells where `{}` starts", free.state),
+            };
+            return Err(Mistake::new(&free.state, fact)
                 .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
         }
     };
@@ -308,15 +317,21 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
     })
 }
 
+/// Whether the first sample comes more than one interval, and a half, after the start of the simulation at 0 s.
+fn begins_late(channel: &Channel) -> bool {
+    matches!(channel.times[..], [first, second, ..] if first > 1.5 * (second - first))
+}
+
 /// First value and half-width of the search: of a measured state, its first sample and half its range; of the rate of a
 /// measured signal, the slope over the first samples and the largest slope anywhere.
 fn guess_start(signal: Option<&str>, rate_of: Option<&str>, experiment: &Experiment) -> Option<(f64, f64)> {
-    if let Some(channel) = signal.and_then(|s| experiment.channel(s)) {
+    let measured = |name: &str| experiment.channel(name).filter(|channel| !begins_late(channel));
+    if let Some(channel) = signal.and_then(measured) {
         let (min, max) = channel.values.iter().fold((f64::MAX, f64::MIN), |(a, b), &v| (a.min(v), b.max(v)));
         let floor = 4.0 * channel.noise.unwrap_or(0.0) + 1e-6 * max.abs().max(min.abs());
         return Some((channel.values[0], (0.5 * (max - min)).max(floor).max(f64::MIN_POSITIVE)));
     }
-    let channel = rate_of.and_then(|s| experiment.channel(s))?;
+    let channel = rate_of.and_then(measured)?;
     let slope = |i: usize, j: usize| (channel.values[j] - channel.values[i]) / (channel.times[j] - channel.times[i]);
     let n = channel.values.len();
     let span = (n - 1).min(3);
