@@ -113,7 +113,7 @@ fn a_start_value_is_not_read_off_samples_that_come_later() {
     );
     let (code, [json, errors]) = run("{ x = { start = 0, min = -5, max = 5 } }");
     assert!(code <= 1, "{errors}");
-    let result: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let result: Value = serde_json::from_str(&json).unwrap();
     let tuner = |k: usize| result["tuners"][k]["value"].as_f64().unwrap();
     assert!((tuner(0) - 2.0).abs() < 1e-4 && (tuner(1) - 0.5).abs() < 1e-3, "{json}");
 }

@@ -159,3 +159,38 @@ fn a_solver_leads_a_response_to_where_it_settles() {
     let s = &result["criteria"][0];
     assert!((number(&s["value"]) - math::ln(50.0) / 3.0).abs() < 1e-3 && s["met"] == true, "{s}");
 }
+
+#[test]
+fn what_may_be_meant_either_way_and_what_an_unstable_system_meets_is_refused() {
+    for (criterion, fact) in [
+        ("c = { phase-margin = {}, demand = '60 %' }", "the values of this kind are angles, not shares in %"),
+        (
+            "c = { damping-ratio = {}, demand = '45 deg' }",
+            "the values of this kind are pure numbers, not angles in deg",
+        ),
+        ("c = { maximum-sensitivity = {}, demand = '100 rad' }", "the values of this kind are pure numbers"),
+        ("c = { slowest-pole = { of = 'closed-loop' }, demand = 5 }", "5 1/s is outside of the range of this kind"),
+        ("c = { slowest-pole = { of = 'closed-loop' }, demand = -5 }", "a demand must be positive, not -5"),
+    ] {
+        let message = refusal(&format!("{LOOP}{criterion}"));
+        assert!(message.contains(fact), "{criterion}: {message}");
+    }
+    let growth = GROWTH.replace("HORIZON", "5 s");
+    for (criterion, fact) in [
+        ("c = { peak = { signal = 'y', of = 'minimum' }, demand = 1 }", "demand"),
+        (
+            "c = { settling-time = { signal = 'y', target = 1, relative-band = 2 }, demand = '3 s' }",
+            "if these are percent",
+        ),
+    ] {
+        let message = refusal(&format!("{growth}{criterion}"));
+        assert!(message.contains(fact), "{criterion}: {message}");
+    }
+    // What grows without end settles nowhere, at its own last value neither.
+    let result = run(&format!("{growth}c = {{ settling-time = {{ signal = 'y' }}, demand = '10 s' }}"));
+    let criterion = &result["criteria"][0];
+    assert!(criterion["value"].is_null() && criterion["met"] == false, "{criterion}");
+    // An equality asks for the value, not for at least as much.
+    let equal = run(&format!("{LOOP}c = {{ phase-margin = {{}}, demand = 1, usage = 'equality' }}"));
+    assert!((number(&equal["criteria"][0]["value"]) - 1.0).abs() < 1e-3 && equal["criteria"][0]["at_least"] != true);
+}
