@@ -78,8 +78,13 @@ impl Past {
     /// The run kept no study, or its data are gone.
     pub fn study(&self, catalogue: &Catalogue) -> Result<StudyFile, Diagnostic> {
         let Some((run, _)) = &self.run else {
-            return Err(Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
-                .with_help("a run of this version of mops writes it"));
+            let path = self.folder.join(store::FILE);
+            return Err(match path.exists() {
+                true => Diagnostic::new(format!("{} holds no run that can be read", path.display()))
+                    .with_help("it is damaged, or of another program; the result is in result.json"),
+                false => Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
+                    .with_help("a run of this version of mops writes it"),
+            });
         };
         let text = without_settings(&run.text, &run.settings);
         read_at(catalogue, &run.home, text, &run.settings)
