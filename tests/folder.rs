@@ -1,4 +1,4 @@
-//! The folder of a run: what is there is never lost, whoever has it open, whatever stands there and whenever a run ends.
+//! The folder of a run: nothing in it is ever lost, whichever process has it open and whenever a run ends.
 
 use std::fs;
 use std::path::Path;

@@ -97,7 +97,7 @@ impl Criterion for Bound {
         let value = Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect());
         let is_far_below = value.number < FAR_BELOW && value.residuals.len() >= SAMPLES;
         let note = is_far_below.then_some("far below the noise: is the noise in the unit of the signal?");
-        Ok(Value { note: value.note.or(note), ..value })
+        Ok(Value { note, ..value })
     }
 
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {

@@ -211,7 +211,10 @@ impl Trace {
                 }
             }
         }
-        best
+        match self.jumped {
+            Some(value) if better(value, best.0) => (value, self.end()),
+            _ => best,
+        }
     }
 
     /// The first time at which the trace is at or beyond `level` in the direction `rising`.
@@ -460,6 +463,7 @@ mod tests {
         let (trace, tangent) = (ramp(1.0, 7.0), ramp(0.5, -3.0));
         assert_eq!((trace.at(2.0), trace.last(), trace.at(3.0)), (7.0, 7.0, 7.0));
         assert_eq!(trace.sample(&[1.0, 2.0]), [2.0, 7.0]);
+        assert_eq!((trace.maximum(), trace.minimum()), ((7.0, 2.0), (1.0, 0.0)));
         assert_eq!(trace.at(1.999_999), 2.999_999);
         assert_eq!(trace.moved(&tangent, 0.1).last(), 6.7);
     }

@@ -1,4 +1,4 @@
-//! What a run leaves in its folder: result, evaluations, report and plots; predictions, the repaired study and its source by a
+//! Output files of a run: result, evaluations, report and plots; predictions, the repaired study and its source by a
 //! diagnosis, the study by a front.
 
 use std::fs;
@@ -22,7 +22,7 @@ use crate::toml_text::settled;
 /// How long a full disk is waited for.
 pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What a run leaves in its folder.
+/// Output files of a run.
 pub(super) struct Remains<'a> {
     pub folder: &'a Path,
     pub solved: &'a Solved,

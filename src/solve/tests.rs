@@ -38,7 +38,7 @@ impl Model for Watched {
     }
 }
 
-/// Remembers what it is told.
+/// Records the points that a run answers.
 #[derive(Default)]
 struct Told(Mutex<Vec<(Vec<u64>, Known)>>);
 

@@ -22,8 +22,6 @@ pub struct Channel {
     /// Indices in the system.
     input: usize,
     output: usize,
-    /// Name of the output.
-    signal: String,
     /// Unit of the output over that of the input.
     pub unit: Unit,
     /// Names and units of the input and the output.
@@ -43,9 +41,8 @@ impl Channel {
             (to, from) if to == from => Unit::one(),
             (to, from) => Unit::known(&format!("({to})/({from})")),
         };
-        let signal = model.signals[output].name.clone();
         let ends = [model.inputs[input].clone(), model.signals[output].clone()];
-        Ok(Self { input, output, signal, unit, ends, factor: 1.0 })
+        Ok(Self { input, output, unit, ends, factor: 1.0 })
     }
 
     /// The channel as a loop transfer function: the output is fed back to the input, so that it is counted in the unit of the
@@ -152,7 +149,7 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
     }
 
     fn signals(&self) -> Vec<String> {
-        vec![self.channel.signal.clone()]
+        vec![self.channel.ends[1].name.clone()]
     }
 
     fn sense(&self) -> Sense {

@@ -137,10 +137,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
                 method.advance();
                 continue;
             }
-            dynamics.pass_break(t, &mut x);
-            if t >= end {
-                sink.end(t, &x, dynamics);
-            }
+            pass_break(dynamics, (t, end), &mut x, sink);
             events.settle(dynamics, t, &mut x, sink)?;
             if t < end {
                 method.restart(dynamics, t, &x, &mut work);
@@ -160,10 +157,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         }
         shift(dynamics, t, &mut x, &mut spare, delay);
         if at_stop {
-            dynamics.pass_break(t, &mut x);
-            if t >= end {
-                sink.end(t, &x, dynamics);
-            }
+            pass_break(dynamics, (t, end), &mut x, sink);
         }
         dynamics.delay_events(delay);
         events.settle(dynamics, t, &mut x, sink)?;
@@ -173,6 +167,19 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         method.restart(dynamics, t, &x, &mut work);
     }
     if all_finite::<S>(x.as_ref()) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
+}
+
+/// Inputs take the values of the break that was reached, which the sink is shown where it is the end.
+fn pass_break<S: Scalar, D: Dynamics<S>>(
+    dynamics: &mut D,
+    (t, end): (f64, f64),
+    x: &mut D::State,
+    sink: &mut impl Sink<S, D>,
+) {
+    dynamics.pass_break(t, x);
+    if t >= end {
+        sink.end(t, x, dynamics);
+    }
 }
 
 fn all_finite<S: Scalar>(x: &[S]) -> bool {

@@ -136,6 +136,11 @@ pub(super) fn label(text: &str) -> Option<(&str, &str)> {
     within('[', ']').or_else(|| within('(', ')').filter(|(name, unit)| !name.is_empty() && is_unit(unit)))
 }
 
+/// A label, as [`label`] reads it.
+pub(super) fn labelled(name: &str, unit: &str) -> String {
+    format!("{name} ({unit})")
+}
+
 /// A cell of the header as name and unit; a column without a name is called by its number.
 fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
     let cell = cell.trim();
@@ -160,7 +165,7 @@ fn keep_labels_that_differ(names: &mut [(String, Option<String>)]) {
     };
     let differs: Vec<bool> = names.iter().map(differs).collect();
     for ((name, unit), _) in names.iter_mut().zip(differs).filter(|(_, differs)| *differs) {
-        *name = format!("{name} ({})", unit.as_deref().unwrap_or_default());
+        *name = labelled(name, unit.as_deref().unwrap_or_default());
     }
 }
 

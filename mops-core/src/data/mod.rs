@@ -202,7 +202,7 @@ impl DataFile {
         let labelled = csv::label(name).and_then(|(name, unit)| {
             let has_unit =
                 |&i: &usize| self.variables[i].columns == 1 && self.variables[i].unit.as_deref() == Some(unit);
-            index_of(name).or_else(|| index_of(&format!("{name} ({unit})"))).filter(has_unit)
+            index_of(name).or_else(|| index_of(&csv::labelled(name, unit))).filter(has_unit)
         });
         if let Some(variable) = labelled {
             return Some((variable, 0));
