@@ -35,6 +35,8 @@ pub struct Unit {
     is_difference: bool,
     /// Exponents of units that count angles, and of those that count cycles.
     turning: [f64; 2],
+    /// Value of its angles in the coherent unit: 180/pi for V/deg, 1 where angles are in rad.
+    angles: f64,
 }
 
 impl Unit {
@@ -47,6 +49,7 @@ impl Unit {
             zero: 0.0,
             is_difference: false,
             turning: [0.0; 2],
+            angles: 1.0,
         }
     }
 
@@ -86,6 +89,7 @@ impl Unit {
             unit.zero = if first && !divide { factor.zero } else { 0.0 };
             unit.dimension = unit.dimension.times(&factor.dimension, sign);
             unit.factor *= raised(factor.factor, sign);
+            unit.angles *= raised(factor.angles, sign);
             for (sum, power) in unit.turning.iter_mut().zip(factor.turning) {
                 *sum += sign * power;
             }
@@ -126,6 +130,12 @@ impl Unit {
     /// Whether it counts angles: rad, deg, rev, and what is made of them.
     pub fn is_angle(&self) -> bool {
         self.turning[0] != 0.0
+    }
+
+    /// Whether a number in it says in which unit angles are counted, where `other` counts them in deg, rev or the like: V does
+    /// not beside V/deg, nor 1/s beside rpm. Radians are 1, so that V beside V/rad leaves nothing open.
+    pub fn leaves_angles_open(&self, other: &Self) -> bool {
+        self.turning == [0.0; 2] && other.is_angle() && other.angles != 1.0
     }
 
     /// Whether it counts cycles, as Hz does: where angles are asked for it is 2 pi times as much.
@@ -251,6 +261,7 @@ fn factor(text: &str) -> Option<(Unit, &str)> {
     if exponent != 1.0 {
         unit.dimension = Dimension::NONE.times(&unit.dimension, exponent);
         unit.factor = raised(unit.factor, exponent);
+        unit.angles = raised(unit.angles, exponent);
         unit.zero = 0.0;
         unit.turning = unit.turning.map(|power| power * exponent);
     }
@@ -319,13 +330,15 @@ fn symbol(text: &str) -> Option<Unit> {
         Turning::Angle => [1.0, 0.0],
         Turning::Cycle => [0.0, 1.0],
     };
+    let factor = prefix * found.factor;
     Some(Unit {
         text: text.to_owned(),
         dimension: found.dimension,
-        factor: prefix * found.factor,
+        factor,
         zero: found.zero,
         is_difference: false,
         turning,
+        angles: if turning[0] == 0.0 { 1.0 } else { factor },
     })
 }
 
@@ -453,6 +466,25 @@ mod tests {
         assert!(Quantity::parse("15 s").unwrap().to(&Unit::known("m")).is_err());
         assert!(Quantity::parse("fast").is_err());
         assert!(Quantity::parse("3 parsecs").is_err());
+    }
+
+    #[test]
+    fn an_angle_is_not_read_into_a_quantity_that_counts_none() {
+        let read = |text: &str, unit: &str| Quantity::parse(text).unwrap().to(&Unit::known(unit));
+        for (text, unit) in [("0.3 V", "V/deg"), ("10 1/s", "rpm"), ("50 %", "deg"), ("2 N m s", "N m s/deg")] {
+            assert!(read(text, unit).unwrap_err().contains("counts no angle"), "{text} as {unit}");
+        }
+        for (text, unit, value) in [
+            ("0.3 V", "V/rad", 0.3),
+            ("300 mV/rad", "V", 0.3),
+            ("0.3 V/deg", "V", 0.3 * 180.0 / PI),
+            ("0.3 V/deg", "V/deg", 0.3),
+            ("2 Hz", "rpm", 120.0),
+            ("2 N m s", "mN m s/rad", 2000.0),
+        ] {
+            let found = read(text, unit).unwrap();
+            assert!((found - value).abs() <= 1e-12 * value, "{text} as {unit}: {found}");
+        }
     }
 
     #[test]

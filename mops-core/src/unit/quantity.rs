@@ -43,10 +43,13 @@ impl Quantity {
     /// The number in `unit`, scales of temperature by their zeros: 20 degC are 293.15 K, or 20 K as [`Unit::difference`].
     ///
     /// # Errors
-    /// A unit that measures something else.
+    /// A unit that measures something else, or that leaves open in which unit its angles are counted.
     pub fn to(&self, unit: &Unit) -> Result<f64, String> {
         match &self.unit {
             None => Ok(self.number),
+            Some(given) if given.leaves_angles_open(unit) => {
+                Err(format!("a quantity in `{given}` counts no angle, one in `{unit}` does; give it in `{unit}`"))
+            }
             Some(given) => given.convert(self.number, unit).ok_or_else(|| misplaced(given, unit)),
         }
     }
