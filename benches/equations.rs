@@ -7,7 +7,7 @@ use std::time::Instant;
 use criterion::Criterion;
 use mops::models::equations::{Equations, EquationsOptions};
 use mops::models::furuta::Furuta;
-use mops::models::kernel::Tolerance;
+use mops::models::kernel::{Simulated, Tolerance};
 use mops::{Case, Input, Job, Model};
 
 const END: f64 = 3.0;
@@ -30,7 +30,7 @@ fn variants() -> Vec<Variant> {
     let text = |text: &str| {
         let options = format!("{text}\n[tolerance]\nrelative = 1e-6\nabsolute = 1e-8\n");
         let options: EquationsOptions = toml::from_str(&options).expect("the text is right");
-        Box::new(Equations::new(&options).expect("so are its equations"))
+        Box::new(Simulated::new(Equations::new(&options).expect("so are its equations")))
     };
     let [a, b, c, d, ba, bp] = PARAMETERS;
     // Start values: the pendulum at 2 rad, the arm at 0.3 rad.

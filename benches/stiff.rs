@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::Criterion;
 use mops::models::equations::{Equations, EquationsOptions};
-use mops::models::kernel::{Dynamics, IntegrationMethod, Tolerance, integrate};
+use mops::models::kernel::{Dynamics, IntegrationMethod, Simulated, Tolerance, integrate};
 use mops::{Case, Job, Model, Scalar};
 use mops_core::math;
 
@@ -22,9 +22,7 @@ const END: f64 = 10.0;
 struct Rod;
 
 impl<S: Scalar> Dynamics<S> for Rod {
-    type State = Vec<S>;
-
-    fn derivative(&self, _: f64, x: &Vec<S>, dx: &mut Vec<S>) {
+    fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
         for i in 0..CELLS {
             let left = if i > 0 { x[i - 1] } else { S::from(HOT) };
             let right = if i + 1 < CELLS { x[i + 1] } else { x[i] };
@@ -63,13 +61,12 @@ fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let tolerance =
         Tolerance { relative: 1e-6, absolute: Some(1e-6), method: IntegrationMethod::Stiff, ..Tolerance::default() };
-    let compiled =
-        || integrate(&mut Rod, 0.0, END, black_box(vec![COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
+    let compiled = || integrate(&mut Rod, 0.0, END, black_box(&[COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
     let (end, work) = compiled();
     println!("compiled: {work:?}, end {:.9}, {:.9}, {:.9}", end[0], end[CELLS / 2], end[CELLS - 1]);
 
     let options: EquationsOptions = toml::from_str(TEXT).expect("the text is right");
-    let model = Equations::new(&options).expect("so are its equations");
+    let model = Simulated::new(Equations::new(&options).expect("so are its equations"));
     let case = Case::default();
     // Start values that are expressions are parameters without a value of their own.
     let parameters: Vec<f64> = model.interface().parameters.iter().map(|p| p.default.unwrap_or(f64::NAN)).collect();

@@ -4,13 +4,13 @@
 //! be chosen so that it settles soon and shakes its load little.
 
 use mops::criteria::settling_time::SettlingTime;
-use mops::models::kernel::{self, Dynamics, Recording, Simulate, Tolerance, record, wanted};
+use mops::models::kernel::{PlantModel, Simulated};
 use mops::{
-    Analysis, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Interface, Job, Mistake, Model, Options,
-    Parameter, Scalar, Study, TunerDraft, Unit, Value, Variable, WithTangents,
+    Analysis, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Instant, Interface, Mistake, Options,
+    Parameter, Plant, Scalar, Study, TunerDraft, Unit, Value, Variable,
 };
 
-/// The model: what it offers, and how it is simulated.
+/// The model: what it offers.
 struct Suspension(Interface);
 
 impl Suspension {
@@ -27,46 +27,39 @@ impl Suspension {
 /// Mass, kg.
 const MASS: f64 = 250.0;
 
-/// The equations, written once for values and for derivatives.
+/// The plant, written once for values and for derivatives.
 struct Wheel<S> {
     k: S,
     d: S,
 }
 
 impl<S: Scalar> Wheel<S> {
-    fn acceleration(&self, x: &[S; 2]) -> S {
+    fn acceleration(&self, x: &[S]) -> S {
         -(self.k * x[0] + self.d * x[1]) / MASS
     }
 }
 
-impl<S: Scalar> Dynamics<S> for Wheel<S> {
-    type State = [S; 2];
+impl<S: Scalar> Plant<S> for Wheel<S> {
+    fn start(&self) -> Vec<S> {
+        [0.0, 1.0].map(S::from).to_vec()
+    }
 
-    fn derivative(&self, _: f64, x: &[S; 2], dx: &mut [S; 2]) {
-        *dx = [x[1], self.acceleration(x)];
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        dx.copy_from_slice(&[at.x[1], self.acceleration(at.x)]);
+    }
+
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        [at.x[0], self.acceleration(at.x)][signal]
     }
 }
 
-impl Model for Suspension {
+impl PlantModel for Suspension {
     fn interface(&self) -> &Interface {
         &self.0
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        kernel::analyse(self, job)
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-}
-
-impl Simulate for Suspension {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut wheel = Wheel { k: parameters[0], d: parameters[1] };
-        let start = [0.0, 1.0].map(S::from);
-        let output = |wheel: &Wheel<S>, signal: usize, _: f64, x: &[S; 2]| [x[0], wheel.acceleration(x)][signal];
-        record(&mut wheel, start, job.horizon, &Tolerance::default(), &wanted(job, &self.0.signals), &output)
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        Ok(Wheel { k: parameters[0], d: parameters[1] })
     }
 }
 
@@ -105,7 +98,7 @@ pub fn study() -> Result<Study, Mistake> {
     };
     Draft {
         name: "suspension".into(),
-        models: vec![("wheel".into(), Suspension::new().into())],
+        models: vec![("wheel".into(), Simulated::new(Suspension::new()).into())],
         tuners: vec![
             ("k".into(), TunerDraft::new(20e3, 5e3, 80e3).log()),
             ("d".into(), TunerDraft::new(500.0, 100.0, 10e3).log()),

@@ -1,18 +1,14 @@
 //! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
 
 use mops_core::{
-    AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity,
+    AnalysisKind, EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity,
     Scalar, State, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::kernel::drive::Drive;
 use crate::kernel::friction::{Contact, contacts};
-use crate::kernel::{
-    Dynamics, Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, mechanism, rates_and_signals,
-    record, rests, wanted,
-};
+use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, rests};
 
 /// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
 ///
@@ -61,7 +57,7 @@ pub struct Furuta {
 
 impl Furuta {
     /// A Furuta pendulum that is simulated to `horizon` (s) where no experiment says otherwise.
-    pub fn model(horizon: Option<f64>, tolerance: Tolerance) -> Kernel<Self> {
+    pub fn model(horizon: Option<f64>, tolerance: Tolerance) -> Simulated<Self> {
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
         let friction =
             |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY).with_default(0.0);
@@ -105,87 +101,34 @@ impl Furuta {
             horizon,
             analysis: AnalysisKind::Time,
         };
-        Kernel(Self { interface, tolerance })
+        Simulated::new(Self { interface, tolerance })
     }
 }
 
-impl Written for Furuta {
+impl PlantModel for Furuta {
     fn interface(&self) -> &Interface {
         &self.interface
-    }
-
-    fn states(&self) -> Vec<Variable> {
-        self.interface.signals[..4].to_vec()
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
 
-    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)))?;
-        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
-    }
-}
-
-impl Equations for Furuta {
-    /// Joints at rest without Coulomb friction, which has no slope there.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let x: [S; 4] = at.states.try_into().expect("the pendulum has four states");
-        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]))?;
-        for (joint, speed) in SPEED.into_iter().enumerate() {
-            if rests(at, x[speed]) {
-                dynamics.coulomb[joint] = S::from(0.0);
-            }
-            dynamics.contact[joint] = Contact::of(x[speed].value());
-        }
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
-    }
-
-    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
-        let left_out = |&&(_, speed, coulomb): &&(&str, usize, usize)| {
-            rests(at, at.states[speed]) && at.parameters[coulomb] != 0.0
-        };
-        let joints = [("phi", SPEED[1], 6), ("theta", SPEED[0], 7)];
-        joints.iter().filter(left_out).map(|(name, ..)| (*name).to_owned()).collect()
-    }
-}
-
-impl Furuta {
-    /// The equations with given parameters and torque.
-    fn dynamics<'a, S: Scalar>(parameters: &[S], drive: Drive<'a, S>) -> Result<FurutaDynamics<'a, S>, Failure> {
-        let [a, b, c, d, ba, bp, ca, cp, ..] = *parameters else { panic!("the study gives every parameter") };
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        let [a, b, c, d, ba, bp, ca, cp, start @ ..] =
+            *parameters.first_chunk::<12>().expect("it has twelve parameters");
         let [ab, cc] = [(a * b).value(), (c * c).value()];
         if ab <= cc {
             let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
             return Err(Failure::Undefined(fact));
         }
         let (viscous, coulomb) = ([bp, ba], [cp, ca]);
-        let outside = [S::from(0.0); 2];
-        Ok(FurutaDynamics { a, b, c, d, viscous, coulomb, drive, outside, contact: [Contact::Forward; 2] })
-    }
-
-    /// The start values.
-    fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
-        parameters[8..].try_into().expect("four start values come last")
-    }
-
-    /// The value of a signal: the states, then the torque.
-    fn signal<S: Scalar>(dynamics: &FurutaDynamics<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
-        if signal < 4 { x[signal] } else { dynamics.drive.at(t) }
+        Ok(FurutaPlant { a, b, c, d, viscous, coulomb, start, contact: [Contact::Forward; 2] })
     }
 }
 
-impl Simulate for Furuta {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
-        let start = Self::start(parameters);
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
-    }
-}
-
-/// The equations, with the present torque and contacts; joints in the order pendulum, arm; states `phi, phi', theta, theta'`.
-pub struct FurutaDynamics<'a, S> {
+/// The pendulum with its present contacts; joints in the order pendulum, arm; states `phi, phi', theta, theta'`.
+pub struct FurutaPlant<S> {
     /// Inertia of the pendulum, kg m2.
     pub a: S,
     /// Inertia of the arm, kg m2.
@@ -198,50 +141,36 @@ pub struct FurutaDynamics<'a, S> {
     pub viscous: [S; 2],
     /// Coulomb friction of pendulum and arm, N m.
     pub coulomb: [S; 2],
-    /// Torque on the arm, N m.
-    pub drive: Drive<'a, S>,
-    /// Torques on pendulum and arm from outside the model, N m.
-    pub outside: [S; 2],
+    /// The states at time 0.
+    pub start: [S; 4],
     /// How pendulum and arm move.
     pub contact: [Contact; 2],
 }
 
-impl<S: Scalar> Holds<S> for FurutaDynamics<'_, S> {
-    fn hold(&mut self, u: &[S], w: &[S]) {
-        self.drive = Drive::held(u[0]);
-        self.outside = [w[1], w[0]];
-    }
-}
-
-impl<S: Scalar> FurutaDynamics<'_, S> {
+impl<S: Scalar> FurutaPlant<S> {
     /// Coupling and arm inertia at this angle (the pendulum's own is `a`), and the forces without Coulomb friction.
-    #[inline]
-    fn terms(&self, t: f64, x: &[S; 4]) -> (S, S, [S; 2]) {
-        let [_, dphi, theta, dtheta] = *x;
+    #[inline(always)]
+    fn terms(&self, at: &Instant<'_, S>) -> (S, S, [S; 2]) {
+        let [_, dphi, theta, dtheta] = *state(at.x);
         let (sin, cos) = theta.sin_cos();
         let coupling = self.c * cos;
         let arm = self.b + self.a * sin * sin;
         let turning = self.a * dphi * sin * cos;
-        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta + self.outside[0];
-        let arm_force = self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi
-            + self.drive.at(t)
-            + self.outside[1];
+        let pendulum_force = turning * dphi + self.d * sin - self.viscous[0] * dtheta + at.w[1];
+        let arm_force =
+            self.c * dtheta * dtheta * sin - turning * dtheta * 2.0 - self.viscous[1] * dphi + at.u[0] + at.w[0];
         (coupling, arm, [pendulum_force, arm_force])
-    }
-
-    fn mass_and_force(&self, t: f64, x: &[S; 4]) -> ([[f64; 2]; 2], [f64; 2]) {
-        let (coupling, arm, force) = self.terms(t, x);
-        let mass = [[self.a.value(), coupling.value()], [coupling.value(), arm.value()]];
-        (mass, force.map(Scalar::value))
     }
 
     fn limits(&self) -> [f64; 2] {
         self.coulomb.map(Scalar::value)
     }
 
-    fn find_contacts(&mut self, t: f64, x: &[S; 4]) {
-        let (mass, force) = self.mass_and_force(t, x);
-        self.contact = contacts(&mass, &force, &self.limits(), &[x[3].value(), x[1].value()]);
+    fn find_contacts(&mut self, at: &Instant<'_, S>) {
+        let (coupling, arm, force) = self.terms(at);
+        let mass = [[self.a.value(), coupling.value()], [coupling.value(), arm.value()]];
+        let speed = SPEED.map(|speed| at.x[speed].value());
+        self.contact = contacts(&mass, &force.map(Scalar::value), &self.limits(), &speed);
     }
 
     fn is_stuck(&self, joint: usize) -> bool {
@@ -249,10 +178,10 @@ impl<S: Scalar> FurutaDynamics<'_, S> {
     }
 
     /// The torque that holds a stuck joint: what its equation needs with no acceleration of its own.
-    fn holding_torque(&self, t: f64, x: &[S; 4], joint: usize) -> S {
-        let (coupling, _, force) = self.terms(t, x);
-        let mut dx = *x;
-        self.derivative(t, x, &mut dx);
+    fn holding_torque(&self, at: &Instant<'_, S>, joint: usize) -> S {
+        let (coupling, _, force) = self.terms(at);
+        let mut dx = *state(at.x);
+        self.rates(at, &mut dx);
         force[joint] - coupling * dx[SPEED[1 - joint]]
     }
 }
@@ -260,17 +189,20 @@ impl<S: Scalar> FurutaDynamics<'_, S> {
 /// Index of the speed of pendulum and arm in the state.
 const SPEED: [usize; 2] = [3, 1];
 
-impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
-    type State = [S; 4];
+#[inline(always)]
+fn state<S>(x: &[S]) -> &[S; 4] {
+    x.first_chunk().expect("the pendulum has four states")
+}
 
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 4).then_some(signal)
+impl<S: Scalar> Plant<S> for FurutaPlant<S> {
+    fn start(&self) -> Vec<S> {
+        self.start.to_vec()
     }
 
     // At each of the six stages of a step: as calls they would cost a fifth of a simulation.
     #[inline(always)]
-    fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {
-        let (coupling, arm, [mut pendulum_force, mut arm_force]) = self.terms(t, x);
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let (coupling, arm, [mut pendulum_force, mut arm_force]) = self.terms(at);
         pendulum_force -= self.coulomb[0] * self.contact[0].sign();
         arm_force -= self.coulomb[1] * self.contact[1].sign();
         let (ddtheta, ddphi) = match [self.is_stuck(0), self.is_stuck(1)] {
@@ -285,7 +217,8 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
             [true, false] => (S::from(0.0), arm_force / arm),
             [true, true] => (S::from(0.0), S::from(0.0)),
         };
-        *dx = [x[1], ddphi, x[3], ddtheta];
+        let [_, dphi, _, dtheta] = *state(at.x);
+        *dx.first_chunk_mut().expect("it has as many rates") = [dphi, ddphi, dtheta, ddtheta];
     }
 
     fn guards(&self) -> usize {
@@ -293,24 +226,25 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
     }
 
     /// Sliding: the speed in its direction. Stuck: what is left of the limit.
-    fn guard(&self, joint: usize, t: f64, x: &[S; 4]) -> S {
+    #[inline]
+    fn guard(&self, joint: usize, at: &Instant<'_, S>) -> S {
         let limit = self.coulomb[joint];
         if limit.value() == 0.0 {
             S::from(1.0)
         } else if self.is_stuck(joint) {
-            limit - self.holding_torque(t, x, joint).abs()
+            limit - self.holding_torque(at, joint).abs()
         } else {
-            x[SPEED[joint]] * self.contact[joint].sign()
+            at.x[SPEED[joint]] * self.contact[joint].sign()
         }
     }
 
-    fn switch(&mut self, joint: usize, t: f64, x: &mut [S; 4]) -> &str {
+    fn switch(&mut self, joint: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         if self.is_stuck(joint) {
-            let torque = self.holding_torque(t, x, joint);
+            let torque = self.holding_torque(&event.at, joint);
             self.contact[joint] = if torque.value() > 0.0 { Contact::Forward } else { Contact::Backward };
         } else {
             x[SPEED[joint]] = S::from(0.0);
-            self.find_contacts(t, x);
+            self.find_contacts(&Instant { x, ..event.at });
         }
         match (joint, self.is_stuck(joint)) {
             (0, true) => "pendulum sticks",
@@ -320,16 +254,22 @@ impl<S: Scalar> Dynamics<S> for FurutaDynamics<'_, S> {
         }
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        self.drive.next_break(t)
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.find_contacts(at);
     }
 
-    fn longest_step(&self) -> f64 {
-        self.drive.longest_step()
-    }
-
-    fn pass_break(&mut self, t: f64, x: &mut [S; 4]) {
-        self.drive.pass_break(t);
-        self.find_contacts(t, x);
+    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
+        let mut left_out = Vec::new();
+        for (position, joint) in [(0, 1), (2, 0)] {
+            let speed = at.x[SPEED[joint]];
+            if rests(at_rest, speed) {
+                if self.coulomb[joint].value() != 0.0 {
+                    left_out.push(position);
+                }
+                self.coulomb[joint] = S::from(0.0);
+            }
+            self.contact[joint] = Contact::of(speed.value());
+        }
+        Ok(left_out)
     }
 }

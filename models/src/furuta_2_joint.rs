@@ -1,18 +1,12 @@
 //! The Furuta pendulum as two rigid bodies and two bearings.
 
-use mops_core::{
-    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity, Scalar, Variable,
-};
+use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::kernel::drive::Drive;
 use crate::kernel::elements::BearingFriction;
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{
-    Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds,
-    wanted,
-};
+use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
 /// The Furuta pendulum as two rigid bodies: an arm that turns by `phi` about the vertical, a pendulum that turns by `theta`
 /// about the arm, 0 upright and pi hanging. With `K = J + m l^2`, `C = m r l`:
@@ -62,7 +56,7 @@ impl ModelOptions for Furuta2JointOptions {
         let interface = mechanism::interface(&[ARM, PENDULUM], parameters, vec![arm_torque()]);
         let ports = mechanism::ports(&["phi", "theta"], &["u"]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Kernel(Furuta2Joint {
+        Ok(Box::new(Simulated::new(Furuta2Joint {
             interface: Interface { ports, horizon, ..interface },
             tolerance: self.tolerance,
         })))
@@ -75,80 +69,23 @@ struct Furuta2Joint {
     tolerance: Tolerance,
 }
 
-impl Written for Furuta2Joint {
+impl PlantModel for Furuta2Joint {
     fn interface(&self) -> &Interface {
         &self.interface
-    }
-
-    fn states(&self) -> Vec<Variable> {
-        self.interface.signals[..4].to_vec()
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
 
-    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
-        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
-    }
-}
-
-impl<S: Scalar> Holds<S> for TwoJoints<'_, S> {
-    fn hold(&mut self, u: &[S], w: &[S]) {
-        self.bodies.drive = Drive::held(u[0]);
-        self.outside.copy_from_slice(w);
-    }
-}
-
-impl Equations for Furuta2Joint {
-    /// Joints at rest without friction, which has no slope there.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), Self::friction(at.parameters)?);
-        dynamics.look(at);
-        let x = at.states.try_into().expect("two joints have four states");
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
-    }
-
-    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
-        let Ok(friction) = Self::friction(at.parameters) else { return Vec::new() };
-        let joints = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), friction).look(at);
-        joints.into_iter().map(|joint| self.interface.signals[2 * joint].name.clone()).collect()
-    }
-}
-
-impl Simulate for Furuta2Joint {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
-        let start = Self::start(parameters);
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
-    }
-}
-
-type TwoJoints<'a, S> = Mechanism<S, TwoBodies<'a, S>, 2, 4>;
-
-impl Furuta2Joint {
-    /// The bearings of arm and pendulum.
-    fn friction<S: Scalar>(parameters: &[S]) -> Result<[BearingFriction<S>; 2], Failure> {
-        let [tau11, tau12, peak1, tau21, tau22, peak2] =
-            *parameters[6..].first_chunk().expect("the study gives every parameter");
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        let [bodies @ .., tau11, tau12, peak1, tau21, tau22, peak2, _, _, _, _] =
+            *parameters.first_chunk::<16>().expect("it has sixteen parameters");
         let line = |at_rest: S, at_one: S| [[S::from(0.0), at_rest], [S::from(1.0), at_one]];
-        Ok([BearingFriction::new(&line(tau11, tau12), peak1)?, BearingFriction::new(&line(tau21, tau22), peak2)?])
-    }
-
-    fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 2]) -> TwoJoints<'a, S> {
-        let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
-        Mechanism::new(TwoBodies { lumped, drive }, friction, &[ARM, PENDULUM])
-    }
-
-    /// The start values.
-    fn start<S: Scalar>(parameters: &[S]) -> [S; 4] {
-        *parameters.last_chunk().expect("four start values come last")
-    }
-
-    /// The value of a signal: the states, then the torque.
-    fn signal<S: Scalar>(dynamics: &TwoJoints<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
-        if signal < 4 { x[signal] } else { dynamics.bodies.drive.at(t) }
+        let friction =
+            [BearingFriction::new(&line(tau11, tau12), peak1)?, BearingFriction::new(&line(tau21, tau22), peak2)?];
+        let bodies = TwoBodies(Lumped::of(&bodies));
+        Ok(Mechanism::new(bodies, friction, &[ARM, PENDULUM], &parameters[12..]))
     }
 }
 
@@ -183,29 +120,14 @@ impl<S: Scalar> Lumped<S> {
     }
 }
 
-/// Arm and pendulum, with the torque on the arm.
-pub(crate) struct TwoBodies<'a, S> {
-    pub lumped: Lumped<S>,
-    pub drive: Drive<'a, S>,
-}
+/// Arm and pendulum; the input is the torque on the arm.
+pub(crate) struct TwoBodies<S>(pub Lumped<S>);
 
-impl<S: Scalar> Bodies<S, 2> for TwoBodies<'_, S> {
+impl<S: Scalar> Bodies<S, 2> for TwoBodies<S> {
     #[inline]
-    fn mass_and_force(&self, t: f64, q: &[S; 2], w: &[S; 2]) -> ([[S; 2]; 2], [S; 2]) {
-        let (mass, [arm, pendulum]) = self.lumped.mass_and_force(q[1], w[0], w[1]);
-        (mass, [arm + self.drive.at(t), pendulum])
-    }
-
-    fn next_break(&self, t: f64) -> f64 {
-        self.drive.next_break(t)
-    }
-
-    fn longest_step(&self) -> f64 {
-        self.drive.longest_step()
-    }
-
-    fn pass_break(&mut self, t: f64) {
-        self.drive.pass_break(t);
+    fn mass_and_force(&self, _: f64, u: &[S], q: &[S; 2], w: &[S; 2]) -> ([[S; 2]; 2], [S; 2]) {
+        let (mass, [arm, pendulum]) = self.0.mass_and_force(q[1], w[0], w[1]);
+        (mass, [arm + u[0], pendulum])
     }
 }
 

@@ -1,19 +1,13 @@
 //! The Furuta pendulum whose pendulum can also tilt sideways, against a spring.
 
-use mops_core::{
-    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Plant, Quantity, Scalar, Variable,
-};
+use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::furuta_2_joint::{ARM, Lumped, PENDULUM, arm_torque, body_parameters, peak, torque};
-use crate::kernel::drive::Drive;
 use crate::kernel::elements::{BearingFriction, SpringDamper};
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
-use crate::kernel::{
-    Equations, Holds, Kernel, Opened, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds,
-    wanted,
-};
+use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
 /// The Furuta pendulum of `furuta-2-joint` with a third joint: at its top the pendulum tilts by `psi` in the plane through
 /// its swing axis, against a spring and a damper in parallel. The rod has no inertia about its own axis. With
@@ -78,7 +72,7 @@ impl ModelOptions for Furuta3JointOptions {
         let interface = mechanism::interface(&[ARM, PENDULUM, TILT], parameters, vec![arm_torque()]);
         let ports = mechanism::ports(&["phi", "theta", "psi"], &["u"]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Kernel(Furuta3Joint {
+        Ok(Box::new(Simulated::new(Furuta3Joint {
             interface: Interface { ports, horizon, ..interface },
             tolerance: self.tolerance,
         })))
@@ -93,98 +87,38 @@ struct Furuta3Joint {
     tolerance: Tolerance,
 }
 
-impl Written for Furuta3Joint {
+impl PlantModel for Furuta3Joint {
     fn interface(&self) -> &Interface {
         &self.interface
-    }
-
-    fn states(&self) -> Vec<Variable> {
-        self.interface.signals[..6].to_vec()
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
 
-    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<Box<dyn Plant<S> + 'a>, Failure> {
-        let dynamics = Self::dynamics(parameters, Drive::held(S::from(0.0)), Self::friction(parameters)?);
-        Ok(Box::new(Opened::new(dynamics, Self::start(parameters), Self::signal)))
-    }
-}
-
-impl<S: Scalar> Holds<S> for ThreeJoints<'_, S> {
-    fn hold(&mut self, u: &[S], w: &[S]) {
-        self.bodies.drive = Drive::held(u[0]);
-        self.outside.copy_from_slice(w);
-    }
-}
-
-impl Equations for Furuta3Joint {
-    /// Joints at rest without friction, which has no slope there.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let mut dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), Self::friction(at.parameters)?);
-        dynamics.look(at);
-        let x = at.states.try_into().expect("three joints have six states");
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
-    }
-
-    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
-        let Ok(friction) = Self::friction(at.parameters) else { return Vec::new() };
-        let joints = Self::dynamics(at.parameters, Drive::held(at.inputs[0]), friction).look(at);
-        joints.into_iter().map(|joint| self.interface.signals[2 * joint].name.clone()).collect()
-    }
-}
-
-impl Simulate for Furuta3Joint {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")), Self::friction(parameters)?);
-        let start = Self::start(parameters);
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
-    }
-}
-
-type ThreeJoints<'a, S> = Mechanism<S, ThreeBodies<'a, S>, 3, 6>;
-
-impl Furuta3Joint {
-    /// The bearings of arm, pendulum and tilt.
-    fn friction<S: Scalar>(parameters: &[S]) -> Result<[BearingFriction<S>; 3], Failure> {
-        let [tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2] =
-            *parameters[6..].first_chunk().expect("the study gives every parameter");
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        let (parameters, start) = parameters.split_at(parameters.len() - 6);
+        let [bodies @ .., tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2, c, d] =
+            *parameters.first_chunk::<19>().expect("it has nineteen parameters besides the start values");
         let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
-        Ok([
+        let friction = [
             BearingFriction::new(&[[at_rest, tau11], [point0, tau01], [point1, tau05], [point2, tau12]], peak1)?,
             BearingFriction::new(&[[at_rest, tau21], [at_one, tau22]], peak2)?,
             BearingFriction::none(),
-        ])
-    }
-
-    fn dynamics<'a, S: Scalar>(p: &[S], drive: Drive<'a, S>, friction: [BearingFriction<S>; 3]) -> ThreeJoints<'a, S> {
-        let lumped = Lumped::of(p.first_chunk().expect("the bodies come first"));
-        // Spring and damper stand before the six start values.
-        let tilt = SpringDamper::new(p[p.len() - 8], p[p.len() - 7]);
-        Mechanism::new(ThreeBodies { lumped, tilt, drive }, friction, &[ARM, PENDULUM, TILT])
-    }
-
-    /// The start values.
-    fn start<S: Scalar>(parameters: &[S]) -> [S; 6] {
-        *parameters.last_chunk().expect("six start values come last")
-    }
-
-    /// The value of a signal: the states, then the torque.
-    fn signal<S: Scalar>(dynamics: &ThreeJoints<'_, S>, signal: usize, t: f64, x: &[S; 6]) -> S {
-        if signal < 6 { x[signal] } else { dynamics.bodies.drive.at(t) }
+        ];
+        let bodies = ThreeBodies { lumped: Lumped::of(&bodies), tilt: SpringDamper::new(c, d) };
+        Ok(Mechanism::new(bodies, friction, &[ARM, PENDULUM, TILT], start))
     }
 }
 
-/// Arm and pendulum, with the torque on the arm and the spring at the top of the pendulum.
-pub(crate) struct ThreeBodies<'a, S> {
+/// Arm and pendulum, with the spring at the top of the pendulum; the input is the torque on the arm.
+pub(crate) struct ThreeBodies<S> {
     pub lumped: Lumped<S>,
     pub tilt: SpringDamper<S>,
-    pub drive: Drive<'a, S>,
 }
 
-impl<S: Scalar> Bodies<S, 3> for ThreeBodies<'_, S> {
-    fn mass_and_force(&self, t: f64, q: &[S; 3], speed: &[S; 3]) -> ([[S; 3]; 3], [S; 3]) {
+impl<S: Scalar> Bodies<S, 3> for ThreeBodies<S> {
+    fn mass_and_force(&self, _: f64, input: &[S], q: &[S; 3], speed: &[S; 3]) -> ([[S; 3]; 3], [S; 3]) {
         let (k, arm, c, gravity) = (self.lumped.a, self.lumped.b, -self.lumped.c, self.lumped.d);
         let [f, w, u] = *speed;
         let (st, ct) = q[1].sin_cos();
@@ -202,18 +136,6 @@ impl<S: Scalar> Bodies<S, 3> for ThreeBodies<'_, S> {
         let h2 = -swing * f * f + k * ct * cp2 * f * u * 2.0 - ksp * cp * w * u * 2.0 - gravity * cp * st;
         let h3 = -tilt * f * f - k * ct * cp2 * f * w * 2.0 + ksp * cp * w * w - gravity * sp * ct
             + self.tilt.torque(q[2], u);
-        (mass, [-h1 + self.drive.at(t), -h2, -h3])
-    }
-
-    fn next_break(&self, t: f64) -> f64 {
-        self.drive.next_break(t)
-    }
-
-    fn longest_step(&self) -> f64 {
-        self.drive.longest_step()
-    }
-
-    fn pass_break(&mut self, t: f64) {
-        self.drive.pass_break(t);
+        (mass, [-h1 + input[0], -h2, -h3])
     }
 }

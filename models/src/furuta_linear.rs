@@ -1,18 +1,13 @@
 //! The Furuta pendulum near its upright position, linearised.
 
-use mops_core::{
-    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity, Scalar, Variable,
-};
+use mops_core::{Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::furuta_2_joint::{ARM, Lumped, PENDULUM, arm_torque};
-use crate::kernel::drive::Drive;
 use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::{self, Joint};
-use crate::kernel::{
-    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, rates_and_signals, record, seconds, wanted,
-};
+use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
 /// The Furuta pendulum linearised about the upright position, with a spring and a damper in parallel in each joint:
 ///
@@ -44,7 +39,8 @@ impl ModelOptions for FurutaLinearOptions {
         self.tolerance.check()?;
         let interface = mechanism::interface(&upright_joints(), lumped_parameters(), vec![arm_torque()]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;
-        Ok(Box::new(Kernel(FurutaLinear { interface: Interface { horizon, ..interface }, tolerance: self.tolerance })))
+        let interface = Interface { horizon, ..interface };
+        Ok(Box::new(Simulated::new(FurutaLinear { interface, tolerance: self.tolerance })))
     }
 }
 
@@ -54,45 +50,18 @@ struct FurutaLinear {
     tolerance: Tolerance,
 }
 
-impl Written for FurutaLinear {
+impl PlantModel for FurutaLinear {
     fn interface(&self) -> &Interface {
         &self.interface
-    }
-
-    fn states(&self) -> Vec<Variable> {
-        self.interface.signals[..4].to_vec()
     }
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
-}
 
-impl Equations for FurutaLinear {
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let dynamics = Self::dynamics(at.parameters, Drive::held(at.inputs[0]))?;
-        let x = at.states.try_into().expect("the pendulum has four states");
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
-    }
-}
-
-impl Simulate for FurutaLinear {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut dynamics = Self::dynamics(parameters, Drive::new(job.case.input("u")))?;
-        let start = *parameters.last_chunk().expect("four start values come last");
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
-    }
-}
-
-impl FurutaLinear {
-    fn dynamics<'a, S: Scalar>(parameters: &[S], drive: Drive<'a, S>) -> Result<Driven<'a, S>, Failure> {
-        let plant = *parameters.first_chunk().expect("the plant comes first");
-        Ok(Driven { plant: Upright::of(plant)?, drive })
-    }
-
-    /// The value of a signal: the states, then the torque.
-    fn signal<S: Scalar>(dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &[S; 4]) -> S {
-        if signal < 4 { x[signal] } else { dynamics.drive.at(t) }
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        let (plant, start) = parameters.split_first_chunk().expect("the plant comes first");
+        Ok(LinearPlant { plant: Upright::of(*plant)?, start })
     }
 }
 
@@ -156,33 +125,20 @@ impl<S: Scalar> Upright<S> {
     }
 }
 
-/// The linearised pendulum with a torque from outside.
-struct Driven<'a, S> {
+/// The linearised pendulum; the input is the torque on the arm.
+struct LinearPlant<'a, S> {
     plant: Upright<S>,
-    drive: Drive<'a, S>,
+    start: &'a [S],
 }
 
-impl<S: Scalar> Dynamics<S> for Driven<'_, S> {
-    type State = [S; 4];
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 4).then_some(signal)
+impl<S: Scalar> Plant<S> for LinearPlant<'_, S> {
+    fn start(&self) -> Vec<S> {
+        self.start.to_vec()
     }
 
-    fn derivative(&self, t: f64, x: &[S; 4], dx: &mut [S; 4]) {
-        let [arm, pendulum] = self.plant.linear(x, self.drive.at(t));
-        *dx = [x[1], arm, x[3], pendulum];
-    }
-
-    fn next_break(&self, t: f64) -> f64 {
-        self.drive.next_break(t)
-    }
-
-    fn longest_step(&self) -> f64 {
-        self.drive.longest_step()
-    }
-
-    fn pass_break(&mut self, t: f64, _: &mut [S; 4]) {
-        self.drive.pass_break(t);
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let x = at.x.first_chunk().expect("the pendulum has four states");
+        let [arm, pendulum] = self.plant.linear(x, at.u[0]);
+        dx.copy_from_slice(&[x[1], arm, x[3], pendulum]);
     }
 }

@@ -1,17 +1,14 @@
 //! The Furuta pendulum held upright by state feedback, its arm led to an angle.
 
 use mops_core::{
-    Failure, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity, Scalar, Variable,
+    EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
 use crate::kernel::elements::{Lag, Saturation};
-use crate::kernel::{
-    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, mechanism, rates_and_signals, record,
-    seconds, wanted,
-};
+use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, seconds};
 
 /// The Furuta pendulum with a spring and a damper in each joint, upright, under state feedback with a filtered reference:
 ///
@@ -75,7 +72,7 @@ impl ModelOptions for FurutaStateFeedbackOptions {
         interface.signals.push(Variable::new("ref", "rad", "reference of the arm's angle"));
         interface.signals.push(Variable::new("u", "N m", "torque on the arm"));
         interface.horizon = seconds("horizon", Some(&self.horizon))?;
-        Ok(Box::new(Kernel(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance })))
+        Ok(Box::new(Simulated::new(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance })))
     }
 }
 
@@ -86,11 +83,12 @@ struct FurutaStateFeedback {
     tolerance: Tolerance,
 }
 
-impl Written for FurutaStateFeedback {
+impl PlantModel for FurutaStateFeedback {
     fn interface(&self) -> &Interface {
         &self.interface
     }
 
+    /// The reference is a state besides those of the pendulum.
     fn states(&self) -> Vec<Variable> {
         self.interface.signals[..5].to_vec()
     }
@@ -98,30 +96,10 @@ impl Written for FurutaStateFeedback {
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
-}
 
-impl Equations for FurutaStateFeedback {
-    /// Within the limit of the torque.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let dynamics = self.dynamics(at.parameters)?;
-        let x = at.states.try_into().expect("the loop has five states");
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Self::signal))
-    }
-}
-
-impl Simulate for FurutaStateFeedback {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let mut dynamics = self.dynamics(parameters)?;
-        let [phi, dphi, theta, dtheta] = *parameters.last_chunk().expect("four start values come last");
-        let start = [phi, dphi, theta, dtheta, S::from(0.0)];
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Self::signal)
-    }
-}
-
-impl FurutaStateFeedback {
-    fn dynamics<S: Scalar>(&self, parameters: &[S]) -> Result<Loop<S>, Failure> {
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl mops_core::Plant<S>, Failure> {
         let p: [S; 19] = parameters.try_into().expect("the study gives every parameter");
-        let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., _, _, _, _] = p;
+        let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., phi, dphi, theta, dtheta] = p;
         Ok(Loop {
             gains: [k1, k2, k3, k4],
             setpoint,
@@ -129,12 +107,8 @@ impl FurutaStateFeedback {
             actuator: Saturation::new(-limit, limit),
             equations: self.plant,
             plant: Upright::of(plant)?,
+            start: [phi, dphi, theta, dtheta, S::from(0.0)],
         })
-    }
-
-    /// The value of a signal: the states, the torque.
-    fn signal<S: Scalar>(dynamics: &Loop<S>, signal: usize, _: f64, x: &[S; 5]) -> S {
-        if signal < 5 { x[signal] } else { dynamics.torque(x) }
     }
 }
 
@@ -146,51 +120,61 @@ struct Loop<S> {
     actuator: Saturation<S>,
     equations: Plant,
     plant: Upright<S>,
+    start: [S; 5],
 }
 
 impl<S: Scalar> Loop<S> {
     /// What the feedback asks for, N m.
-    fn demand(&self, x: &[S; 5]) -> S {
+    fn demand(&self, x: &[S]) -> S {
         let [k1, k2, k3, k4] = self.gains;
         -(k1 * (x[0] - x[4]) + k2 * x[1] + k3 * x[2] + k4 * x[3])
     }
 
     /// What the actuator gives, N m.
-    fn torque(&self, x: &[S; 5]) -> S {
+    fn torque(&self, x: &[S]) -> S {
         self.actuator.output(self.demand(x))
     }
 }
 
-impl<S: Scalar> Dynamics<S> for Loop<S> {
-    type State = [S; 5];
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < 5).then_some(signal)
+impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
+    fn start(&self) -> Vec<S> {
+        self.start.to_vec()
     }
 
-    fn derivative(&self, _: f64, x: &[S; 5], dx: &mut [S; 5]) {
-        let plant = [x[0], x[1], x[2], x[3]];
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let x = at.x;
+        let plant = x.first_chunk().expect("the pendulum has four states");
         let [arm, pendulum] = match self.equations {
-            Plant::Nonlinear => self.plant.nonlinear(&plant, self.torque(x)),
-            Plant::Linear => self.plant.linear(&plant, self.torque(x)),
+            Plant::Nonlinear => self.plant.nonlinear(plant, self.torque(x)),
+            Plant::Linear => self.plant.linear(plant, self.torque(x)),
         };
-        *dx = [x[1], arm, x[3], pendulum, self.filter.derivative(self.setpoint, x[4])];
+        dx.copy_from_slice(&[x[1], arm, x[3], pendulum, self.filter.derivative(self.setpoint, x[4])]);
+    }
+
+    /// The states, then the torque.
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        at.x.get(signal).copied().unwrap_or_else(|| self.torque(at.x))
     }
 
     fn guards(&self) -> usize {
         1
     }
 
-    fn guard(&self, _: usize, _: f64, x: &[S; 5]) -> S {
-        self.actuator.guard(self.demand(x))
+    fn guard(&self, _: usize, at: &Instant<'_, S>) -> S {
+        self.actuator.guard(self.demand(at.x))
     }
 
-    fn switch(&mut self, _: usize, _: f64, x: &mut [S; 5]) -> &str {
-        let limited = self.actuator.switch(self.demand(x));
+    fn switch(&mut self, _: usize, event: &EventInstant<'_, S>, _: &mut [S]) -> &str {
+        let limited = self.actuator.switch(self.demand(event.at.x));
         if limited { "torque reaches its limit" } else { "torque leaves its limit" }
     }
 
-    fn pass_break(&mut self, _: f64, x: &mut [S; 5]) {
-        self.actuator.settle(self.demand(x));
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.actuator.settle(self.demand(at.x));
+    }
+
+    /// Within the limit of the torque.
+    fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
+        Ok(Vec::new())
     }
 }

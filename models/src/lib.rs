@@ -11,13 +11,13 @@ pub mod kernel;
 mod linear_system;
 pub mod pid_loop;
 pub mod pid_open_loop;
-mod plant;
+mod rational;
 pub mod state_space;
 pub mod transfer_function;
 mod with_effects;
 
 use mops_core::ModelKind;
-pub use with_effects::{Moment, Own, OwnModel, WithEffects};
+pub use with_effects::{Moment, WithEffects};
 
 /// Every kind of model. A new one is a file, and a line here.
 pub fn kinds() -> Vec<ModelKind> {

@@ -3,7 +3,10 @@
 use std::fmt;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
-use mops_core::{Analysis, Dual, Expression, Failure, Job, Mistake, Parameter, Scalar, StateSpace, Unit, WithTangents};
+use mops_core::{
+    Along, Analysis, DIRECTIONS, Dual, Expression, Failure, Job, Mistake, Parameter, Scalar, StateSpace, Unit,
+    WithTangents,
+};
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
@@ -48,16 +51,15 @@ pub(crate) fn analyse(model: &impl LinearSystem, job: &Job<'_>) -> Result<Analys
 
 /// [`mops_core::Model::tangents`] of a linear system.
 pub(crate) fn tangents(model: &impl LinearSystem, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
-    const CHUNK: usize = 8;
     let mut tangents = Vec::with_capacity(seeds.len());
-    for seeds in seeds.chunks(CHUNK) {
+    for seeds in seeds.chunks(DIRECTIONS) {
         let parameter = |(i, &value): (usize, &f64)| {
             let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
-            Dual::<CHUNK> { value, tangent }
+            Dual { value, tangent }
         };
-        let parameters: Vec<Dual<CHUNK>> = job.parameters.iter().enumerate().map(parameter).collect();
+        let parameters: Vec<Along> = job.parameters.iter().enumerate().map(parameter).collect();
         let matrices = model.matrices(&parameters)?;
-        let along = |direction: usize| part(model, &matrices, |x: Dual<CHUNK>| x.tangent[direction]);
+        let along = |direction: usize| part(model, &matrices, |x: Along| x.tangent[direction]);
         tangents.extend((0..seeds.len()).map(|direction| Analysis::Linear(along(direction))));
     }
     Ok((analyse(model, job)?, tangents))

@@ -1,17 +1,14 @@
 //! A PID controller in a loop with a linear plant.
 
 use mops_core::{
-    AnalysisKind, Failure, Input, Interface, Job, Mistake, Model, ModelOptions, OperatingPoint, Parameter, Quantity,
-    Scalar, Unit, Variable,
+    AnalysisKind, EventInstant, Failure, Input, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant,
+    Quantity, Scalar, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::kernel::drive::Drive;
-use crate::kernel::{
-    Dynamics, Equations, Kernel, Recording, Simulate, Tolerance, Written, rates_and_signals, record, wanted,
-};
-use crate::plant::{Plant, TransferFunction};
+use crate::kernel::{PlantModel, Simulated, Tolerance};
+use crate::rational::{PlantOptions, TransferFunction};
 
 /// A PID controller with filtered derivative in a loop with unity feedback and a linear plant `G`:
 ///
@@ -38,7 +35,7 @@ use crate::plant::{Plant, TransferFunction};
 pub struct PidLoopOptions {
     /// The plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
     /// coefficients of falling powers of s. A name instead of a number makes a parameter of it.
-    plant: Plant,
+    plant: PlantOptions,
     /// End of the simulation.
     horizon: Quantity,
     /// The setpoint's step: `{ time = "0 s", size = 1.0 }`.
@@ -112,7 +109,7 @@ impl ModelOptions for PidLoopOptions {
         };
         let mut names = Vec::new();
         let plant = TransferFunction::new(&self.plant, &CONTROLLER, &mut names).map_err(|m| m.within("plant"))?;
-        Ok(Box::new(Kernel(PidLoop {
+        Ok(Box::new(Simulated::new(PidLoop {
             interface: interface(&names, horizon),
             plant,
             setpoint,
@@ -175,7 +172,7 @@ struct PidLoop {
     tolerance: Tolerance,
 }
 
-impl Written for PidLoop {
+impl PlantModel for PidLoop {
     fn interface(&self) -> &Interface {
         &self.interface
     }
@@ -190,78 +187,22 @@ impl Written for PidLoop {
     fn tolerance(&self) -> Tolerance {
         self.tolerance
     }
-}
 
-impl Simulate for PidLoop {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+    fn input(&self, index: usize) -> Option<&Input> {
+        if index == 0 { Some(&self.setpoint) } else { self.load.as_ref() }
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         let (controller, named) = parameters.split_at(CONTROLLER.len());
         let (numerator, denominator) = self.plant.polynomials(named)?;
-        let plant = (numerator.as_slice(), denominator.as_slice());
-        let controller = Controller::new(controller);
-        let zero = S::from(0.0);
-        // The plant's states, then integral and derivative filter; common sizes as arrays.
-        match denominator.len() + 2 {
-            3 => self.simulate_with(job, plant, controller, [zero; 3]),
-            4 => self.simulate_with(job, plant, controller, [zero; 4]),
-            5 => self.simulate_with(job, plant, controller, [zero; 5]),
-            6 => self.simulate_with(job, plant, controller, [zero; 6]),
-            states => self.simulate_with(job, plant, controller, vec![zero; states]),
-        }
-    }
-}
-
-impl PidLoop {
-    fn simulate_with<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone>(
-        &self,
-        job: &Job<'_>,
-        plant: (&[S], &[S]),
-        controller: Controller<S>,
-        start: X,
-    ) -> Result<Recording, Failure> {
-        let setpoint = Drive::new(Some(job.case.input("r").unwrap_or(&self.setpoint)));
-        let load = Drive::new(job.case.input("d").or(self.load.as_ref()));
-        let mut dynamics = self.dynamics(plant, controller, &start, [setpoint, load]);
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &wanted(job, &self.interface.signals), &Loop::signal)
-    }
-
-    /// The loop with states like `start`.
-    fn dynamics<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone>(
-        &self,
-        (numerator, denominator): (&[S], &[S]),
-        controller: Controller<S>,
-        start: &X,
-        [setpoint, load]: [Drive<'a, S>; 2],
-    ) -> Loop<'a, S, X> {
-        let padded = |coefficients: &[S]| {
-            let mut padded = start.clone();
-            padded.as_mut()[..coefficients.len()].copy_from_slice(coefficients);
-            padded
-        };
-        Loop {
-            numerator: padded(numerator),
-            denominator: padded(denominator),
-            controller,
+        Ok(Loop {
+            numerator,
+            denominator,
+            controller: Controller::new(controller),
             limit: self.limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
-            setpoint,
-            load,
             saturated: 0.0,
             sampled: self.sampling.map(Sampled::new),
-        }
-    }
-}
-
-impl Equations for PidLoop {
-    /// Within the limits of the actuator.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        if self.sampling.is_some() {
-            return Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into()));
-        }
-        let (controller, named) = at.parameters.split_at(CONTROLLER.len());
-        let (numerator, denominator) = self.plant.polynomials(named)?;
-        let drives = [Drive::held(at.inputs[0]), Drive::held(at.inputs[1])];
-        let x = at.states.to_vec();
-        let dynamics = self.dynamics((&numerator, &denominator), Controller::new(controller), &x, drives);
-        Ok(rates_and_signals(&dynamics, &x, self.interface.signals.len(), &Loop::signal))
+        })
     }
 }
 
@@ -384,51 +325,41 @@ fn saturate<S: Scalar>(value: S, [low, high]: [f64; 2]) -> S {
     }
 }
 
-/// The closed loop: the plant in controllable canonical form, integral and derivative filter of the controller. `X` is
-/// its state; the coefficients of the plant are kept in the same form, and end before the states of the controller.
-struct Loop<'a, S, X> {
-    numerator: X,
-    denominator: X,
+/// The closed loop: the plant in controllable canonical form, integral and derivative filter of the controller; the inputs are
+/// setpoint and load.
+struct Loop<S> {
+    numerator: Vec<S>,
+    denominator: Vec<S>,
     controller: Controller<S>,
     limit: [f64; 2],
-    setpoint: Drive<'a, S>,
-    load: Drive<'a, S>,
     /// -1 at the lower limit, 1 at the upper, 0 between.
     saturated: f64,
     sampled: Option<Sampled<S>>,
 }
 
-impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
-    /// The sum of products over the states of the plant.
-    #[inline]
-    fn dot(coefficients: &X, x: &X) -> S {
-        let (coefficients, x) = (coefficients.as_ref(), x.as_ref());
-        (1..x.len() - 2).fold(coefficients[0] * x[0], |sum, i| sum + coefficients[i] * x[i])
+/// The sum of products; of as many states as the coefficients are.
+#[inline(always)]
+fn dot<S: Scalar>(coefficients: &[S], x: &[S]) -> S {
+    match (coefficients, x) {
+        ([a], [x, ..]) => *a * *x,
+        ([a, b], [x, y, ..]) => *a * *x + *b * *y,
+        ([a, b, c], [x, y, z, ..]) => *a * *x + *b * *y + *c * *z,
+        _ => (1..coefficients.len()).fold(coefficients[0] * x[0], |sum, i| sum + coefficients[i] * x[i]),
     }
+}
 
-    /// Setpoint and output of the plant.
-    #[inline]
-    fn compared(&self, t: f64, x: &X) -> (S, S) {
-        (self.setpoint.at(t), Self::dot(&self.numerator, x))
-    }
-
-    /// The value of a signal.
-    fn signal(&self, signal: usize, t: f64, x: &X) -> S {
-        let (r, y) = self.compared(t, x);
-        match signal {
-            0 => r,
-            1 => y,
-            2 => -y + r,
-            3 => self.actuator(r, y, x),
-            _ => self.load.at(t),
-        }
+impl<S: Scalar> Loop<S> {
+    /// Output of the plant.
+    #[inline(always)]
+    fn output(&self, x: &[S]) -> S {
+        dot(&self.numerator, x)
     }
 
     /// What the continuous controller asks for.
-    #[inline]
-    fn wanted(&self, r: S, y: S, x: &X) -> S {
+    #[inline(always)]
+    fn wanted(&self, r: S, y: S, x: &[S]) -> S {
         let Controller { k, nd, wp, wd, .. } = self.controller;
-        let [.., integral, filtered] = *x.as_ref() else { unreachable!("the controller has two states") };
+        let [.., integral, filtered] = *x else { unreachable!("the controller has two states") };
         let mut error = wp * r - y;
         if self.controller.has_derivative() {
             error += nd * (wd * r - y - filtered);
@@ -437,8 +368,8 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
     }
 
     /// What the actuator gives.
-    #[inline]
-    fn actuator(&self, r: S, y: S, x: &X) -> S {
+    #[inline(always)]
+    fn actuator(&self, r: S, y: S, x: &[S]) -> S {
         match &self.sampled {
             Some(sampled) => sampled.acting,
             None if self.saturated < 0.0 => S::from(self.limit[0]),
@@ -448,31 +379,47 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Loop<'_, S, X> {
     }
 }
 
-impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, X> {
-    type State = X;
+impl<S: Scalar> Plant<S> for Loop<S> {
+    fn start(&self) -> Vec<S> {
+        vec![S::from(0.0); self.denominator.len() + 2]
+    }
 
+    // At each of the six stages of a step, with a number of states that is known there: as calls they cost a tenth of a simulation.
     #[inline(always)]
-    fn derivative(&self, t: f64, x: &X, dx: &mut X) {
-        let (r, y) = self.compared(t, x);
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let n = at.x.len() - 2;
+        let (numerator, denominator) = (&self.numerator[..n], &self.denominator[..n]);
+        let (x, dx, r) = (&at.x[..n + 2], &mut dx[..n + 2], at.u[0]);
+        let y = dot(numerator, x);
         let u = self.actuator(r, y, x);
-        let input = u + self.load.at(t) - Self::dot(&self.denominator, x);
+        let input = u + at.u[1] - dot(denominator, x);
         let unbounded = if self.saturated == 0.0 { u } else { self.wanted(r, y, x) };
-        let (x, dx) = (x.as_ref(), dx.as_mut());
-        let n = x.len() - 2;
-        dx[..n - 1].copy_from_slice(&x[1..n]);
-        dx[n - 1] = input;
-        dx[n] = S::from(0.0);
-        dx[n + 1] = S::from(0.0);
+        let (of_plant, of_controller) = dx.split_at_mut(n);
+        of_plant[..n - 1].copy_from_slice(&x[1..n]);
+        of_plant[n - 1] = input;
+        of_controller.fill(S::from(0.0));
         if self.sampled.is_some() {
             return;
         }
         let Controller { wd, tracking, integral_gain, filter_rate, .. } = self.controller;
-        dx[n] = integral_gain * (-y + r);
+        of_controller[0] = integral_gain * (-y + r);
         if self.saturated != 0.0 && self.controller.winds_back() {
-            dx[n] += (u - unbounded) / tracking;
+            of_controller[0] += (u - unbounded) / tracking;
         }
         if self.controller.has_derivative() {
-            dx[n + 1] = (wd * r - y - x[n + 1]) * filter_rate;
+            of_controller[1] = (wd * r - y - x[n + 1]) * filter_rate;
+        }
+    }
+
+    #[inline]
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        let (r, y) = (at.u[0], self.output(at.x));
+        match signal {
+            0 => r,
+            1 => y,
+            2 => -y + r,
+            3 => self.actuator(r, y, at.x),
+            _ => at.u[1],
         }
     }
 
@@ -482,10 +429,9 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
     }
 
     /// Guard 0 watches the lower limit, guard 1 the upper.
-    fn guard(&self, index: usize, t: f64, x: &X) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
         let side = if index == 0 { -1.0 } else { 1.0 };
-        let (r, y) = self.compared(t, x);
-        let inside = (-self.wanted(r, y, x) + self.limit[index]) * side;
+        let inside = (-self.wanted(at.u[0], self.output(at.x), at.x) + self.limit[index]) * side;
         match self.saturated {
             s if s == side => -inside,
             0.0 => inside,
@@ -493,7 +439,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
         }
     }
 
-    fn switch(&mut self, index: usize, _: f64, _: &mut X) -> &str {
+    fn switch(&mut self, index: usize, _: &EventInstant<'_, S>, _: &mut [S]) -> &str {
         let side = if index == 0 { -1.0 } else { 1.0 };
         self.saturated = if self.saturated == side { 0.0 } else { side };
         match (index, self.saturated == 0.0) {
@@ -503,24 +449,17 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
         }
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        let next = self.setpoint.next_break(t).min(self.load.next_break(t));
-        self.sampled.as_ref().map_or(next, |sampled| next.min(sampled.next_break()))
+    fn next_break(&self, _: f64) -> f64 {
+        self.sampled.as_ref().map_or(f64::INFINITY, Sampled::next_break)
     }
 
-    fn longest_step(&self) -> f64 {
-        self.setpoint.longest_step().min(self.load.longest_step())
-    }
-
-    fn pass_break(&mut self, t: f64, x: &mut X) {
-        self.setpoint.pass_break(t);
-        self.load.pass_break(t);
-        let (r, y) = self.compared(t, x);
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        let (r, y) = (at.u[0], self.output(at.x));
         if let Some(sampled) = &mut self.sampled {
-            sampled.pass(t, &self.controller, self.limit, r, y);
+            sampled.pass(at.t, &self.controller, self.limit, r, y);
             return;
         }
-        let wanted = self.wanted(r, y, x).value();
+        let wanted = self.wanted(r, y, at.x).value();
         self.saturated = if wanted < self.limit[0] {
             -1.0
         } else if wanted > self.limit[1] {
@@ -528,5 +467,13 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone> Dynamics<S> for Loop<'_, S, 
         } else {
             0.0
         };
+    }
+
+    /// Within the limits of the actuator.
+    fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
+        match self.sampled {
+            Some(_) => Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into())),
+            None => Ok(Vec::new()),
+        }
     }
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::linear_system::{self, LinearSystem, Matrices, canonical};
-use crate::plant::{Plant, TransferFunction};
+use crate::rational::{PlantOptions, TransferFunction};
 
 /// The loop transfer function of `pid-loop`, for margins and peaks of sensitivities:
 ///
@@ -29,7 +29,7 @@ use crate::plant::{Plant, TransferFunction};
 pub struct PidOpenLoopOptions {
     /// The plant, as in `pid-loop`: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator =
     /// [...] }` with coefficients of falling powers of s. A name instead of a number makes a parameter of it.
-    plant: Plant,
+    plant: PlantOptions,
 }
 
 /// The controller's parameters and the delay; those named in the plant come after them.

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Units, canonical, coherent};
-use crate::plant::from_roots;
+use crate::rational::from_roots;
 
 /// `G(s) = numerator(s)/denominator(s) exp(-s delay)`, or `gain (s - z1)(s - z2).../((s - p1)(s - p2)...) exp(-s delay)`: a
 /// linear system by its transfer function, for criteria of linear systems.

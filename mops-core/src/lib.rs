@@ -76,7 +76,7 @@ pub use outcome::{
     Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
 pub use placement::{Augment, EffectDraft};
-pub use plant::{Instant, Open, Opening, Plant, Span};
+pub use plant::{EventInstant, Instant, Open, Opening, Plant, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
 pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};

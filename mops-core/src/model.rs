@@ -109,6 +109,13 @@ pub struct Interface {
     pub analysis: AnalysisKind,
 }
 
+impl Interface {
+    /// Number of forces that may act from outside: one for every [`Port::Process`].
+    pub fn forces(&self) -> usize {
+        self.ports.iter().filter(|port| matches!(port, Port::Process { .. })).count()
+    }
+}
+
 /// What a model gives to criteria.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum AnalysisKind {

@@ -18,6 +18,17 @@ pub struct Instant<'a, S> {
     pub w: &'a [S],
 }
 
+/// The instant of an event, and how it moves with the parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct EventInstant<'a, S> {
+    /// Time, states, inputs and forces just before the event; the inputs move with it.
+    pub at: Instant<'a, S>,
+    /// Rates of the inputs, per s.
+    pub du: &'a [f64],
+    /// The derivatives of the time of the event with respect to the directions of the scalar; its value is 0.
+    pub delay: S,
+}
+
 /// What is known of a plant over a time: bounds of what an [`Instant`] gives.
 #[derive(Debug, Clone, Copy)]
 pub struct Span<'a> {
@@ -31,10 +42,22 @@ pub struct Span<'a> {
     pub w: &'a [Enclosure],
 }
 
-/// `x' = f(t, x, u, w)` at given parameters, in modes of its own between which guards switch.
+/// A plant: `x' = f(t, x, u, w)` at given parameters, in modes of its own between which guards switch.
+///
+/// It is written once over [`Scalar`], so that it runs with values and with exact tangents, those of jumps at events included.
+/// All of its state that is not in `x` is its mode, which changes in [`Plant::switch`], [`Plant::rest`] and [`Plant::settle`]
+/// alone; between them it is smooth.
 pub trait Plant<S: Scalar> {
     /// The states at time 0.
     fn start(&self) -> Vec<S>;
+
+    /// Whether a simulation can begin here.
+    ///
+    /// # Errors
+    /// Why it cannot: equations that have no solution here, or parameters that contradict one another.
+    fn can_start(&self, _at: &Instant<'_, S>) -> Result<(), Failure> {
+        Ok(())
+    }
 
     /// Writes `x'` in the present mode.
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]);
@@ -44,7 +67,7 @@ pub trait Plant<S: Scalar> {
         at.x.get(signal).copied().unwrap_or_else(|| at.u[signal - at.x.len()])
     }
 
-    /// Number of its guards.
+    /// Number of guards in the present mode.
     fn guards(&self) -> usize {
         0
     }
@@ -54,17 +77,24 @@ pub trait Plant<S: Scalar> {
         S::from(1.0)
     }
 
-    /// A guard became negative: changes the mode; where the state jumps, `x` is the state behind it. Returns what happened.
-    fn switch(&mut self, _index: usize, _at: &Instant<'_, S>, _x: &mut [S]) -> &str {
+    /// The rate of a guard along the solution, per s; `du` are the rates of the inputs. `None` where only values of the guard
+    /// tell it.
+    fn guard_rate(&self, _index: usize, _at: &Instant<'_, S>, _du: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// A guard became negative: changes the mode; where the state jumps, writes the state after the event to `x`, in which the
+    /// state before it stands. Returns what happened; an empty text where a user need not know.
+    fn switch(&mut self, _index: usize, _event: &EventInstant<'_, S>, _x: &mut [S]) -> &str {
         ""
     }
 
-    /// Whether it encloses guards.
+    /// Whether it encloses its guards.
     fn has_bounds(&self) -> bool {
         false
     }
 
-    /// Bounds of a guard and of its rate over a time, as [`Plant::guard`].
+    /// Bounds of a guard and of its rate over a time; asked for where [`Plant::has_bounds`].
     fn enclose_guard(&self, _index: usize, _over: &Span<'_>) -> Enclosure {
         Enclosure::UNKNOWN
     }
@@ -73,9 +103,23 @@ pub trait Plant<S: Scalar> {
     /// what happened.
     ///
     /// # Errors
-    /// There is no such state: which events accumulate, and the way out.
-    fn rest(&mut self, _index: usize, _at: &Instant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
+    /// There is no such state: which events accumulate, and the way out. The simulation fails.
+    fn rest(&mut self, _index: usize, _event: &EventInstant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
         Err("a mode of the model changes to and fro without end".to_owned())
+    }
+
+    /// Finds the mode: at the start, at each of its own breaks, and where inputs or forces jump.
+    fn settle(&mut self, _at: &Instant<'_, S>) {}
+
+    /// Takes the mode in which the plant is linearised. Where it is `at_rest`, or a search for such a point passes, no joint has
+    /// dry friction; else joints have none whose speed is as good as 0, and the others slide the way they move. Returns the
+    /// positions, as states, of the joints whose dry friction is left out.
+    ///
+    /// # Errors
+    /// The plant has no linearisation.
+    fn linearised_at(&mut self, at: &Instant<'_, S>, _at_rest: bool) -> Result<Vec<usize>, Failure> {
+        self.settle(at);
+        Ok(Vec::new())
     }
 
     /// The typical size of a state, in its unit; `None` where only the simulation tells it.
@@ -83,8 +127,92 @@ pub trait Plant<S: Scalar> {
         None
     }
 
-    /// Inputs or forces jumped, also called once at the start: finds the mode.
-    fn settle(&mut self, _at: &Instant<'_, S>) {}
+    /// The next time after `t` at which the plant itself takes a sample or jumps, s; infinity if never.
+    fn next_break(&self, _t: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    /// The longest step within which the plant is well resolved, s: a state that rests says nothing of it.
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// The entries of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
+    /// method solves with the band that they span.
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        None
+    }
+
+    /// Passes each entry of the Jacobian `df/dx` on as row, column and value, and returns `true`; `false` where the plant has
+    /// no exact one, and differences must do.
+    fn jacobian(&self, _at: &Instant<'_, S>, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        false
+    }
+
+    /// What a failure of the simulation means for this plant.
+    fn explain(&self, failure: Failure) -> Failure {
+        failure
+    }
+}
+
+impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
+    fn start(&self) -> Vec<S> {
+        (**self).start()
+    }
+    fn can_start(&self, at: &Instant<'_, S>) -> Result<(), Failure> {
+        (**self).can_start(at)
+    }
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        (**self).rates(at, dx)
+    }
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        (**self).signal(signal, at)
+    }
+    fn guards(&self) -> usize {
+        (**self).guards()
+    }
+    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+        (**self).guard(index, at)
+    }
+    fn guard_rate(&self, index: usize, at: &Instant<'_, S>, du: &[f64]) -> Option<f64> {
+        (**self).guard_rate(index, at, du)
+    }
+    fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
+        (**self).switch(index, event, x)
+    }
+    fn has_bounds(&self) -> bool {
+        (**self).has_bounds()
+    }
+    fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
+        (**self).enclose_guard(index, over)
+    }
+    fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
+        (**self).rest(index, event, close, x)
+    }
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        (**self).settle(at)
+    }
+    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
+        (**self).linearised_at(at, at_rest)
+    }
+    fn scale(&self, state: usize) -> Option<f64> {
+        (**self).scale(state)
+    }
+    fn next_break(&self, t: f64) -> f64 {
+        (**self).next_break(t)
+    }
+    fn longest_step(&self) -> f64 {
+        (**self).longest_step()
+    }
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        (**self).jacobian_pattern()
+    }
+    fn jacobian(&self, at: &Instant<'_, S>, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        (**self).jacobian(at, entry)
+    }
+    fn explain(&self, failure: Failure) -> Failure {
+        (**self).explain(failure)
+    }
 }
 
 /// A model that can be opened at its ports.

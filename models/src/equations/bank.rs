@@ -15,8 +15,11 @@ pub trait Bank<S> {
     fn set(&mut self, register: Register, value: S);
 }
 
-/// Room for 256 registers: an index cannot be out of range, so none is checked.
-pub struct Small<S>(Box<[S; 256]>);
+/// Registers whose number fits into a byte.
+pub const FEW: usize = 256;
+
+/// Room for [`FEW`] registers: an index cannot be out of range, so none is checked.
+pub struct Small<S>(Box<[S; FEW]>);
 
 /// Any number of registers.
 pub struct Large<S>(Vec<S>);
@@ -24,8 +27,8 @@ pub struct Large<S>(Vec<S>);
 #[allow(clippy::cast_possible_truncation)]
 impl<S: Scalar> Bank<S> for Small<S> {
     fn with(count: usize) -> Self {
-        assert!(count <= 256, "the size was looked at");
-        Self(Box::new([S::from(0.0); 256]))
+        assert!(count <= FEW, "the size was looked at");
+        Self(Box::new([S::from(0.0); FEW]))
     }
     #[inline(always)]
     fn get(&self, register: Register) -> S {

@@ -71,6 +71,8 @@ pub struct Compiled {
     pub scales: Vec<Option<f64>>,
     /// Number of parameters of the equations, without those that only are start values.
     pub parameters: usize,
+    /// Whether forces from outside enter its equations, as inputs after the others.
+    pub takes_forces: bool,
     /// Registers.
     pub layout: Layout,
     /// Runs once in a simulation, when parameters are known.
@@ -122,11 +124,16 @@ fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
 }
 
 impl Compiled {
-    /// Compiles a model whose states have these names.
+    /// Compiles a model whose states have these names, with a number of inputs, of forces from outside, and of parameters.
     ///
     /// # Errors
     /// A model with more than 65536 numbers at a time.
-    pub fn new(system: &System, names: &[&str], inputs: usize, parameters: usize) -> Result<Self, Mistake> {
+    pub fn new(
+        system: &System,
+        names: &[&str],
+        [inputs, forces]: [usize; 2],
+        parameters: usize,
+    ) -> Result<Self, Mistake> {
         let graph = &system.graph;
         let mut wanted: Vec<Vec<Id>> = vec![system.derivatives.clone()];
         let mut graph = graph.clone();
@@ -152,7 +159,7 @@ impl Compiled {
             Mistake::new("states", "the model needs more than 65536 numbers at a time")
                 .with_help("a model of this size is written in Rust")
         };
-        let mut layout = Layout::new(parameters, names.len(), inputs, system.modes).map_err(too_large)?;
+        let mut layout = Layout::new(parameters, names.len(), inputs + forces, system.modes).map_err(too_large)?;
         let (setup, programs) = compile(&graph, &mut layout, &wanted).map_err(too_large)?;
         let mut programs = programs.into_iter();
         let mut next = || programs.next().expect("there is a tape for everything wanted");
@@ -200,6 +207,7 @@ impl Compiled {
             states: names.len(),
             scales: system.scales.clone(),
             parameters,
+            takes_forces: forces > 0,
             layout,
             setup,
             derivative,

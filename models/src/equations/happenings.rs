@@ -1,12 +1,11 @@
 //! The events of a user's model: when they are armed, what they reset, where they come to rest.
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{Dual, Scalar};
+use mops_core::{Dual, EventInstant, Instant, Plant, Scalar};
 
 use super::bank::{Bank, Large};
 use super::bounds::{moved, signed};
 use super::running::{Running, set_up};
-use crate::kernel::Dynamics;
 
 /// What an event waits for.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,17 +22,17 @@ pub(super) enum Phase {
 /// events leave (see [`crate::kernel`]), so that a rest state that is elsewhere is found out.
 const NEAR: f64 = 1e-6;
 
-impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X, B> {
+impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     /// The value that is not negative while an event waits.
-    pub(super) fn happening_guard(&self, k: usize, t: f64, x: &X) -> S {
-        let guard = |running: &Self| running.results::<1>(&running.model.happenings[k].guard, t, x.as_ref())[0];
+    pub(super) fn happening_guard(&self, k: usize, at: &Instant<'_, S>) -> S {
+        let guard = |running: &Self| running.results::<1>(&running.model.happenings[k].guard, at)[0];
         match &self.phases[k] {
             Phase::Armed(threshold) => guard(self) - *threshold,
             Phase::Passed => -guard(self),
             Phase::AtRest(weights) => {
-                let mut rates = x.clone();
-                self.free_rates(t, x.as_ref(), rates.as_mut());
-                weights.iter().fold(S::from(0.0), |sum, &(state, weight)| sum - rates.as_ref()[state] * weight)
+                let mut rates = at.x.to_vec();
+                self.free_rates(at, &mut rates);
+                weights.iter().fold(S::from(0.0), |sum, &(state, weight)| sum - rates[state] * weight)
             }
         }
     }
@@ -62,7 +61,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
     }
 
     /// An event happens, is armed, or leaves its rest. Returns what happened.
-    pub(super) fn happen(&mut self, k: usize, t: f64, x: &mut X) -> &str {
+    pub(super) fn happen(&mut self, k: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         let model = self.model;
         let happening = &model.happenings[k];
         match self.phases[k] {
@@ -73,13 +72,13 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
             Phase::AtRest(_) => {
                 self.phases[k] = Phase::Armed(0.0);
                 self.hold_states();
-                self.arm(k, t, x);
+                self.arm(k, event, x);
                 &happening.leaves
             }
             Phase::Armed(_) => {
-                self.assign(&happening.resets, t, x);
-                self.settle(t, x.as_ref());
-                self.arm(k, t, x);
+                self.assign(&happening.resets, event, x);
+                self.settle_modes(&Instant { x, ..event.at });
+                self.arm(k, event, x);
                 &happening.name
             }
         }
@@ -87,18 +86,25 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// Arms an event where its guard is positive, or will be: at a reset that turns the guard round, rounding may leave it
     /// negative, and it is 0 where nothing moves any more.
-    fn arm(&mut self, k: usize, t: f64, x: &X) {
+    fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S]) {
         self.phases[k] = Phase::Armed(0.0);
-        let guard = self.happening_guard(k, t, x).value();
+        let at = Instant { x, ..event.at };
+        let guard = self.happening_guard(k, &at).value();
         if guard <= 0.0 {
-            let rises = self.guard_rate(self.guard_of(k), t, x).is_some_and(|rate| rate >= 0.0);
+            let rises = self.guard_rate(self.guard_of(k), &at, event.du).is_some_and(|rate| rate >= 0.0);
             self.phases[k] = if rises { Phase::Armed(guard) } else { Phase::Passed };
         }
     }
 
     /// Its events accumulate: takes the states to where they rest, if the study gives such a place, it is the place where they
     /// accumulate, and nothing makes the guard rise there.
-    pub(super) fn come_to_rest(&mut self, k: usize, t: f64, close: f64, x: &mut X) -> Result<&str, String> {
+    pub(super) fn come_to_rest(
+        &mut self,
+        k: usize,
+        event: &EventInstant<'_, S>,
+        close: f64,
+        x: &mut [S],
+    ) -> Result<&str, String> {
         let model = self.model;
         let happening = &model.happenings[k];
         let name = &happening.name;
@@ -109,26 +115,27 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
                  at-rest = {{ h = 0, v = 0 }}"
             ));
         }
-        let before = x.clone();
-        self.assign(&happening.at_rest, t, x);
+        let before = event.at.x;
+        self.assign(&happening.at_rest, event, x);
         // A state that never moved has no size: it counts as what it becomes in the interval of the events.
-        let [rates, bends] = self.rates_and_bends(t, &before);
+        let [rates, bends] = self.rates_and_bends(&event.at, event.du);
         let is_near = |&state: &usize| {
-            let (x, was) = (x.as_ref()[state].value(), before.as_ref()[state].value());
+            let (x, was) = (x[state].value(), before[state].value());
             let size = NEAR * self.sizes[state].max(x.abs());
             (x - was).abs() <= size.max(close * rates[state].abs()).max(close * close * bends[state].abs())
         };
         if !states.iter().all(is_near) {
             return Err(format!("`{name}` happens again and again, but not where its `at-rest` says that it ends"));
         }
-        let weights = self.lift(k, t, x);
+        let at = Instant { x, ..event.at };
+        let weights = self.lift(k, &at);
         if weights.iter().all(|(_, weight)| *weight == 0.0) {
             return Err(format!("the states that `at-rest` of `{name}` names do not move its guard"));
         }
         self.phases[k] = Phase::AtRest(weights);
         self.hold_states();
-        self.settle(t, x.as_ref());
-        match self.happening_guard(k, t, x).value() >= 0.0 {
+        self.settle_modes(&at);
+        match self.happening_guard(k, &at).value() >= 0.0 {
             true => Ok(&happening.rests),
             false => Err(format!("`{name}` happens again and again where nothing holds it at its `at-rest`")),
         }
@@ -146,25 +153,26 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// How much the rate of each held state makes the guard rise: by the first derivative of the guard with respect to time
     /// if it contains these rates, else by the second, as where the guard is a position and its speed is held too.
-    fn lift(&self, k: usize, t: f64, x: &X) -> Vec<(usize, f64)> {
+    fn lift(&self, k: usize, at: &Instant<'_, S>) -> Vec<(usize, f64)> {
         let model = self.model;
-        let (held, n) = (&model.happenings[k].at_rest.0, x.as_ref().len());
-        let mut free = x.clone();
-        self.free_rates(t, x.as_ref(), free.as_mut());
+        let (held, n) = (&model.happenings[k].at_rest.0, at.x.len());
+        let still = vec![0.0; at.u.len()];
+        let mut free = at.x.to_vec();
+        self.free_rates(at, &mut free);
         let guard = &model.happenings[k].guard;
         let mut bank = self.dual_bank();
         let gradient: Vec<f64> = (0..n)
             .map(|state| {
-                self.load_dual(&mut bank, t, x.as_ref(), |i| f64::from(u8::from(i == state)), 0.0);
+                self.load_dual(&mut bank, at, |i| f64::from(u8::from(i == state)), (0.0, &still));
                 guard.run(&mut bank);
                 bank.get(guard.results[0]).tangent[0]
             })
             .collect();
-        if held.iter().any(|&state| gradient[state] * free.as_ref()[state].value() != 0.0) {
+        if held.iter().any(|&state| gradient[state] * free[state].value() != 0.0) {
             return held.iter().map(|&state| (state, gradient[state])).collect();
         }
         let mut second = |state: usize| {
-            self.load_dual(&mut bank, t, x.as_ref(), |i| f64::from(u8::from(i == state)), 0.0);
+            self.load_dual(&mut bank, at, |i| f64::from(u8::from(i == state)), (0.0, &still));
             model.derivative.run(&mut bank);
             let rate = |i: usize| bank.get(model.derivative.results[i]).tangent[0];
             (0..n).map(|i| if gradient[i] == 0.0 { 0.0 } else { gradient[i] * rate(i) }).sum()
@@ -173,22 +181,28 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
     }
 
     /// First and second derivatives of all states with respect to time, none of them held.
-    fn rates_and_bends(&self, t: f64, x: &X) -> [Vec<f64>; 2] {
-        let mut rates = x.clone();
-        self.free_rates(t, x.as_ref(), rates.as_mut());
+    fn rates_and_bends(&self, at: &Instant<'_, S>, du: &[f64]) -> [Vec<f64>; 2] {
+        let mut rates = at.x.to_vec();
+        self.free_rates(at, &mut rates);
         let mut bank = self.dual_bank();
-        self.load_dual(&mut bank, t, x.as_ref(), |i| rates.as_ref()[i].value(), 1.0);
+        self.load_dual(&mut bank, at, |i| rates[i].value(), (1.0, du));
         self.model.derivative.run(&mut bank);
         let bends = self.model.derivative.results.iter().map(|&register| bank.get(register).tangent[0]);
-        [rates.as_ref().iter().map(|rate| rate.value()).collect(), bends.collect()]
+        [rates.iter().map(|rate| rate.value()).collect(), bends.collect()]
     }
 
     /// The rate of a guard's tape along the solution.
-    pub(super) fn tape_rate(&self, tape: &super::program::Program, result: usize, t: f64, x: &X) -> f64 {
-        let mut slope = x.clone();
-        self.derivative(t, x, &mut slope);
+    pub(super) fn tape_rate(
+        &self,
+        tape: &super::program::Program,
+        result: usize,
+        at: &Instant<'_, S>,
+        du: &[f64],
+    ) -> f64 {
+        let mut slope = at.x.to_vec();
+        self.rates(at, &mut slope);
         let mut bank = self.dual_bank();
-        self.load_dual(&mut bank, t, x.as_ref(), |i| slope.as_ref()[i].value(), 1.0);
+        self.load_dual(&mut bank, at, |i| slope[i].value(), (1.0, du));
         tape.run(&mut bank);
         let rate: Dual<1> = bank.get(tape.results[result]);
         rate.tangent[0]
@@ -204,15 +218,24 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
         bank
     }
 
-    /// States with these tangents; time, and inputs as it passes, with the tangent `time`.
-    fn load_dual(&self, bank: &mut Large<Dual<1>>, t: f64, x: &[S], tangent: impl Fn(usize) -> f64, time: f64) {
+    /// States with these tangents; time with the tangent `time`, and inputs with theirs `du`.
+    fn load_dual(
+        &self,
+        bank: &mut Large<Dual<1>>,
+        at: &Instant<'_, S>,
+        tangent: impl Fn(usize) -> f64,
+        (time, du): (f64, &[f64]),
+    ) {
         let layout = &self.model.layout;
-        for (i, x) in x.iter().enumerate() {
+        for (i, x) in at.x.iter().enumerate() {
             bank.set(layout.state(i), Dual { value: x.value(), tangent: [tangent(i)] });
         }
-        for (i, drive) in self.drives.iter().enumerate() {
-            bank.set(layout.input(i), Dual { value: drive.at(t).value(), tangent: [time * drive.slope(t)] });
+        for (i, (u, &rate)) in at.u.iter().zip(du).enumerate() {
+            bank.set(layout.input(i), Dual { value: u.value(), tangent: [rate] });
         }
-        bank.set(layout.time(), Dual { value: t, tangent: [time] });
+        for (i, w) in self.forces(at.w).iter().enumerate() {
+            bank.set(layout.input(at.u.len() + i), Dual::from(w.value()));
+        }
+        bank.set(layout.time(), Dual { value: at.t, tangent: [time] });
     }
 }

@@ -14,7 +14,6 @@ mod layout;
 mod lower;
 mod modes;
 mod options;
-mod ported;
 mod program;
 mod running;
 mod system;
@@ -24,13 +23,11 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Local, Mistake, Model, ModelOptions, Open, OperatingPoint, Scalar,
-    State, Unit, Variable, WithTangents,
+    AnalysisKind, Failure, Interface, Mistake, Model, ModelOptions, Plant, Port, Scalar, State, Unit, Variable,
 };
 
-use crate::kernel::drive::Drive;
-use crate::kernel::{self, Recording, Simulate, Tolerance, rates_and_signals, record, wanted};
-use bank::{Bank, Large as Many, Small};
+use crate::kernel::{PlantModel, Simulated, Tolerance};
+use bank::{Bank, FEW, Large, Small};
 use compiled::Compiled;
 use definition::Definition;
 pub use definition::Text;
@@ -43,12 +40,9 @@ impl ModelOptions for EquationsOptions {
     const KIND: &'static str = "equations";
 
     fn build(self) -> Result<Box<dyn Model>, Mistake> {
-        Ok(Box::new(Equations::new(&self)?))
+        Ok(Box::new(Simulated::new(Equations::new(&self)?)))
     }
 }
-
-/// Registers of a model that fits into few, without tangents.
-type Few = Small<f64>;
 
 /// The model of the kind `equations`.
 pub struct Equations {
@@ -82,7 +76,7 @@ impl Equations {
         let d = &definition;
         let (parameters, starts) = parameters(d, &system)?;
         let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
-        let compiled = Compiled::new(&system, &names, d.inputs.len(), d.parameters.len())?;
+        let compiled = Compiled::new(&system, &names, [d.inputs.len(), 0], d.parameters.len())?;
         let variable =
             |q: &definition::Declared| Variable { name: q.name.clone(), unit: q.unit.clone(), about: q.about.clone() };
         let signals = d.states.iter().chain(d.outputs.iter().map(|(output, _)| output)).chain(&d.inputs);
@@ -119,45 +113,45 @@ impl Equations {
         self.compiled.derivative.len()
     }
 
-    /// Values of the states at the start: of parameters, or of expressions where the parameter is no number, as nobody
+    /// The equations with an input more in every equation that is a port.
+    fn opened(&self) -> &Compiled {
+        self.opened.get_or_init(|| {
+            let d = &self.definition;
+            let state = |name: &String| d.states.iter().position(|s| s.name == *name);
+            let process = |port: &Port| match port {
+                Port::Process { state: name, .. } => state(name),
+                _ => None,
+            };
+            let ports: Vec<usize> = self.interface.ports.iter().filter_map(process).collect();
+            let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
+            let system = System::new(d, &ports).expect("it was read before");
+            Compiled::new(&system, &names, [d.inputs.len(), ports.len()], d.parameters.len())
+                .expect("a few inputs more do not make it too large")
+        })
+    }
+
+    /// The plant; where its numbers fit into few registers, these need no check of their indices.
+    fn running<'a, S: Scalar>(&'a self, compiled: &'a Compiled, parameters: &'a [S]) -> Box<dyn Plant<S> + 'a> {
+        if compiled.layout.registers <= FEW {
+            Box::new(self.started::<S, Small<S>>(Running::new(compiled, parameters, self.tolerance), parameters))
+        } else {
+            Box::new(self.started::<S, Large<S>>(Running::new(compiled, parameters, self.tolerance), parameters))
+        }
+    }
+
+    /// The plant at its start: states are those of parameters, or of expressions where the parameter is no number, as nobody
     /// gives it.
-    fn start<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
-        &self,
-        dynamics: &Running<'_, S, X, B>,
-        parameters: &[S],
-    ) -> Vec<S> {
-        let expressions: HashMap<usize, S> = dynamics.starts().into_iter().collect();
+    fn started<'a, S: Scalar, B: Bank<S>>(&self, plant: Running<'a, S, B>, parameters: &[S]) -> Running<'a, S, B> {
+        let expressions: HashMap<usize, S> = plant.starts().into_iter().collect();
         let start = |(s, start): (usize, &Start)| match *start {
             Start::Expression(parameter) if parameters[parameter].value().is_nan() => expressions[&s],
             Start::Parameter(parameter) | Start::Expression(parameter) => parameters[parameter],
         };
-        self.starts.iter().enumerate().map(start).collect()
-    }
-
-    /// The dynamics with constant inputs.
-    fn held<'a, S: Scalar>(&'a self, at: &OperatingPoint<'a, S>) -> Running<'a, S, Vec<S>, Many<S>> {
-        let drives = at.inputs.iter().map(|&u| Drive::held(u)).collect();
-        Running::new(&self.compiled, drives, at.parameters, self.tolerance)
-    }
-
-    fn run<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>>(
-        &self,
-        job: &Job<'_>,
-        parameters: &[S],
-        state: impl FnOnce(&[S]) -> X,
-    ) -> Result<Recording, Failure> {
-        let drives = self.interface.inputs.iter().map(|input| Drive::new(job.case.input(&input.name))).collect();
-        let mut dynamics: Running<'_, S, X, B> = Running::new(&self.compiled, drives, parameters, self.tolerance);
-        let start = state(&self.start(&dynamics, parameters));
-        dynamics.check_start(&start)?;
-        let output =
-            |dynamics: &Running<'_, S, X, B>, signal: usize, t: f64, x: &X| dynamics.signal(signal, t, x.as_ref());
-        let signals = wanted(job, &self.interface.signals);
-        record(&mut dynamics, start, job.horizon, &self.tolerance, &signals, &output).map_err(|f| dynamics.explain(f))
+        plant.starting_at(self.starts.iter().enumerate().map(start).collect())
     }
 }
 
-impl Model for Equations {
+impl PlantModel for Equations {
     fn interface(&self) -> &Interface {
         &self.interface
     }
@@ -166,73 +160,20 @@ impl Model for Equations {
         self.notes.clone()
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        self.values(job).map(|recording| Analysis::Time(recording.response))
-    }
-
-    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        Some(kernel::tangents(self, job, seeds))
-    }
-
-    fn equation_states(&self) -> Vec<Variable> {
+    fn states(&self) -> Vec<Variable> {
         self.interface.signals[..self.compiled.states].to_vec()
     }
 
-    fn start_values(&self, parameters: &[f64]) -> Option<Vec<f64>> {
-        let drives = self.interface.inputs.iter().map(|_| Drive::held(0.0)).collect();
-        let dynamics: Running<'_, f64, Vec<f64>, Many<f64>> =
-            Running::new(&self.compiled, drives, parameters, self.tolerance);
-        Some(self.start(&dynamics, parameters))
+    fn tolerance(&self) -> Tolerance {
+        self.tolerance
     }
 
-    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
-        Some(kernel::local(self, at))
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        Ok(self.running(&self.compiled, parameters))
     }
 
-    fn ported(&self) -> Option<&dyn Open> {
-        Some(self)
-    }
-}
-
-impl kernel::Equations for Equations {
-    /// At time 0; joints at rest without dry friction.
-    fn equations<S: Scalar>(&self, at: &OperatingPoint<'_, S>) -> Result<[Vec<S>; 2], Failure> {
-        let mut dynamics = self.held(at);
-        dynamics.look(at);
-        let output = |dynamics: &Running<'_, S, Vec<S>, Many<S>>, signal: usize, t: f64, x: &Vec<S>| {
-            dynamics.signal(signal, t, x)
-        };
-        Ok(rates_and_signals(&dynamics, &at.states.to_vec(), self.interface.signals.len(), &output))
-    }
-
-    fn frictionless(&self, at: &OperatingPoint<'_>) -> Vec<String> {
-        let positions = self.held(at).look(at);
-        positions.into_iter().map(|position| self.interface.signals[position].name.clone()).collect()
-    }
-}
-
-impl Simulate for Equations {
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        self.run::<S, Vec<S>, Many<S>>(job, parameters, <[S]>::to_vec)
-    }
-}
-
-impl Equations {
-    /// Without tangents small models run on arrays of known size, and on registers whose indices need no check: on vectors
-    /// a simulation takes half as long again. The operations are the same, and so are the bits.
-    fn values(&self, job: &Job<'_>) -> Result<Recording, Failure> {
-        fn array<const N: usize>(x: &[f64]) -> [f64; N] {
-            x.try_into().expect("the size was looked at")
-        }
-        let few = self.compiled.layout.registers <= 256;
-        match self.compiled.states {
-            1 if few => self.run::<f64, [f64; 1], Few>(job, job.parameters, array),
-            2 if few => self.run::<f64, [f64; 2], Few>(job, job.parameters, array),
-            3 if few => self.run::<f64, [f64; 3], Few>(job, job.parameters, array),
-            4 if few => self.run::<f64, [f64; 4], Few>(job, job.parameters, array),
-            _ if few => self.run::<f64, Vec<f64>, Few>(job, job.parameters, <[f64]>::to_vec),
-            _ => self.simulate(job, job.parameters),
-        }
+    fn open_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        Ok(self.running(self.opened(), parameters))
     }
 }
 

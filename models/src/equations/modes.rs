@@ -1,12 +1,12 @@
 //! The modes of a model from text: which branch holds, which joint is stuck.
 
-use mops_core::{Failure, OperatingPoint, Scalar};
+use mops_core::{Failure, Instant, Plant, Scalar};
 
 use super::bank::Bank;
 use super::running::Running;
-use crate::kernel::{Dynamics, Tolerance, rests};
+use crate::kernel::{Tolerance, rests};
 
-impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X, B> {
+impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     pub(super) fn set_mode(&mut self, mode: usize, value: f64) {
         self.modes[mode] = value;
         self.bank.borrow_mut().set(self.model.layout.mode(mode), S::from(value));
@@ -17,15 +17,15 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
     }
 
     /// Puts every condition and contact into the mode that fits this moment.
-    pub(super) fn settle(&mut self, t: f64, x: &[S]) {
-        self.settle_switches(t, x);
-        self.find_contacts(t, x);
+    pub(super) fn settle_modes(&mut self, at: &Instant<'_, S>) {
+        self.settle_switches(at);
+        self.find_contacts(at);
     }
 
-    fn settle_switches(&mut self, t: f64, x: &[S]) {
+    fn settle_switches(&mut self, at: &Instant<'_, S>) {
         for k in 0..self.model.switches.len() {
             let switch = &self.model.switches[k];
-            let sides @ [difference, _] = self.results(&switch.sides, t, x).map(Scalar::value);
+            let sides @ [difference, _] = self.results(&switch.sides, at).map(Scalar::value);
             let holds = difference > 0.0 || difference == 0.0 && !switch.strict;
             self.set_mode(switch.mode, f64::from(u8::from(holds)));
             self.set_slack(k, sides);
@@ -46,12 +46,12 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// Joints that move slide the way they move. Of those at rest each is stuck if the torque it takes is within its
     /// limit, else it slides the way it accelerates: the choice in which all agree, as in [`crate::kernel::friction`].
-    pub(super) fn find_contacts(&mut self, t: f64, x: &[S]) {
+    pub(super) fn find_contacts(&mut self, at: &Instant<'_, S>) {
         let model = self.model;
         let mut resting = Vec::new();
         for (j, joint) in model.joints.iter().enumerate() {
-            let speed = x[joint.contact.velocity].value();
-            let [_, limit, ..] = self.results::<4>(&joint.balance, t, x).map(Scalar::value);
+            let speed = at.x[joint.contact.velocity].value();
+            let [_, limit, ..] = self.results::<4>(&joint.balance, at).map(Scalar::value);
             if speed == 0.0 && limit > 0.0 {
                 resting.push(j);
             }
@@ -63,7 +63,7 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
             self.choose_contacts(&resting, code);
             let discord = resting.iter().map(|&j| {
                 let joint = &model.joints[j];
-                let [torque, limit, coulomb, acceleration] = self.results(&joint.balance, t, x).map(Scalar::value);
+                let [torque, limit, coulomb, acceleration] = self.results(&joint.balance, at).map(Scalar::value);
                 let direction = self.modes[joint.contact.direction];
                 if direction == 0.0 {
                     torque.abs() / limit - 1.0
@@ -98,17 +98,16 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
 
     /// Takes the modes of an operating point, for a look at the equations alone: joints slide the way they move, those at
     /// rest have no dry friction. Gives the positions of joints whose friction is left out, as states.
-    pub fn look(&mut self, at: &OperatingPoint<'_, S>) -> Vec<usize> {
-        let x = at.states;
-        self.settle_switches(0.0, x);
+    pub(super) fn look(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Vec<usize> {
+        self.settle_switches(at);
         let mut left_out = Vec::new();
         for joint in &self.model.joints {
             let contact = joint.contact;
-            let speed = x[contact.velocity];
-            let rests = rests(at, speed);
+            let speed = at.x[contact.velocity];
+            let rests = rests(at_rest, speed);
             self.set_mode(contact.direction, if rests { 0.0 } else { speed.value().signum() });
             self.set_mode(contact.stuck, 0.0);
-            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, 0.0, x).map(Scalar::value);
+            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, at).map(Scalar::value);
             if rests && (limit != 0.0 || coulomb != 0.0) {
                 left_out.push(contact.position);
             }
@@ -117,9 +116,9 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
     }
 
     /// Whether equations that are solved together have a solution here.
-    pub fn check_start(&self, x: &X) -> Result<(), Failure> {
+    pub(super) fn check_start(&self, at: &Instant<'_, S>) -> Result<(), Failure> {
         for joint in &self.model.joints {
-            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, 0.0, x.as_ref()).map(Scalar::value);
+            let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, at).map(Scalar::value);
             if coulomb < 0.0 || limit < coulomb {
                 return Err(Failure::Undefined(format!(
                     "where it {}, its friction is {coulomb} and breaks away at {limit}: `coulomb` must not be negative, \
@@ -138,14 +137,14 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'_, S, X
             }
         }
         drop(bank);
-        let mut slope = x.clone();
-        self.derivative(0.0, x, &mut slope);
-        if slope.as_ref().iter().all(|d| d.value().is_finite()) {
+        let mut slope = at.x.to_vec();
+        self.rates(at, &mut slope);
+        if slope.iter().all(|d| d.value().is_finite()) {
             return Ok(());
         }
         let mut bank = self.bank.borrow_mut();
         for tape in &self.model.matrices {
-            self.load(&mut bank, 0.0, x.as_ref());
+            self.load(&mut bank, at);
             tape.run(&mut *bank);
             let entries: Vec<f64> = tape.results.iter().map(|&r| bank.get(r).value()).collect();
             if determinant(entries) == 0.0 {

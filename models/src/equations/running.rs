@@ -1,25 +1,24 @@
-//! A compiled model in a simulation: the present values, modes and inputs.
+//! A compiled model as a plant: the present values and modes.
 
 use std::cell::RefCell;
-use std::marker::PhantomData;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
-use mops_core::{Dual, Failure, Instant, Scalar};
+use mops_core::{Along, DIRECTIONS, Dual, EventInstant, Failure, Instant, Plant, Scalar, Span};
 
 use super::bank::{Bank, Large};
 use super::bounds::{self, moved, signed};
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, Tolerance};
+use crate::kernel::Tolerance;
 
-/// The dynamics of a compiled model; `X` is the state vector, `B` the registers.
-pub struct Running<'a, S, X, B> {
+/// The plant of a compiled model; `B` are the registers.
+pub struct Running<'a, S, B> {
     pub(super) model: &'a Compiled,
     pub(super) bank: RefCell<B>,
-    pub(super) drives: Vec<Drive<'a, S>>,
+    /// The states at time 0.
+    start: Vec<S>,
     pub(super) parameters: &'a [S],
     pub(super) tolerance: Tolerance,
     started: bool,
@@ -33,8 +32,6 @@ pub struct Running<'a, S, X, B> {
     flips: Vec<usize>,
     /// What each event waits for.
     pub(super) phases: Vec<Phase>,
-    /// By how much the event of the moment comes later: tangents without a value.
-    delay: S,
     /// States that are held where events have come to rest.
     pub(super) held: Vec<usize>,
     /// Largest absolute values of the states where the simulation begins and at events.
@@ -42,12 +39,8 @@ pub struct Running<'a, S, X, B> {
     /// Registers with bounds, from their first use on.
     bounds: RefCell<Vec<Enclosure>>,
     /// Registers in which the Jacobian is computed, from its first use on.
-    jacobian: RefCell<Option<Large<Dual<CHUNK>>>>,
-    state: PhantomData<X>,
+    jacobian: RefCell<Option<Large<Along>>>,
 }
-
-/// Columns of the Jacobian that are computed at once.
-const CHUNK: usize = 8;
 
 /// A condition that has switched that often is blamed where a simulation runs out of steps: a thousandth of those there are.
 const FLIPS: usize = 100;
@@ -63,15 +56,15 @@ enum Guard {
     Happening(usize),
 }
 
-impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, S, X, B> {
-    /// A simulation with these parameters, the start values among them left aside.
-    pub fn new(model: &'a Compiled, drives: Vec<Drive<'a, S>>, parameters: &'a [S], tolerance: Tolerance) -> Self {
+impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
+    /// The plant with these parameters, the start values among them left aside.
+    pub fn new(model: &'a Compiled, parameters: &'a [S], tolerance: Tolerance) -> Self {
         let mut bank = B::with(model.layout.registers);
         set_up(model, &mut bank, parameters.iter().copied());
         Self {
             model,
             bank: RefCell::new(bank),
-            drives,
+            start: Vec::new(),
             jacobian: RefCell::new(None),
             parameters,
             tolerance,
@@ -81,12 +74,16 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
             spans: vec![0.0; model.switches.len()],
             flips: vec![0; model.switches.len()],
             phases: vec![Phase::Armed(0.0); model.happenings.len()],
-            delay: S::from(0.0),
             held: Vec::new(),
             sizes: vec![0.0; model.states],
             bounds: RefCell::new(Vec::new()),
-            state: PhantomData,
         }
+    }
+
+    /// The plant that starts at these states.
+    #[must_use]
+    pub fn starting_at(self, start: Vec<S>) -> Self {
+        Self { start, ..self }
     }
 
     /// Start values that are expressions: state and value.
@@ -97,63 +94,34 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         states.iter().zip(&tape.results).map(|(&state, &register)| (state, bank.get(register))).collect()
     }
 
+    /// Writes an instant into the registers; forces are inputs after the others, where the model was compiled with them.
     #[inline(always)]
-    pub(super) fn load(&self, bank: &mut B, t: f64, x: &[S]) {
-        let layout = &self.model.layout;
-        for (i, &x) in x.iter().enumerate() {
-            bank.set(layout.state(i), x);
-        }
-        for (i, drive) in self.drives.iter().enumerate() {
-            bank.set(layout.input(i), drive.at(t));
-        }
-        bank.set(layout.time(), S::from(t));
-    }
-
-    /// Results of a tape at a time and a state.
-    pub(super) fn results<const N: usize>(&self, tape: &Program, t: f64, x: &[S]) -> [S; N] {
-        let mut bank = self.bank.borrow_mut();
-        self.load(&mut bank, t, x);
-        tape.run(&mut *bank);
-        std::array::from_fn(|k| bank.get(tape.results[k]))
-    }
-
-    /// The derivative with inputs and forces from outside.
-    pub(super) fn open_rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        let mut bank = self.bank.borrow_mut();
-        let bank = &mut *bank;
+    pub(super) fn load(&self, bank: &mut B, at: &Instant<'_, S>) {
         let layout = &self.model.layout;
         for (i, &x) in at.x.iter().enumerate() {
             bank.set(layout.state(i), x);
         }
-        for (i, &value) in at.u.iter().chain(at.w).enumerate() {
-            // A drive that is held adds a slope of 0, which makes a negative zero positive.
-            bank.set(layout.input(i), value + 0.0);
+        for (i, &u) in at.u.iter().enumerate() {
+            bank.set(layout.input(i), u);
+        }
+        for (i, &w) in self.forces(at.w).iter().enumerate() {
+            bank.set(layout.input(at.u.len() + i), w);
         }
         bank.set(layout.time(), S::from(at.t));
-        let tape = &self.model.derivative;
-        tape.run(bank);
-        for (dx, &register) in dx.iter_mut().zip(&tape.results) {
-            *dx = bank.get(register);
-        }
-        for &state in &self.held {
-            dx[state] = S::from(0.0);
-        }
     }
 
-    /// Holds the inputs at these values.
-    pub fn hold_drives(&mut self, values: impl Iterator<Item = S>) {
-        for (drive, value) in self.drives.iter_mut().zip(values) {
-            *drive = Drive::held(value);
-        }
+    /// Forces from outside, as far as the equations take them in.
+    #[inline(always)]
+    pub(super) fn forces<'w, T>(&self, w: &'w [T]) -> &'w [T] {
+        if self.model.takes_forces { w } else { &[] }
     }
 
-    /// The value of a signal.
-    pub fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
-        match &self.model.signals[signal] {
-            Signal::State(state) => x[*state],
-            Signal::Input(input) => self.drives[*input].at(t),
-            Signal::Tape(tape) => self.results::<1>(tape, t, x)[0],
-        }
+    /// Results of a tape at an instant.
+    pub(super) fn results<const N: usize>(&self, tape: &Program, at: &Instant<'_, S>) -> [S; N] {
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, at);
+        tape.run(&mut *bank);
+        std::array::from_fn(|k| bank.get(tape.results[k]))
     }
 
     fn kind(&self, index: usize) -> Guard {
@@ -167,14 +135,7 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
         }
     }
 
-    /// Bounds of a guard over a time, with bounds of the states and of the inputs.
-    pub(super) fn enclose(
-        &self,
-        index: usize,
-        time: Enclosure,
-        x: &[Enclosure],
-        inputs: impl Iterator<Item = Enclosure>,
-    ) -> Enclosure {
+    fn enclose(&self, index: usize, Span { time, x, u, w }: &Span<'_>) -> Enclosure {
         let layout = &self.model.layout;
         let mut registers = self.bounds.borrow_mut();
         if registers.is_empty() {
@@ -184,10 +145,10 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
             registers[usize::from(layout.mode(mode))] = Enclosure::from(value);
         }
         registers[usize::from(layout.state(0))..][..x.len()].copy_from_slice(x);
-        for (i, input) in inputs.enumerate() {
-            registers[usize::from(layout.input(i))] = input;
+        for (i, input) in u.iter().chain(self.forces(w)).enumerate() {
+            registers[usize::from(layout.input(i))] = *input;
         }
-        registers[usize::from(layout.time())] = time;
+        registers[usize::from(layout.time())] = *time;
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
@@ -216,47 +177,33 @@ impl<'a, S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Running<'a, 
     }
 
     /// The derivatives, of states that are held too.
-    pub(super) fn free_rates(&self, t: f64, x: &[S], dx: &mut [S]) {
+    #[inline(always)]
+    pub(super) fn free_rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let mut bank = self.bank.borrow_mut();
         let bank = &mut *bank;
-        self.load(bank, t, x);
+        self.load(bank, at);
         self.model.derivative.run(bank);
         for (dx, &register) in dx.iter_mut().zip(&self.model.derivative.results) {
             *dx = bank.get(register);
         }
     }
 
-    /// Gives states new values, computed from those they have.
-    pub(super) fn assign(&self, (states, tape): &(Vec<usize>, Program), t: f64, x: &mut X) {
+    /// Gives states new values, computed from those before the event.
+    pub(super) fn assign(&self, (states, tape): &(Vec<usize>, Program), event: &EventInstant<'_, S>, x: &mut [S]) {
         let mut bank = self.bank.borrow_mut();
-        self.load(&mut bank, t, x.as_ref());
+        self.load(&mut bank, &event.at);
         if S::DIRECTIONS > 0 {
-            let layout = &self.model.layout;
-            for (i, drive) in self.drives.iter().enumerate() {
-                bank.set(layout.input(i), drive.at(t) + self.delay * drive.slope(t));
-            }
-            bank.set(layout.time(), self.delay + t);
+            bank.set(self.model.layout.time(), event.delay + event.at.t);
         }
         tape.run(&mut *bank);
         for (&state, &register) in states.iter().zip(&tape.results) {
-            x.as_mut()[state] = bank.get(register);
+            x[state] = bank.get(register);
         }
     }
 
     fn note_sizes(&mut self, x: &[S]) {
         for (size, x) in self.sizes.iter_mut().zip(x) {
             *size = size.max(x.value().abs());
-        }
-    }
-
-    /// What went wrong where a simulation got nowhere: a condition that switched to and fro.
-    pub fn explain(&self, failure: Failure) -> Failure {
-        let mut jumping = self.model.switches.iter().zip(&self.flips);
-        match failure {
-            Failure::StepLimit(t) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
-                Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
-            }
-            failure => failure,
         }
     }
 }
@@ -269,14 +216,27 @@ pub(super) fn set_up<S: Scalar>(model: &Compiled, bank: &mut impl Bank<S>, param
     model.setup.run(bank);
 }
 
-impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for Running<'_, S, X, B> {
-    type State = X;
+impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
+    fn start(&self) -> Vec<S> {
+        self.start.clone()
+    }
 
-    #[inline(always)]
-    fn derivative(&self, t: f64, x: &X, dx: &mut X) {
-        self.free_rates(t, x.as_ref(), dx.as_mut());
+    fn can_start(&self, at: &Instant<'_, S>) -> Result<(), Failure> {
+        self.check_start(at)
+    }
+
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        self.free_rates(at, dx);
         for &state in &self.held {
-            dx.as_mut()[state] = S::from(0.0);
+            dx[state] = S::from(0.0);
+        }
+    }
+
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        match &self.model.signals[signal] {
+            Signal::State(state) => at.x[*state],
+            Signal::Input(input) => at.u[*input],
+            Signal::Tape(tape) => self.results::<1>(tape, at)[0],
         }
     }
 
@@ -284,39 +244,39 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         self.model.joints.len() + self.model.switches.len() + self.model.happenings.len()
     }
 
-    fn guard(&self, index: usize, t: f64, x: &X) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
                 if self.is(joint.contact.stuck) {
-                    let [torque, limit, ..] = self.results::<4>(&joint.balance, t, x.as_ref());
+                    let [torque, limit, ..] = self.results::<4>(&joint.balance, at);
                     limit - torque.abs()
                 } else {
-                    x.as_ref()[joint.contact.velocity] * self.modes[joint.contact.direction]
+                    at.x[joint.contact.velocity] * self.modes[joint.contact.direction]
                 }
             }
             Guard::Switch(k) => {
                 let switch = &self.model.switches[k];
-                let [difference, _] = self.results(&switch.sides, t, x.as_ref());
+                let [difference, _] = self.results(&switch.sides, at);
                 let sign = if self.is(switch.mode) { 1.0 } else { -1.0 };
                 difference * sign + self.slack[k]
             }
-            Guard::Happening(k) => self.happening_guard(k, t, x),
+            Guard::Happening(k) => self.happening_guard(k, at),
         }
     }
 
-    fn guard_rate(&self, index: usize, t: f64, x: &X) -> Option<f64> {
+    fn guard_rate(&self, index: usize, at: &Instant<'_, S>, du: &[f64]) -> Option<f64> {
         match self.kind(index) {
             Guard::Joint(_) => None,
             Guard::Switch(k) => {
                 let switch = &self.model.switches[k];
-                let rate = self.tape_rate(&switch.sides, 0, t, x);
+                let rate = self.tape_rate(&switch.sides, 0, at, du);
                 Some(if self.is(switch.mode) { rate } else { -rate })
             }
             Guard::Happening(k) => match &self.phases[k] {
                 Phase::AtRest(_) => None,
                 phase => {
-                    let rate = self.tape_rate(&self.model.happenings[k].guard, 0, t, x);
+                    let rate = self.tape_rate(&self.model.happenings[k].guard, 0, at, du);
                     Some(if *phase == Phase::Passed { -rate } else { rate })
                 }
             },
@@ -327,13 +287,13 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         true
     }
 
-    fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
-        self.enclose(index, time, x, self.drives.iter().map(|drive| drive.enclose(time)))
+    fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
+        self.enclose(index, over)
     }
 
-    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut X) -> Result<&str, String> {
+    fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
         match self.kind(index) {
-            Guard::Happening(k) => self.come_to_rest(k, t, close, x),
+            Guard::Happening(k) => self.come_to_rest(k, event, close, x),
             Guard::Joint(j) => Err(format!(
                 "a joint with dry friction does not settle: {}, again and again",
                 self.model.joints[j].slides
@@ -346,12 +306,13 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         self.model.scales[state]
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut X) -> &str {
-        self.note_sizes(x.as_ref());
+    fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
+        self.note_sizes(x);
+        let at = event.at;
         match self.kind(index) {
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
-                let [torque, limit, ..] = self.results::<4>(&joint.balance, t, x.as_ref()).map(Scalar::value);
+                let [torque, limit, ..] = self.results::<4>(&joint.balance, &at).map(Scalar::value);
                 if limit == 0.0 {
                     // Without friction the joint passes through its rest; which way it moves counts where friction comes.
                     self.set_contact(j, -self.modes[joint.contact.direction]);
@@ -360,8 +321,8 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                 if self.is(joint.contact.stuck) {
                     self.set_contact(j, if torque > 0.0 { 1.0 } else { -1.0 });
                 } else {
-                    x.as_mut()[joint.contact.velocity] = S::from(0.0);
-                    self.find_contacts(t, x.as_ref());
+                    x[joint.contact.velocity] = S::from(0.0);
+                    self.find_contacts(&Instant { x, ..at });
                 }
                 if self.is(joint.contact.stuck) { &joint.sticks } else { &joint.slides }
             }
@@ -370,25 +331,14 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
                 let holds = !self.is(switch.mode);
                 self.set_mode(switch.mode, f64::from(u8::from(holds)));
                 self.flips[k] += 1;
-                let sides = self.results(&switch.sides, t, x.as_ref()).map(Scalar::value);
+                let sides = self.results(&switch.sides, &at).map(Scalar::value);
                 self.set_slack(k, sides);
                 if switch.jumps {
-                    self.find_contacts(t, x.as_ref());
+                    self.find_contacts(&at);
                 }
                 ""
             }
-            Guard::Happening(k) => self.happen(k, t, x),
-        }
-    }
-
-    fn delay_events(&mut self, delay: S) {
-        self.delay = delay;
-    }
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        match &self.model.signals[signal] {
-            Signal::State(state) => Some(*state),
-            _ => None,
+            Guard::Happening(k) => self.happen(k, event, x),
         }
     }
 
@@ -396,8 +346,8 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         Some(self.model.pattern.clone())
     }
 
-    /// Columns that share no row are differentiated together, eight such groups in one run of the tape.
-    fn jacobian(&self, t: f64, x: &X, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+    /// Columns that share no row are differentiated together, several such groups in one run of the tape.
+    fn jacobian(&self, at: &Instant<'_, S>, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         let model = self.model;
         let mut bank = self.jacobian.borrow_mut();
         let bank = bank.get_or_insert_with(|| {
@@ -409,17 +359,17 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         for (mode, &value) in self.modes.iter().enumerate() {
             bank.set(layout.mode(mode), Dual::from(value));
         }
-        for (i, drive) in self.drives.iter().enumerate() {
-            bank.set(layout.input(i), Dual::from(drive.at(t).value()));
+        for (i, input) in at.u.iter().chain(self.forces(at.w)).enumerate() {
+            bank.set(layout.input(i), Dual::from(input.value()));
         }
-        bank.set(layout.time(), Dual::from(t));
-        for groups in model.columns.chunks(CHUNK) {
-            for (i, x) in x.as_ref().iter().enumerate() {
+        bank.set(layout.time(), Dual::from(at.t));
+        for groups in model.columns.chunks(DIRECTIONS) {
+            for (i, x) in at.x.iter().enumerate() {
                 bank.set(layout.state(i), Dual::from(x.value()));
             }
             for (direction, group) in groups.iter().enumerate() {
                 for (column, _) in group {
-                    bank.set(layout.state(*column), Dual::variable(x.as_ref()[*column].value(), direction));
+                    bank.set(layout.state(*column), Dual::variable(at.x[*column].value(), direction));
                 }
             }
             model.derivative.run(bank);
@@ -434,25 +384,29 @@ impl<S: Scalar, X: AsRef<[S]> + AsMut<[S]> + Clone, B: Bank<S>> Dynamics<S> for 
         true
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        self.drives.iter().map(|drive| drive.next_break(t)).fold(f64::INFINITY, f64::min)
-    }
-
-    fn longest_step(&self) -> f64 {
-        self.drives.iter().map(Drive::longest_step).fold(f64::INFINITY, f64::min)
-    }
-
-    fn pass_break(&mut self, t: f64, x: &mut X) {
-        for drive in &mut self.drives {
-            drive.pass_break(t);
-        }
-        self.settle(t, x.as_ref());
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.settle_modes(at);
         if !std::mem::replace(&mut self.started, true) {
-            self.note_sizes(x.as_ref());
+            self.note_sizes(at.x);
             for k in 0..self.phases.len() {
-                let passed = self.happening_guard(k, t, x).value() < 0.0;
+                let passed = self.happening_guard(k, at).value() < 0.0;
                 self.phases[k] = if passed { Phase::Passed } else { Phase::Armed(0.0) };
             }
+        }
+    }
+
+    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
+        Ok(self.look(at, at_rest))
+    }
+
+    /// Where a simulation got nowhere as a condition switched to and fro, that is what is said.
+    fn explain(&self, failure: Failure) -> Failure {
+        let mut jumping = self.model.switches.iter().zip(&self.flips);
+        match failure {
+            Failure::StepLimit(t) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
+                Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
+            }
+            failure => failure,
         }
     }
 }

@@ -5,7 +5,10 @@ mod large;
 use mops_core::math;
 use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
 
-use super::{Equations, EquationsOptions};
+use super::EquationsOptions;
+use crate::kernel::Simulated;
+
+type Equations = Simulated<super::Equations>;
 
 mod dry_friction;
 mod events;
@@ -17,7 +20,8 @@ mod units;
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
 
 fn read(text: &str) -> Result<Equations, Mistake> {
-    Equations::new(&toml::from_str::<EquationsOptions>(text).unwrap_or_else(|e| panic!("{e}\n{text}")))
+    let options = toml::from_str::<EquationsOptions>(text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    super::Equations::new(&options).map(Simulated::new)
 }
 
 fn model(text: &str) -> Equations {
@@ -111,7 +115,7 @@ fn ten_plants_written_by_hand_agree_with_an_independent_integration() {
 #[test]
 fn the_tape_of_the_furuta_pendulum_is_about_as_short_as_its_equations() {
     for text in [text!("furuta-free"), text!("furuta-driven")] {
-        let instructions = model(text).instructions();
+        let instructions = model(text).plant_model().instructions();
         assert!(instructions <= 24, "{instructions}");
     }
 }
@@ -370,7 +374,7 @@ fn a_heat_rod_of_a_hundred_nodes_takes_few_lines() {
     let index = low as usize - 1;
     let here = warm[index] * (1.0 - part) + warm[index + 1] * part;
     assert!((here - 20.0 - 30.0 * erfc_of_half).abs() < 0.15, "{here}");
-    let pattern = model.jacobian_pattern();
+    let pattern = model.plant_model().jacobian_pattern();
     assert_eq!(pattern.len(), 3 * 100 - 2);
     assert!(pattern.iter().all(|&(row, column)| row.abs_diff(column) <= 1));
 }

@@ -10,34 +10,31 @@ use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
 /// The stages of a step.
-pub(super) struct DormandPrince<X> {
-    k: [X; 7],
-    stage: X,
+pub struct DormandPrince<S> {
+    k: [Vec<S>; 7],
+    stage: Vec<S>,
 }
 
-impl<S: Scalar, D: Dynamics<S>> Method<S, D> for DormandPrince<D::State> {
+impl<S: Scalar> Method<S> for DormandPrince<S> {
     const ERROR_ORDER: f64 = 5.0;
     const IS_EXPLICIT: bool = true;
 
-    fn new(_: &D, x: &D::State) -> Self {
-        Self { k: std::array::from_fn(|_| x.clone()), stage: x.clone() }
+    fn new<D: Dynamics<S> + ?Sized>(_: &D, x: &[S]) -> Self {
+        Self { k: std::array::from_fn(|_| x.to_vec()), stage: x.to_vec() }
     }
 
-    fn restart(&mut self, f: &D, t: f64, x: &D::State, work: &mut Work) {
+    fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work) {
         f.derivative(t, x, &mut self.k[0]);
         work.derivatives += 1;
     }
 
-    fn slope(&self) -> &D::State {
+    fn slope(&self) -> &[S] {
         &self.k[0]
     }
 
-    #[inline(never)] // Within the loop over steps the stages run out of registers: a quarter of their time.
-    fn attempt(&mut self, f: &D, at: Attempt<'_, D::State>, next: &mut D::State, work: &mut Work) -> f64 {
-        let Attempt { t, h, x, weights } = at;
-        stages(f, (t, h), x, &mut self.k, &mut self.stage, next);
+    fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64 {
         work.derivatives += 6;
-        error_norm(h, x, next, &self.k, weights)
+        f.attempt(self, at, next)
     }
 
     #[inline]
@@ -46,24 +43,47 @@ impl<S: Scalar, D: Dynamics<S>> Method<S, D> for DormandPrince<D::State> {
     }
 
     #[inline]
-    fn dense(&self, h: f64, x: &D::State, next: &D::State, dense: &mut [D::State; 5]) {
-        dense_output(h, x, next, &self.k, dense);
+    fn dense(&self, h: f64, x: &[S], next: &[S], dense: &mut [Vec<S>; 5]) {
+        by_size!(x.len(), S, N => dense_output::<S, N>(h, x, next, &self.k, dense));
     }
+}
+
+impl<S: Scalar> DormandPrince<S> {
+    /// An attempt with `N` states; 0 stands for any number.
+    #[inline(never)] // Within the loop over steps the stages run out of registers: a quarter of their time.
+    pub(super) fn attempt_of<D: Dynamics<S> + ?Sized, const N: usize>(
+        &mut self,
+        f: &D,
+        at: Attempt<'_, S>,
+        next: &mut [S],
+    ) -> f64 {
+        let Attempt { t, h, x, weights } = at;
+        let n = if N == 0 { x.len() } else { N };
+        let (x, next) = (&x[..n], &mut next[..n]);
+        stages(f, (t, h), x, &mut self.k, &mut self.stage[..n], next);
+        error_norm(h, x, next, &self.k, weights)
+    }
+}
+
+/// Slices of a length that is known to the compiler where `n` is.
+#[inline(always)]
+fn cut<S>([k0, k1, k2, k3, k4, k5, k6]: &[Vec<S>; 7], n: usize) -> [&[S]; 7] {
+    [&k0[..n], &k1[..n], &k2[..n], &k3[..n], &k4[..n], &k5[..n], &k6[..n]]
 }
 
 /// The six new stages; `k[0]` is given, `k[6]` is the derivative at the new state.
 #[rustfmt::skip]
-#[inline]
-fn stages<S: Scalar, D: Dynamics<S>>(
-    f: &D, (t, h): (f64, f64), x: &D::State, k: &mut [D::State; 7], stage: &mut D::State, next: &mut D::State,
+#[inline(always)]
+fn stages<S: Scalar, D: Dynamics<S> + ?Sized>(
+    f: &D, (t, h): (f64, f64), x: &[S], k: &mut [Vec<S>; 7], stage: &mut [S], next: &mut [S],
 ) {
-    let n = x.as_ref().len();
+    let n = x.len();
     // Terms in the order of the stages, so that the newest derivative, which is waited for, comes in last.
     macro_rules! combine {
         ($target:expr, $($i:literal * $c:expr),+) => {{
-            let (target, x) = ($target.as_mut(), x.as_ref());
+            let k = cut(k, n);
             for j in 0..n {
-                target[j] = x[j] $(+ k[$i].as_ref()[j] * (h * ($c)))+;
+                $target[j] = x[j] $(+ k[$i][j] * (h * ($c)))+;
             }
         }};
     }
@@ -82,36 +102,37 @@ fn stages<S: Scalar, D: Dynamics<S>>(
 }
 
 /// Norm of the embedded error estimate.
-#[inline]
-fn error_norm<S: Scalar, X: AsRef<[S]>>(h: f64, x: &X, next: &X, k: &[X; 7], weights: &Weights) -> f64 {
-    let error = |j: usize| {
-        let kj = |i: usize| k[i].as_ref()[j].value();
-        h * (71.0 / 57600.0 * kj(0) - 71.0 / 16695.0 * kj(2) + 71.0 / 1920.0 * kj(3) - 17253.0 / 339_200.0 * kj(4)
-            + 22.0 / 525.0 * kj(5)
-            - 1.0 / 40.0 * kj(6))
-    };
-    let size = |x: &X, j: usize| x.as_ref()[j].value().abs();
-    weights.norm(h, x.as_ref().len(), |j| (error(j), [size(x, j), size(next, j), size(&k[6], j)]))
+#[inline(always)]
+fn error_norm<S: Scalar>(h: f64, x: &[S], next: &[S], k: &[Vec<S>; 7], weights: &Weights) -> f64 {
+    let k = cut(k, x.len());
+    let mut norm = weights.norm(h, x.len());
+    for j in 0..x.len() {
+        let kj = |i: usize| k[i][j].value();
+        let error = h
+            * (71.0 / 57600.0 * kj(0) - 71.0 / 16695.0 * kj(2) + 71.0 / 1920.0 * kj(3) - 17253.0 / 339_200.0 * kj(4)
+                + 22.0 / 525.0 * kj(5)
+                - 1.0 / 40.0 * kj(6));
+        norm.add(j, error, [x[j].value(), next[j].value(), kj(6)]);
+    }
+    norm.of_errors()
 }
 
 #[rustfmt::skip]
 #[inline]
-fn dense_output<S: Scalar, X: AsRef<[S]> + AsMut<[S]>>(h: f64, x: &X, next: &X, k: &[X; 7], dense: &mut [X; 5]) {
+fn dense_output<S: Scalar, const N: usize>(h: f64, x: &[S], next: &[S], k: &[Vec<S>; 7], dense: &mut [Vec<S>; 5]) {
     const D: [f64; 7] = [
         -12_715_105_075.0 / 11_282_082_432.0, 0.0, 87_487_479_700.0 / 32_700_410_799.0, -10_690_763_975.0 / 1_880_347_072.0,
         701_980_252_875.0 / 199_316_789_632.0, -1_453_857_185.0 / 822_651_844.0, 69_997_945.0 / 29_380_423.0,
     ];
-    for j in 0..x.as_ref().len() {
-        let (x0, x1) = (x.as_ref()[j], next.as_ref()[j]);
-        let (k1, k7) = (k[0].as_ref()[j] * h, k[6].as_ref()[j] * h);
+    let n = if N == 0 { x.len() } else { N };
+    let (k, x, next, [d0, d1, d2, d3, d4]) = (cut(k, n), &x[..n], &next[..n], dense);
+    let (d0, d1, d2, d3, d4) = (&mut d0[..n], &mut d1[..n], &mut d2[..n], &mut d3[..n], &mut d4[..n]);
+    for j in 0..n {
+        let (x0, x1) = (x[j], next[j]);
+        let (k1, k7) = (k[0][j] * h, k[6][j] * h);
         let difference = x1 - x0;
         let bspl = k1 - difference;
-        dense[0].as_mut()[j] = x0;
-        dense[1].as_mut()[j] = difference;
-        dense[2].as_mut()[j] = bspl;
-        dense[3].as_mut()[j] = difference - k7 - bspl;
-        let sum = k[0].as_ref()[j] * D[0] + k[2].as_ref()[j] * D[2] + k[3].as_ref()[j] * D[3]
-            + k[4].as_ref()[j] * D[4] + k[5].as_ref()[j] * D[5] + k[6].as_ref()[j] * D[6];
-        dense[4].as_mut()[j] = sum * h;
+        let sum = k[0][j] * D[0] + k[2][j] * D[2] + k[3][j] * D[3] + k[4][j] * D[4] + k[5][j] * D[5] + k[6][j] * D[6];
+        (d0[j], d1[j], d2[j], d3[j], d4[j]) = (x0, difference, bspl, difference - k7 - bspl, sum * h);
     }
 }

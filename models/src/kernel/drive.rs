@@ -88,6 +88,11 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// Whether it has the same value up to the next break.
+    pub fn is_constant(&self) -> bool {
+        self.curve.is_none() && self.slope == 0.0
+    }
+
     /// Bounds over a time between two breaks.
     pub fn enclose(&self, time: Enclosure) -> Enclosure {
         let value = Enclosure::from(self.value.value());

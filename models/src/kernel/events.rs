@@ -66,7 +66,7 @@ const MOST_BOUNDS: usize = 2000;
 const HALVINGS: u32 = 30;
 
 /// The events of a simulation.
-pub(super) struct Events {
+pub(super) struct Events<S> {
     /// Simulated time, s.
     span: f64,
     /// Values of the guards at the present instant.
@@ -76,6 +76,8 @@ pub(super) struct Events {
     /// Bounds of the state over the step, and over a part of it.
     whole: Vec<Enclosure>,
     bounds: Vec<Enclosure>,
+    /// States at the inner ones of [`PLACES`].
+    inner: [Vec<S>; 3],
 }
 
 /// When a guard switched.
@@ -89,9 +91,10 @@ struct Past {
     closer: u32,
 }
 
-impl Events {
-    pub(super) fn new(span: f64) -> Self {
-        Self { span, values: Vec::new(), past: Vec::new(), whole: Vec::new(), bounds: Vec::new() }
+impl<S: Scalar> Events<S> {
+    pub(super) fn new(span: f64, x: &[S]) -> Self {
+        let inner = std::array::from_fn(|_| x.to_vec());
+        Self { span, values: Vec::new(), past: Vec::new(), whole: Vec::new(), bounds: Vec::new(), inner }
     }
 
     /// Times that differ by less are one instant, s.
@@ -99,19 +102,24 @@ impl Events {
         RESOLUTION * t.abs().max(1e-3 * self.span)
     }
 
+    /// Whether the present mode has guards.
+    pub(super) fn are_watched(&self) -> bool {
+        !self.values.is_empty()
+    }
+
     /// Lets all events of an instant happen: guards that are negative switch, the one with the lowest number first, until
     /// none is negative.
-    pub(super) fn settle<S: Scalar, D: Dynamics<S>>(
+    pub(super) fn settle<D: Dynamics<S> + ?Sized>(
         &mut self,
         dynamics: &mut D,
         t: f64,
-        x: &mut D::State,
+        x: &mut [S],
         sink: &mut impl Sink<S, D>,
     ) -> Result<(), Failure> {
         let mut index = 0;
-        while index < dynamics.guards() {
+        self.values.resize(dynamics.guards(), 0.0);
+        while index < self.values.len() {
             let value = dynamics.guard(index, t, x).value();
-            self.values.resize(dynamics.guards(), 0.0);
             self.values[index] = value;
             if value >= 0.0 || value.is_nan() {
                 index += 1;
@@ -126,6 +134,7 @@ impl Events {
             } else {
                 sink.event(t, dynamics.switch(index, t, x));
             }
+            self.values.resize(dynamics.guards(), 0.0);
             index = 0;
         }
         Ok(())
@@ -146,20 +155,25 @@ impl Events {
     }
 
     /// The guard that is negative first within the step, which ends there; `arrival` is the time and state at its end.
-    pub(super) fn first<S: Scalar, D: Dynamics<S>>(
+    pub(super) fn first<D: Dynamics<S> + ?Sized>(
         &mut self,
         dynamics: &D,
-        step: &mut Step<D::State>,
-        arrival: (f64, &D::State),
-        x: &mut D::State,
+        step: &mut Step<S>,
+        arrival: (f64, &[S]),
+        x: &mut [S],
     ) -> Option<usize> {
         let mut first = None;
         let mut end = 1.0;
-        let has_bounds = dynamics.has_bounds() && dynamics.guards() > 0;
+        if !self.are_watched() {
+            return None;
+        }
+        let has_bounds = dynamics.has_bounds();
         if has_bounds {
             step.enclose(0.0, 1.0, &mut self.whole);
+        } else {
+            step.states_at(&INNER, &mut self.inner);
         }
-        for index in 0..dynamics.guards() {
+        for index in 0..self.values.len() {
             let mut value = |theta: f64| {
                 if theta >= 1.0 {
                     return dynamics.guard(index, arrival.0, arrival.1).value();
@@ -185,8 +199,12 @@ impl Events {
             } else if whole.value.low > f64::NEG_INFINITY || (has_bounds && is_bounded(&mut enclose)) {
                 Search { value: &mut value, enclose: &mut enclose, length: step.length, left: MOST_BOUNDS }
                     .first(ends, whole, HALVINGS)
+            } else if has_bounds || end < 1.0 {
+                let inner = INNER.map(|place| value(place * end));
+                looks(&mut value, ends, inner)
             } else {
-                looks(&mut value, ends)
+                let inner = dynamics.guard_at(index, &INNER.map(|place| step.time(place)), &self.inner);
+                looks(&mut value, ends, inner.map(Scalar::value))
             };
             // Most steps end without an event; the values at their end are those at the start of the next.
             if first.is_none() {
@@ -269,16 +287,37 @@ impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
 /// Places of a step in which a guard without bounds is looked at.
 const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The first bracket of a guard without bounds: between the looks, and where the quartic through them has a minimum below 0.
-fn looks(value: &mut impl FnMut(f64) -> f64, [start, last]: Bracket) -> Option<Bracket> {
+/// Those within it.
+const INNER: [f64; 3] = [PLACES[1], PLACES[2], PLACES[3]];
+
+/// The first bracket of a guard without bounds, from its values at the ends and at the inner places between them: between
+/// these looks, and where the quartic through them has a minimum below 0.
+#[inline]
+fn looks(value: &mut impl FnMut(f64) -> f64, ends: Bracket, inner: [f64; 3]) -> Option<Bracket> {
+    let values = [ends[0].1, inner[0], inner[1], inner[2], ends[1].1];
+    if is_far(&values) { None } else { look_closer(value, ends, &values) }
+}
+
+/// Whether values are positive, and no quartic through them can dip below 0: by no more than they differ. Most guards are.
+#[inline]
+fn is_far(values: &[f64; 5]) -> bool {
+    let [mut low, mut high] = [values[0]; 2];
+    for &value in values {
+        low = if value < low { value } else { low };
+        high = if value > high { value } else { high };
+    }
+    low > high - low
+}
+
+fn look_closer(value: &mut impl FnMut(f64) -> f64, [start, last]: Bracket, values: &[f64; 5]) -> Option<Bracket> {
     let width = last.0;
-    let mut at = |place: f64| (place * width, value(place * width));
-    let look = [start, at(PLACES[1]), at(PLACES[2]), at(PLACES[3]), last];
+    let at = |k: usize| (PLACES[k] * width, values[k]);
+    let look = [start, at(1), at(2), at(3), last];
     for k in 1..look.len() {
         if look[k].1 < 0.0 {
             return Some(rise_before([look[k - 1], look[k]], value));
         }
-        if let Some(place) = dip(&look.map(|(_, value)| value), k - 1) {
+        if let Some(place) = dip(values, k - 1) {
             let dip = (place * width, value(place * width));
             if dip.1 < 0.0 {
                 return Some(rise_before([look[k - 1], dip], value));
@@ -292,11 +331,6 @@ fn looks(value: &mut impl FnMut(f64) -> f64, [start, last]: Bracket) -> Option<B
 fn dip(values: &[f64; 5], between: usize) -> Option<f64> {
     const PARTS: u32 = 16;
     let (from, to) = (PLACES[between], PLACES[between + 1]);
-    // No quartic through positive values dips by more than they differ: most guards are far from 0.
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    if low > high - low {
-        return None;
-    }
     let places = (1..PARTS).map(|k| from + (to - from) * f64::from(k) / f64::from(PARTS));
     let (place, value) =
         places.map(|p| (p, quartic(values, p))).fold((from, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
@@ -361,14 +395,14 @@ fn zero_between([mut a, mut b]: Bracket, resolution: f64, value: &mut impl FnMut
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 /// I.14; jumps of tangents at events: S. Galan, W. Feehery, P. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
-pub(super) fn delay<S: Scalar, D: Dynamics<S>>(f: &D, index: usize, step: &Step<D::State>, x: &mut D::State) -> S {
+pub(super) fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>, x: &mut [S]) -> S {
     /// Part of the step between the two places that give the rate.
     const APART: f64 = 1e-3;
     if S::DIRECTIONS == 0 {
         return S::from(0.0);
     }
     let theta = step.share;
-    let guard = |theta: f64, x: &mut D::State| {
+    let guard = |theta: f64, x: &mut [S]| {
         step.at(theta, x);
         f.guard(index, step.time(theta), x)
     };
@@ -382,10 +416,10 @@ pub(super) fn delay<S: Scalar, D: Dynamics<S>>(f: &D, index: usize, step: &Step<
 }
 
 /// Moves the state by `delay` along its derivative: to first order, and its value not at all.
-pub(super) fn shift<S: Scalar, D: Dynamics<S>>(f: &D, t: f64, x: &mut D::State, dx: &mut D::State, delay: S) {
+pub(super) fn shift<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &mut [S], dx: &mut [S], delay: S) {
     if S::DIRECTIONS > 0 {
         f.derivative(t, x, dx);
-        for (x, dx) in x.as_mut().iter_mut().zip(dx.as_ref()) {
+        for (x, dx) in x.iter_mut().zip(dx.iter()) {
             *x += *dx * delay;
         }
     }

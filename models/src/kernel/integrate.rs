@@ -8,71 +8,72 @@ use super::events::{Events, delay, shift};
 use super::step::Step;
 use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
-use super::{Dynamics, IntegrationMethod, Simulated, Sink, Tolerance};
+use super::{Dynamics, Integrated, IntegrationMethod, Sink, Tolerance};
 
 /// What a method is asked to do: a step of length `h` from `x` at `t`.
-pub(super) struct Attempt<'a, X> {
+pub struct Attempt<'a, S> {
     pub(super) t: f64,
     pub(super) h: f64,
-    pub(super) x: &'a X,
+    pub(super) x: &'a [S],
     pub(super) weights: &'a Weights,
 }
 
 /// A one-step method with error estimate and dense output.
-pub(super) trait Method<S: Scalar, D: Dynamics<S>> {
+pub(super) trait Method<S: Scalar> {
     /// The error of a step of length `h` is of this order in `h`.
     const ERROR_ORDER: f64;
     /// Whether it damps what decays in short steps alone.
     const IS_EXPLICIT: bool;
 
-    fn new(f: &D, x: &D::State) -> Self;
+    fn new<D: Dynamics<S> + ?Sized>(f: &D, x: &[S]) -> Self;
 
     /// The solution begins anew at `x`: at the start, and where an event or a break made the right-hand side jump.
-    fn restart(&mut self, f: &D, t: f64, x: &D::State, work: &mut Work);
+    fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work);
 
     /// The derivative at the start of the next step.
-    fn slope(&self) -> &D::State;
+    fn slope(&self) -> &[S];
 
     /// Computes the state after the step, and the norm of its errors over their weights; NaN where there is none.
-    fn attempt(&mut self, f: &D, at: Attempt<'_, D::State>, next: &mut D::State, work: &mut Work) -> f64;
+    fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64;
 
     /// The step was accepted, and the next begins where it ended.
     fn advance(&mut self);
 
     /// The coefficients of [`Step`] for the step last attempted.
-    fn dense(&self, h: f64, x: &D::State, next: &D::State, dense: &mut [D::State; 5]);
+    fn dense(&self, h: f64, x: &[S], next: &[S], dense: &mut [Vec<S>; 5]);
 }
 
 /// Integrates from `t` to `end`; `sink` is told of every step and event.
 ///
 /// # Errors
 /// The state stops being finite, the steps run out, or become too small for the clock.
-pub fn integrate<S: Scalar, D: Dynamics<S>>(
+pub fn integrate<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
     t: f64,
     end: f64,
-    x: D::State,
+    x: &[S],
     tolerance: &Tolerance,
     sink: &mut impl Sink<S, D>,
-) -> Simulated<D::State> {
+) -> Integrated<S> {
     match tolerance.method {
-        IntegrationMethod::Explicit => run::<S, D, DormandPrince<D::State>>(dynamics, (t, end), x, tolerance, sink),
-        IntegrationMethod::Stiff => run::<S, D, Esdirk<D::State>>(dynamics, (t, end), x, tolerance, sink),
+        IntegrationMethod::Explicit => run::<S, D, DormandPrince<S>>(dynamics, (t, end), x, tolerance, sink),
+        IntegrationMethod::Stiff => run::<S, D, Esdirk<S>>(dynamics, (t, end), x, tolerance, sink),
     }
 }
 
-fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
+fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     dynamics: &mut D,
     (mut t, end): (f64, f64),
-    mut x: D::State,
+    start: &[S],
     tolerance: &Tolerance,
     sink: &mut impl Sink<S, D>,
-) -> Simulated<D::State> {
+) -> Integrated<S> {
     let span = end - t;
+    let mut x = start.to_vec();
     let mut work = Work::default();
     let mut method = M::new(dynamics, &x);
     let mut weights = Weights::new(dynamics, &x, span, tolerance);
-    let mut events = Events::new(span);
+    let mut events = Events::new(span, &x);
     let mut next = x.clone();
     let mut spare = x.clone();
     let mut step = Step::new(&x);
@@ -88,6 +89,10 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
     let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
     let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
+    let remembers = dynamics.remembers();
+    // The next break stays where it is up to an event or to the break itself, unless steps that were taken move it.
+    let mut stop = dynamics.next_break(t).min(end);
+
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {
             return Err(Failure::StepLimit(t));
@@ -95,7 +100,9 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         if let Some(failure) = sink.ends(t) {
             return Err(failure);
         }
-        let stop = dynamics.next_break(t).min(end);
+        if remembers {
+            stop = dynamics.next_break(t).min(end);
+        }
         proposed = proposed.min(longest);
         // A step that would leave a sliver before the stop is made to reach it. It is cut, and what was proposed stands.
         let reaches = t + 1.01 * proposed >= stop;
@@ -106,7 +113,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         work.derivatives += 2 * usize::from(weights.feel(dynamics, (t, &x), rejected));
         let error = method.attempt(dynamics, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
         if !error.is_finite() || error > 1.0 {
-            if !error.is_finite() && (h < 1e-12 * span || !all_finite::<S>(x.as_ref())) {
+            if !error.is_finite() && (h < 1e-12 * span || !all_finite(&x)) {
                 return Err(Failure::Diverged(t));
             }
             proposed = h * sizes.after_rejection(error);
@@ -115,15 +122,15 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
             continue;
         }
         work.steps += 1;
-        work.rough += usize::from(weights.is_rough(h, x.as_ref()));
+        work.rough += usize::from(weights.is_rough(h, &x));
         step.begin(t, h);
-        if sink.reads_steps() || dynamics.guards() > 0 || dynamics.remembers() {
+        if sink.reads_steps() || events.are_watched() || remembers {
             method.dense(h, &x, &next, &mut step.dense);
         }
         let arrival = if reaches { stop } else { t + h };
         let event = events.first(dynamics, &mut step, (arrival, &next), &mut spare);
         sink.step(&step, dynamics);
-        if dynamics.remembers() {
+        if remembers {
             dynamics.accepted(&step);
         }
         let factor = sizes.after_acceptance(error, rejected > 0);
@@ -132,7 +139,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         let Some(index) = event else {
             std::mem::swap(&mut x, &mut next);
             t = arrival;
-            weights.follow(x.as_ref());
+            weights.follow(&x);
             if !reaches {
                 method.advance();
                 continue;
@@ -140,6 +147,7 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
             pass_break(dynamics, (t, end), &mut x, sink);
             events.settle(dynamics, t, &mut x, sink)?;
             if t < end {
+                stop = dynamics.next_break(t).min(end);
                 method.restart(dynamics, t, &x, &mut work);
             }
             continue;
@@ -163,17 +171,18 @@ fn run<S: Scalar, D: Dynamics<S>, M: Method<S, D>>(
         events.settle(dynamics, t, &mut x, sink)?;
         dynamics.delay_events(S::from(0.0));
         shift(dynamics, t, &mut x, &mut spare, -delay);
-        weights.follow(x.as_ref());
+        weights.follow(&x);
+        stop = dynamics.next_break(t).min(end);
         method.restart(dynamics, t, &x, &mut work);
     }
-    if all_finite::<S>(x.as_ref()) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
+    if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
 /// Inputs take the values of the break that was reached, which the sink is shown where it is the end.
-fn pass_break<S: Scalar, D: Dynamics<S>>(
+fn pass_break<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
     (t, end): (f64, f64),
-    x: &mut D::State,
+    x: &mut [S],
     sink: &mut impl Sink<S, D>,
 ) {
     dynamics.pass_break(t, x);
@@ -194,9 +203,8 @@ mod tests {
     /// `x'' = -x`.
     struct Oscillator;
     impl<S: Scalar> Dynamics<S> for Oscillator {
-        type State = [S; 2];
-        fn derivative(&self, _: f64, x: &[S; 2], dx: &mut [S; 2]) {
-            *dx = [x[1], -x[0]];
+        fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
+            dx.copy_from_slice(&[x[1], -x[0]]);
         }
     }
 
@@ -205,38 +213,37 @@ mod tests {
     #[test]
     fn the_harmonic_oscillator_comes_back_after_a_period() {
         let period = std::f64::consts::TAU;
-        let (x, work) = integrate(&mut Oscillator, 0.0, period, [1.0, 0.0], &TIGHT, &mut ()).unwrap();
+        let (x, work) = integrate(&mut Oscillator, 0.0, period, &[1.0, 0.0], &TIGHT, &mut ()).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-8 && x[1].abs() < 1e-8, "{x:?} {work:?}");
     }
 
     #[test]
     fn tangents_are_exact_and_change_no_value() {
-        let (plain, _) = integrate(&mut Oscillator, 0.0, 3.0, [1.0, 0.5], &TIGHT, &mut ()).unwrap();
+        let (plain, _) = integrate(&mut Oscillator, 0.0, 3.0, &[1.0, 0.5], &TIGHT, &mut ()).unwrap();
         let x0 = [Dual::<1>::variable(1.0, 0), Dual::from(0.5)];
-        let (dual, _) = integrate(&mut Oscillator, 0.0, 3.0, x0, &TIGHT, &mut ()).unwrap();
-        assert_eq!((dual[0].value, dual[1].value), (plain[0], plain[1]));
+        let (dual, _) = integrate(&mut Oscillator, 0.0, 3.0, &x0, &TIGHT, &mut ()).unwrap();
+        assert_eq!([dual[0].value, dual[1].value], [plain[0], plain[1]]);
         assert!((dual[0].tangent[0] - math::cos(3.0)).abs() < 1e-9);
     }
 
     /// `x' = x^2`, which is infinite at `t = 1` from `x = 1`.
     struct Explosion;
     impl Dynamics<f64> for Explosion {
-        type State = [f64; 1];
-        fn derivative(&self, _: f64, x: &[f64; 1], dx: &mut [f64; 1]) {
+        fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
             dx[0] = x[0] * x[0];
         }
     }
 
     #[test]
     fn a_solution_that_becomes_infinite_is_a_failure() {
-        let failure = integrate(&mut Explosion, 0.0, 2.0, [1.0], &TIGHT, &mut ()).unwrap_err();
+        let failure = integrate(&mut Explosion, 0.0, 2.0, &[1.0], &TIGHT, &mut ()).unwrap_err();
         assert!(matches!(failure, Failure::Diverged(_) | Failure::StepTooSmall(_)), "{failure:?}");
     }
 
     #[test]
     fn steps_are_limited() {
         let tolerance = Tolerance { max_steps: 10, ..TIGHT };
-        let failure = integrate(&mut Oscillator, 0.0, 100.0, [1.0, 0.0], &tolerance, &mut ()).unwrap_err();
+        let failure = integrate(&mut Oscillator, 0.0, 100.0, &[1.0, 0.0], &tolerance, &mut ()).unwrap_err();
         assert!(matches!(failure, Failure::StepLimit(_)), "{failure:?}");
     }
 
@@ -246,18 +253,17 @@ mod tests {
         bounces: Vec<f64>,
     }
     impl<S: Scalar> Dynamics<S> for Ball<S> {
-        type State = [S; 2];
-        fn derivative(&self, _: f64, x: &[S; 2], dx: &mut [S; 2]) {
-            *dx = [x[1], S::from(-9.81)];
+        fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
+            dx.copy_from_slice(&[x[1], S::from(-9.81)]);
         }
         fn guards(&self) -> usize {
             1
         }
-        fn guard(&self, _: usize, _: f64, x: &[S; 2]) -> S {
+        fn guard(&self, _: usize, _: f64, x: &[S]) -> S {
             x[0]
         }
-        fn switch(&mut self, _: usize, t: f64, x: &mut [S; 2]) -> &str {
-            *x = [S::from(0.0), -x[1] * self.rebound];
+        fn switch(&mut self, _: usize, t: f64, x: &mut [S]) -> &str {
+            x.copy_from_slice(&[S::from(0.0), -x[1] * self.rebound]);
             self.bounces.push(t);
             "bounce"
         }
@@ -266,7 +272,7 @@ mod tests {
     #[test]
     fn events_are_located_to_rounding() {
         let mut ball = Ball { rebound: 1.0, bounces: Vec::new() };
-        integrate(&mut ball, 0.0, 3.0, [1.0, 0.0], &TIGHT, &mut ()).unwrap();
+        integrate(&mut ball, 0.0, 3.0, &[1.0, 0.0], &TIGHT, &mut ()).unwrap();
         let fall = (2.0 / 9.81_f64).sqrt();
         let exact: Vec<f64> = [1.0, 3.0, 5.0].iter().map(|n| n * fall).filter(|&t| t < 3.0).collect();
         assert_eq!(ball.bounces.len(), exact.len());
@@ -287,7 +293,7 @@ mod tests {
         };
         let mut ball = Ball { rebound: Dual::<2>::variable(0.8, 1), bounces: Vec::new() };
         let start = [Dual::variable(1.0, 0), Dual::from(0.0)];
-        let (x, _) = integrate(&mut ball, 0.0, 1.2, start, &TIGHT, &mut ()).unwrap();
+        let (x, _) = integrate(&mut ball, 0.0, 1.2, &start, &TIGHT, &mut ()).unwrap();
         let h = 1e-5;
         for (i, x) in x.iter().enumerate() {
             let slopes = [

@@ -1,28 +1,16 @@
 //! Mechanisms: joints coupled by a mass matrix, with the friction of their bearings.
 
-use mops_core::{Interface, OperatingPoint, Parameter, Port, Scalar, State, Unit, Variable};
+use mops_core::{EventInstant, Failure, Instant, Interface, Parameter, Plant, Port, Scalar, State, Unit, Variable};
 
 use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};
-use super::{Dynamics, rests};
+use super::rests;
 
 /// The rigid bodies of a mechanism with `N` joints: `M(q) q'' = f(t, q, q') - friction`.
 pub trait Bodies<S: Scalar, const N: usize> {
-    /// Mass matrix (kg m2) and torques without bearing friction (N m) at angles `q` (rad) and speeds `w` (rad/s).
-    fn mass_and_force(&self, t: f64, q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]);
-
-    /// As [`Dynamics::next_break`].
-    fn next_break(&self, _t: f64) -> f64 {
-        f64::INFINITY
-    }
-
-    /// As [`Dynamics::longest_step`].
-    fn longest_step(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// As [`Dynamics::pass_break`].
-    fn pass_break(&mut self, _t: f64) {}
+    /// Mass matrix (kg m2) and torques without bearing friction (N m) under the inputs `u`, at angles `q` (rad) and speeds `w`
+    /// (rad/s).
+    fn mass_and_force(&self, t: f64, u: &[S], q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]);
 }
 
 /// A joint as the user meets it.
@@ -74,12 +62,10 @@ pub fn ports(angles: &[&str], inputs: &[&str]) -> Vec<Port> {
     joints.chain(inputs.iter().map(actuator)).chain(angles.iter().flat_map(sensors)).collect()
 }
 
-/// A mechanism with its friction, and how its joints move; the state is angle and speed of each joint in turn, `M = 2 N`.
-pub struct Mechanism<S, B, const N: usize, const M: usize> {
-    /// The bodies.
-    pub bodies: B,
-    /// Torques on the joints from outside the model, N m.
-    pub outside: [S; N],
+/// A mechanism with its friction, and how its joints move; the state is angle and speed of each joint in turn.
+pub struct Mechanism<S, B, const N: usize> {
+    bodies: B,
+    start: Vec<S>,
     friction: [BearingFriction<S>; N],
     contact: [Contact; N],
     /// Lines of the friction tables over which the joints slide.
@@ -102,10 +88,9 @@ enum Guard {
     Sign(usize),
 }
 
-impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B, N, M> {
-    /// A mechanism of bodies, the friction of its joints, and the joints.
-    pub fn new(bodies: B, friction: [BearingFriction<S>; N], joints: &[Joint; N]) -> Self {
-        const { assert!(M == 2 * N, "a state is angle and speed of each joint") };
+impl<S: Scalar, B: Bodies<S, N>, const N: usize> Mechanism<S, B, N> {
+    /// A mechanism of bodies, the friction of its joints, and the joints, from these angles and speeds on.
+    pub fn new(bodies: B, friction: [BearingFriction<S>; N], joints: &[Joint; N], start: &[S]) -> Self {
         let watched = |i: usize| {
             let sign = friction[i].drives_from().map(|_| Guard::Sign(i));
             let contact = (sign.is_some() || !friction[i].is_viscous()).then_some(Guard::Contact(i));
@@ -118,7 +103,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         let contact = std::array::from_fn(|i| if friction[i].is_viscous() { Contact::Forward } else { Contact::Stuck });
         Self {
             bodies,
-            outside: [S::from(0.0); N],
+            start: start.to_vec(),
             friction,
             contact,
             line: [0; N],
@@ -134,24 +119,8 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
         &self.contact
     }
 
-    /// Takes the modes of an operating point, for a look at the equations alone: joints slide the way they move, those at
-    /// rest have no dry friction. Gives the indices of joints whose friction is left out.
-    pub fn look(&mut self, at: &OperatingPoint<'_, S>) -> Vec<usize> {
-        let mut left_out = Vec::new();
-        for i in 0..N {
-            let speed = at.states[2 * i + 1];
-            if rests(at, speed) && !self.friction[i].is_viscous() {
-                left_out.push(i);
-                self.friction[i] = BearingFriction::none();
-            }
-            self.contact[i] = Contact::of(speed.value());
-            self.line[i] = self.friction[i].table().line_at(speed.abs());
-        }
-        left_out
-    }
-
     /// Angles and speeds.
-    fn split(x: &[S; M]) -> ([S; N], [S; N]) {
+    fn split(x: &[S]) -> ([S; N], [S; N]) {
         (std::array::from_fn(|i| x[2 * i]), std::array::from_fn(|i| x[2 * i + 1]))
     }
 
@@ -166,23 +135,23 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
     }
 
     #[inline]
-    fn mass_and_force(&self, t: f64, q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]) {
-        let (mass, mut force) = self.bodies.mass_and_force(t, q, w);
-        force.iter_mut().zip(self.outside).for_each(|(force, outside)| *force += outside);
+    fn mass_and_force(&self, at: &Instant<'_, S>, q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]) {
+        let (mass, mut force) = self.bodies.mass_and_force(at.t, at.u, q, w);
+        force.iter_mut().zip(at.w).for_each(|(force, &outside)| *force += outside);
         (mass, force)
     }
 
     /// Accelerations and friction torques.
-    fn balance(&self, t: f64, x: &[S; M]) -> ([S; N], [S; N]) {
-        let (q, w) = Self::split(x);
-        let (mass, force) = self.mass_and_force(t, &q, &w);
+    fn balance(&self, at: &Instant<'_, S>) -> ([S; N], [S; N]) {
+        let (q, w) = Self::split(at.x);
+        let (mass, force) = self.mass_and_force(at, &q, &w);
         let sliding = std::array::from_fn(|i| self.sliding(i, w[i]).1);
         balance(&mass, &force, &sliding, &self.contact)
     }
 
-    fn settle(&mut self, t: f64, x: &[S; M], wish: &[Contact; N], released: Option<usize>) {
-        let (q, w) = Self::split(x);
-        let (mass, force) = self.mass_and_force(t, &q, &w);
+    fn find_contacts(&mut self, at: &Instant<'_, S>, wish: &[Contact; N], released: Option<usize>) {
+        let (q, w) = Self::split(at.x);
+        let (mass, force) = self.mass_and_force(at, &q, &w);
         let mass = mass.map(|row| row.map(Scalar::value));
         let (force, speed) = (force.map(Scalar::value), w.map(Scalar::value));
         let sliding = std::array::from_fn(|i| self.friction[i].sliding(w[i].abs()).value());
@@ -194,17 +163,16 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Mechanism<S, B,
     }
 }
 
-impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for Mechanism<S, B, N, M> {
-    type State = [S; M];
-
-    fn shows(&self, signal: usize) -> Option<usize> {
-        (signal < M).then_some(signal)
+impl<S: Scalar, B: Bodies<S, N>, const N: usize> Plant<S> for Mechanism<S, B, N> {
+    fn start(&self) -> Vec<S> {
+        self.start.clone()
     }
 
-    fn derivative(&self, t: f64, x: &[S; M], dx: &mut [S; M]) {
-        let (acceleration, _) = self.balance(t, x);
+    #[inline]
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let (acceleration, _) = self.balance(at);
         for i in 0..N {
-            dx[2 * i] = x[2 * i + 1];
+            dx[2 * i] = at.x[2 * i + 1];
             dx[2 * i + 1] = acceleration[i];
         }
     }
@@ -213,22 +181,24 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for
         self.guards.len()
     }
 
-    fn guard(&self, index: usize, t: f64, x: &[S; M]) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+        let speed = |i: usize| at.x[2 * i + 1];
         match self.guards[index] {
             Guard::Contact(i) if self.contact[i] == Contact::Stuck => {
-                self.friction[i].limit() - self.balance(t, x).1[i].abs()
+                self.friction[i].limit() - self.balance(at).1[i].abs()
             }
-            Guard::Contact(i) => x[2 * i + 1] * self.contact[i].sign(),
+            Guard::Contact(i) => speed(i) * self.contact[i].sign(),
             Guard::Line(i) | Guard::Sign(i) if self.contact[i] == Contact::Stuck => S::from(1.0),
-            Guard::Line(i) => self.friction[i].table().guard(self.line[i], self.sliding(i, x[2 * i + 1]).0),
+            Guard::Line(i) => self.friction[i].table().guard(self.line[i], self.sliding(i, speed(i)).0),
             Guard::Sign(i) => {
-                let torque = self.sliding(i, x[2 * i + 1]).1;
+                let torque = self.sliding(i, speed(i)).1;
                 if self.drives[i] { -torque } else { torque }
             }
         }
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut [S; M]) -> &str {
+    fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
+        let at = event.at;
         match self.guards[index] {
             Guard::Line(i) => {
                 let (speed, _) = self.sliding(i, x[2 * i + 1]);
@@ -243,30 +213,35 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize, const M: usize> Dynamics<S> for
                 let mut wish = self.contact;
                 let was_stuck = self.contact[i] == Contact::Stuck;
                 if was_stuck {
-                    wish[i] = Contact::of(self.balance(t, x).1[i].value());
+                    wish[i] = Contact::of(self.balance(&at).1[i].value());
                 } else {
                     wish[i] = Contact::Stuck;
                     x[2 * i + 1] = S::from(0.0);
                 }
-                self.settle(t, x, &wish, was_stuck.then_some(i));
+                self.find_contacts(&Instant { x, ..at }, &wish, was_stuck.then_some(i));
                 self.events[i][usize::from(self.contact[i] != Contact::Stuck)]
             }
         }
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        self.bodies.next_break(t)
-    }
-
-    fn longest_step(&self) -> f64 {
-        self.bodies.longest_step()
-    }
-
-    fn pass_break(&mut self, t: f64, x: &mut [S; M]) {
-        self.bodies.pass_break(t);
+    fn settle(&mut self, at: &Instant<'_, S>) {
         let wish = if self.started { self.contact } else { [Contact::Stuck; N] };
         self.started = true;
-        self.settle(t, x, &wish, None);
+        self.find_contacts(at, &wish, None);
+    }
+
+    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
+        let mut left_out = Vec::new();
+        for i in 0..N {
+            let speed = at.x[2 * i + 1];
+            if rests(at_rest, speed) && !self.friction[i].is_viscous() {
+                left_out.push(2 * i);
+                self.friction[i] = BearingFriction::none();
+            }
+            self.contact[i] = Contact::of(speed.value());
+            self.line[i] = self.friction[i].table().line_at(speed.abs());
+        }
+        Ok(left_out)
     }
 }
 

@@ -1,8 +1,46 @@
 //! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
 
+/// Evaluates an expression with the constant `$N` as the number of states, where it is small and there are no tangents; else with 0,
+/// which stands for any number. Loops over few states of a known number take half the time; with tangents it matters little.
+macro_rules! by_size {
+    ($states:expr, $S:ty, $N:ident => $body:expr) => {
+        match if <$S as mops_core::Scalar>::DIRECTIONS == 0 { $states } else { 0 } {
+            1 => {
+                const $N: usize = 1;
+                $body
+            }
+            2 => {
+                const $N: usize = 2;
+                $body
+            }
+            3 => {
+                const $N: usize = 3;
+                $body
+            }
+            4 => {
+                const $N: usize = 4;
+                $body
+            }
+            5 => {
+                const $N: usize = 5;
+                $body
+            }
+            6 => {
+                const $N: usize = 6;
+                $body
+            }
+            _ => {
+                const $N: usize = 0;
+                $body
+            }
+        }
+    };
+}
+
 mod banded;
 mod dormand_prince;
 pub mod drive;
+mod driven;
 pub mod elements;
 mod esdirk;
 mod events;
@@ -10,36 +48,51 @@ pub mod friction;
 mod integrate;
 mod local;
 pub mod mechanism;
-mod opened;
+mod plant_model;
 mod record;
 mod step;
 mod step_size;
 mod weights;
-mod written;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
 
 pub use mops_core::{IntegrationMethod, Tolerance};
 
+use dormand_prince::DormandPrince;
+pub use driven::Driven;
+use integrate::Attempt;
 pub use integrate::integrate;
-pub use local::{Equations, local, rates_and_signals, rests};
-pub use opened::{Holds, Opened};
-pub use record::{Recording, Simulate, Wanted, analyse, record, tangents, tangents_of, wanted};
+pub(crate) use local::rests;
+pub(crate) use plant_model::shown;
+pub use plant_model::{PlantModel, Simulated};
+pub(crate) use record::{Recording, record, tangents_of, wanted};
 pub use step::Step;
-pub use written::{Kernel, Written};
 
-/// `x' = f(t, x)`, with modes between which events switch. Parameters, inputs and the mode are the implementor's own.
+/// What the integrator steps: a closed system `x' = f(t, x)`, with modes between which events switch. Its inputs are its own.
 ///
-/// The equations are written once over [`Scalar`], so that they run with values and with tangents. Tangents are exact,
-/// the jumps at events included. States are `[S; N]` where a model's size is known, `Vec<S>` where it is not; neither
-/// allocates in the step loop.
+/// [`Driven`] is a [`mops_core::Plant`] as such a system; a model is a plant.
 pub trait Dynamics<S: Scalar> {
-    /// The state vector.
-    type State: AsRef<[S]> + AsMut<[S]> + Clone;
-
     /// Writes `x'` at time `t` in the present mode. Within a step the mode and its inputs are smooth.
-    fn derivative(&self, t: f64, x: &Self::State, dx: &mut Self::State);
+    fn derivative(&self, t: f64, x: &[S], dx: &mut [S]);
+
+    /// A step of the explicit method, tried: the state after it goes to `next`, and the norm of its errors comes back. Provided here,
+    /// so that the stages are compiled together with the equations: as calls these would cost a third of a simulation.
+    #[doc(hidden)]
+    fn attempt(&self, method: &mut DormandPrince<S>, at: Attempt<'_, S>, next: &mut [S]) -> f64 {
+        by_size!(at.x.len(), S, N => method.attempt_of::<Self, N>(self, at, next))
+    }
+
+    /// The value of a signal; where not said otherwise, signals are the states.
+    fn signal(&self, signal: usize, _t: f64, x: &[S]) -> S {
+        x[signal]
+    }
+
+    /// The values of a signal at several instants. Provided here, so that it is compiled together with the signal.
+    #[doc(hidden)]
+    fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
+        std::array::from_fn(|k| self.signal(signal, times[k], &states[k]))
+    }
 
     /// Number of guards in the present mode.
     fn guards(&self) -> usize {
@@ -47,18 +100,24 @@ pub trait Dynamics<S: Scalar> {
     }
 
     /// The value of a guard: the mode holds while it is not negative.
-    fn guard(&self, _index: usize, _t: f64, _x: &Self::State) -> S {
+    fn guard(&self, _index: usize, _t: f64, _x: &[S]) -> S {
         S::from(1.0)
     }
 
     /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
     /// event, whose time moves too. Returns what happened; an empty text where a user need not know.
-    fn switch(&mut self, _index: usize, _t: f64, _x: &mut Self::State) -> &str {
+    fn switch(&mut self, _index: usize, _t: f64, _x: &mut [S]) -> &str {
         ""
     }
 
+    /// The values of a guard at several instants; provided here as [`Dynamics::signal_at`].
+    #[doc(hidden)]
+    fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
+        std::array::from_fn(|k| self.guard(index, times[k], &states[k]))
+    }
+
     /// The rate of a guard along the solution, per s; `None` where only values of the guard tell it.
-    fn guard_rate(&self, _index: usize, _t: f64, _x: &Self::State) -> Option<f64> {
+    fn guard_rate(&self, _index: usize, _t: f64, _x: &[S]) -> Option<f64> {
         None
     }
 
@@ -78,7 +137,7 @@ pub trait Dynamics<S: Scalar> {
     ///
     /// # Errors
     /// There is no such state: which events accumulate, and the way out. The simulation fails.
-    fn rest(&mut self, _index: usize, _t: f64, _close: f64, _x: &mut Self::State) -> Result<&str, String> {
+    fn rest(&mut self, _index: usize, _t: f64, _close: f64, _x: &mut [S]) -> Result<&str, String> {
         Err("a mode of the model changes to and fro without end".to_owned())
     }
 
@@ -119,12 +178,12 @@ pub trait Dynamics<S: Scalar> {
 
     /// Tells every entry of the Jacobian `df/dx` as row, column and value, and returns `true`; `false` where the
     /// implementor has no exact one, and differences must do.
-    fn jacobian(&self, _t: f64, _x: &Self::State, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+    fn jacobian(&self, _t: f64, _x: &[S], _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         false
     }
 
     /// A break was reached (also called once at the start): inputs take their new values.
-    fn pass_break(&mut self, _t: f64, _x: &mut Self::State) {}
+    fn pass_break(&mut self, _t: f64, _x: &mut [S]) {}
 
     /// Whether it wants to be told of accepted steps.
     fn remembers(&self) -> bool {
@@ -132,7 +191,7 @@ pub trait Dynamics<S: Scalar> {
     }
 
     /// A step was accepted: a delay keeps what will come out of it later.
-    fn accepted(&mut self, _step: &Step<Self::State>) {}
+    fn accepted(&mut self, _step: &Step<S>) {}
 }
 
 /// A time that a model's options give under `key`, in s.
@@ -144,9 +203,9 @@ pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, Mistak
 }
 
 /// What the integrator tells of a simulation: steps, then events.
-pub trait Sink<S: Scalar, D: Dynamics<S>> {
+pub trait Sink<S: Scalar, D: Dynamics<S> + ?Sized> {
     /// A step was accepted; `dynamics` is in the mode that held during it.
-    fn step(&mut self, step: &Step<D::State>, dynamics: &D);
+    fn step(&mut self, step: &Step<S>, dynamics: &D);
     /// Whether it reads states within steps; if not, they are not prepared.
     fn reads_steps(&self) -> bool {
         true
@@ -156,18 +215,18 @@ pub trait Sink<S: Scalar, D: Dynamics<S>> {
         None
     }
     /// The end was reached: inputs have their values of that instant.
-    fn end(&mut self, _t: f64, _x: &D::State, _dynamics: &D) {}
+    fn end(&mut self, _t: f64, _x: &[S], _dynamics: &D) {}
     /// The mode changed.
     fn event(&mut self, _t: f64, _what: &str) {}
 }
 
 /// Nobody listens.
-impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for () {
-    fn step(&mut self, _: &Step<D::State>, _: &D) {}
+impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for () {
+    fn step(&mut self, _: &Step<S>, _: &D) {}
     fn reads_steps(&self) -> bool {
         false
     }
 }
 
 /// What a simulation gives: the last state, and the work.
-pub type Simulated<X> = Result<(X, Work), Failure>;
+pub type Integrated<S> = Result<(Vec<S>, Work), Failure>;

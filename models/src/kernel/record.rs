@@ -15,34 +15,6 @@ pub struct Recording {
     pub tangents: Vec<Response>,
 }
 
-/// What a time-domain model does once, over the scalar.
-pub trait Simulate {
-    /// Simulates a job; `parameters` stand for those of the job, with tangents.
-    ///
-    /// # Errors
-    /// The failure of the simulation.
-    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure>;
-}
-
-/// [`mops_core::Model::analyse`] of a model that can [`Simulate`].
-///
-/// # Errors
-/// The failure of the simulation.
-pub fn analyse(model: &impl Simulate, job: &Job<'_>) -> Result<Analysis, Failure> {
-    model.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
-}
-
-/// [`mops_core::Model::tangents`] of a model that can [`Simulate`]: [`DIRECTIONS`] directions in one simulation.
-///
-/// # Errors
-/// The failure of the simulation.
-pub fn tangents(model: &impl Simulate, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
-    if seeds.is_empty() {
-        return analyse(model, job).map(|analysis| (analysis, Vec::new()));
-    }
-    tangents_of(|parameters| model.simulate(job, parameters), job.parameters, seeds)
-}
-
 /// The analysis and its tangents along the seeds, of which there is one at least, by a simulation over the scalar.
 ///
 /// # Errors
@@ -92,19 +64,19 @@ const FIRST_ROOM: usize = 16 << 20;
 const SEGMENT: usize = 6 * size_of::<f64>();
 
 /// Records signals along the steps.
-struct Recorder<'a, X, F> {
+struct Recorder<'a, S> {
     signals: &'a [(usize, String)],
+    /// The states that they show as they are.
+    shows: Vec<Option<usize>>,
     cancellation: &'a Cancellation,
     /// Bytes recorded so far, and how many may be.
     taken: usize,
     room: usize,
-    /// The value of a signal, by its index, at a time and a state.
-    output: &'a F,
     /// Traces of the signals, then of their tangents along every direction in turn.
     traces: Vec<Vec<Trace>>,
     events: Vec<Event>,
     /// The state at [`Trace::NODES`].
-    states: [X; 5],
+    states: [Vec<S>; 5],
     resolved: Vec<Resolved>,
     tolerance: &'a Tolerance,
 }
@@ -152,9 +124,9 @@ const WEIGHTS: [f64; 5] = {
     weights
 };
 
-impl<X: Clone, F> Recorder<'_, X, F> {
+impl<S: Scalar> Recorder<'_, S> {
     /// Adds a segment that ends at `end` to the traces of a signal.
-    fn push<S: Scalar>(&mut self, index: usize, end: f64, values: &[S; 5]) {
+    fn push(&mut self, index: usize, end: f64, values: &[S; 5]) {
         self.taken += SEGMENT * (1 + S::DIRECTIONS);
         self.traces[0][index].push(end, values.map(Scalar::value));
         for direction in 0..S::DIRECTIONS {
@@ -169,7 +141,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
     }
 
     /// Whether the quartic through the values is what the signal is near both ends. What is not finite is left alone.
-    fn agrees<S: Scalar>(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
+    fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
         let [first, last] = [CHECK, 1.0 - CHECK].map(|s| signal(s).value());
         let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
             WEIGHTS.iter().enumerate().map(|(k, weight)| weight * values[node(k)].value()).sum()
@@ -181,7 +153,7 @@ impl<X: Clone, F> Recorder<'_, X, F> {
 
     /// Whether the quartic of a step of this length must be compared with the signal: the step is longer than those that
     /// were, or the quartic does not go on from the last one as smoothly as it should.
-    fn must_compare<S: Scalar>(&mut self, index: usize, length: f64, values: &[S; 5]) -> bool {
+    fn must_compare(&mut self, index: usize, length: f64, values: &[S; 5]) -> bool {
         let slope = |weight: &dyn Fn(usize) -> f64| (0..5).map(|k| weight(k) * values[k].value()).sum::<f64>() / length;
         let begin = slope(&|k| SLOPE[k]);
         let off = (begin - self.resolved[index].slope).abs() * length;
@@ -190,16 +162,14 @@ impl<X: Clone, F> Recorder<'_, X, F> {
     }
 
     /// Adds the part `[from, to]` of a step to the traces of a signal, in halves where one quartic does not do.
-    fn refine<S: Scalar>(
+    fn refine(
         &mut self,
-        step: &Step<X>,
+        step: &Step<S>,
         index: usize,
         [from, to]: [f64; 2],
         halvings: u32,
-        signal: &impl Fn(f64, &X) -> S,
-    ) where
-        X: AsRef<[S]> + AsMut<[S]>,
-    {
+        signal: &impl Fn(f64, &[S]) -> S,
+    ) {
         let mut state = self.states[0].clone();
         let mut at = |s: f64| {
             let s = from + s * (to - from);
@@ -222,28 +192,25 @@ fn largest<S: Scalar>(values: &[S; 5]) -> f64 {
     values.iter().fold(0.0, |most, value| most.max(value.value().abs()))
 }
 
-impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D> for Recorder<'_, D::State, F> {
-    fn step(&mut self, step: &Step<D::State>, dynamics: &D) {
-        let computes = self.signals.iter().any(|(signal, _)| dynamics.shows(*signal).is_none());
+impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
+    fn step(&mut self, step: &Step<S>, dynamics: &D) {
+        let computes = self.shows.iter().any(Option::is_none);
         if computes {
-            for (state, s) in self.states.iter_mut().zip(Trace::NODES) {
-                step.state(s, state);
-            }
+            step.states(&Trace::NODES, &mut self.states);
         }
         let end = step.start + step.taken;
         for (i, (signal, _)) in self.signals.iter().enumerate() {
-            if let Some(state) = dynamics.shows(*signal) {
+            if let Some(state) = self.shows[i] {
                 let value = |node: usize| match computes {
-                    true => self.states[node].as_ref()[state],
+                    true => self.states[node][state],
                     false => step.component(Trace::NODES[node], state),
                 };
                 self.push(i, end, &std::array::from_fn(value));
                 continue;
             }
-            let output = self.output;
-            let computed = |t: f64, x: &D::State| output(dynamics, *signal, t, x);
+            let computed = |t: f64, x: &[S]| dynamics.signal(*signal, t, x);
             let time = |s: f64| step.start + s * step.taken;
-            let values: [S; 5] = std::array::from_fn(|node| computed(time(Trace::NODES[node]), &self.states[node]));
+            let values = dynamics.signal_at(*signal, &Trace::NODES.map(time), &self.states);
             self.resolved[i].size = self.resolved[i].size.max(largest(&values));
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
@@ -271,13 +238,13 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
         }
     }
 
-    fn end(&mut self, t: f64, x: &D::State, dynamics: &D) {
+    fn end(&mut self, t: f64, x: &[S], dynamics: &D) {
         for (i, (signal, _)) in self.signals.iter().enumerate() {
-            if dynamics.shows(*signal).is_some() {
+            if self.shows[i].is_some() {
                 continue;
             }
             // An input that jumps at the end is seen in what follows it at once.
-            let value = (self.output)(dynamics, *signal, t, x);
+            let value = dynamics.signal(*signal, t, x);
             let before = self.traces[0][i].last();
             if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {
                 self.traces[0][i].jump_at_end(value.value());
@@ -297,42 +264,40 @@ impl<S: Scalar, D: Dynamics<S>, F: Fn(&D, usize, f64, &D::State) -> S> Sink<S, D
     }
 }
 
-/// Simulates from 0 to `end` and records signals; `output` gives the value of one.
+/// Simulates from 0 to `end` and records signals.
 ///
 /// # Errors
 /// The failure of the simulation.
-pub fn record<S: Scalar, D: Dynamics<S>>(
+pub fn record<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
-    start: D::State,
+    start: &[S],
     end: f64,
     tolerance: &Tolerance,
     wanted: &Wanted,
-    output: &impl Fn(&D, usize, f64, &D::State) -> S,
 ) -> Result<Recording, Failure> {
-    record_within(ROOM, dynamics, (start, end), tolerance, wanted, output)
+    record_within(ROOM, dynamics, (start, end), tolerance, wanted)
 }
 
 /// [`record`] with the bytes that it may take.
-fn record_within<S: Scalar, D: Dynamics<S>>(
+fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
     room: usize,
     dynamics: &mut D,
-    (start, end): (D::State, f64),
+    (start, end): (&[S], f64),
     tolerance: &Tolerance,
     wanted: &Wanted,
-    output: &impl Fn(&D, usize, f64, &D::State) -> S,
 ) -> Result<Recording, Failure> {
     let Wanted { signals, cancellation } = wanted;
     let traces = (1 + S::DIRECTIONS) * signals.len();
     let segments = (FIRST_ROOM / SEGMENT / traces.max(1)).min(256);
     let mut recorder = Recorder {
         signals,
+        shows: signals.iter().map(|(signal, _)| dynamics.shows(*signal)).collect(),
         cancellation,
         taken: 0,
         room,
-        output,
         traces: vec![vec![Trace::starting_at(0.0, segments); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
-        states: std::array::from_fn(|_| start.clone()),
+        states: std::array::from_fn(|_| start.to_vec()),
         resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
         tolerance,
     };

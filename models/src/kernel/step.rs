@@ -4,7 +4,7 @@ use mops_core::Scalar;
 use mops_core::enclosure::{Enclosure, Interval};
 
 /// An accepted step from `start` to `start + taken`, with its dense output.
-pub struct Step<X> {
+pub struct Step<S> {
     /// Time at which it begins, s.
     pub start: f64,
     /// Length of the step for which the dense output was made, s.
@@ -13,17 +13,15 @@ pub struct Step<X> {
     pub taken: f64,
     /// The same part as a share of `length`.
     pub(super) share: f64,
-    /// `r0 .. r4` of [`Step::at`].
-    pub(super) dense: [X; 5],
+    /// `r0 .. r4` of [`Step::at`], each for all states.
+    pub(super) dense: [Vec<S>; 5],
 }
 
-impl<X: Clone> Step<X> {
-    pub(super) fn new(x: &X) -> Self {
-        Self { start: 0.0, length: 0.0, taken: 0.0, share: 1.0, dense: std::array::from_fn(|_| x.clone()) }
+impl<S: Scalar> Step<S> {
+    pub(super) fn new(x: &[S]) -> Self {
+        Self { start: 0.0, length: 0.0, taken: 0.0, share: 1.0, dense: std::array::from_fn(|_| x.to_vec()) }
     }
-}
 
-impl<X> Step<X> {
     /// A new step, of which all holds.
     #[inline]
     pub(super) fn begin(&mut self, start: f64, length: f64) {
@@ -43,55 +41,69 @@ impl<X> Step<X> {
 
     /// The state at `start + s taken`, `s` in [0, 1].
     #[inline]
-    pub fn state<S: Scalar>(&self, s: f64, x: &mut X)
-    where
-        X: AsRef<[S]> + AsMut<[S]>,
-    {
+    pub fn state(&self, s: f64, x: &mut [S]) {
         self.at(s * self.share, x);
     }
 
+    /// The states at the shares `nodes` of what holds of the step.
+    pub(super) fn states<const K: usize>(&self, nodes: &[f64; K], states: &mut [Vec<S>; K]) {
+        self.states_at(&nodes.map(|s| s * self.share), states);
+    }
+
+    /// The states at these shares of its length.
+    pub(super) fn states_at<const K: usize>(&self, thetas: &[f64; K], states: &mut [Vec<S>; K]) {
+        by_size!(self.dense[0].len(), S, N => states_of::<S, N>(&self.dense, thetas, states));
+    }
+
     /// One component of [`Step::state`].
-    #[inline]
-    pub(super) fn component<S: Scalar>(&self, s: f64, i: usize) -> S
-    where
-        X: AsRef<[S]>,
-    {
-        let theta = s * self.share;
-        let back = 1.0 - theta;
+    #[inline(always)]
+    pub(super) fn component(&self, s: f64, i: usize) -> S {
         let [r0, r1, r2, r3, r4] = &self.dense;
-        let (r0, r1, r2, r3, r4) = (r0.as_ref()[i], r1.as_ref()[i], r2.as_ref()[i], r3.as_ref()[i], r4.as_ref()[i]);
-        r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
+        value([r0[i], r1[i], r2[i], r3[i], r4[i]], s * self.share)
     }
 
     /// The state at `start + theta length`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
     #[inline]
-    pub(super) fn at<S: Scalar>(&self, theta: f64, x: &mut X)
-    where
-        X: AsRef<[S]> + AsMut<[S]>,
-    {
-        let back = 1.0 - theta;
-        let [r0, r1, r2, r3, r4] = &self.dense;
-        let (r0, r1, r2, r3, r4) = (r0.as_ref(), r1.as_ref(), r2.as_ref(), r3.as_ref(), r4.as_ref());
-        for (i, x) in x.as_mut().iter_mut().enumerate() {
-            *x = r0[i] + (r1[i] + (r2[i] + (r3[i] + r4[i] * back) * theta) * back) * theta;
-        }
+    pub(super) fn at(&self, theta: f64, x: &mut [S]) {
+        by_size!(x.len(), S, N => state_of::<S, N>(&self.dense, theta, x));
     }
 
     /// Bounds of the values of all components from the share `from` to the share `to`, and of their rates.
-    pub(super) fn enclose<S: Scalar>(&self, from: f64, to: f64, bounds: &mut Vec<Enclosure>)
-    where
-        X: AsRef<[S]>,
-    {
+    pub(super) fn enclose(&self, from: f64, to: f64, bounds: &mut Vec<Enclosure>) {
         let (m, radius) = (0.5 * (from + to), 0.5 * (to - from));
         let per_second = Interval::point(1.0 / self.length);
-        let [r0, r1, r2, r3, r4] = &self.dense;
         bounds.clear();
-        bounds.extend((0..r0.as_ref().len()).map(|i| {
-            let r = [r0, r1, r2, r3, r4].map(|r| r.as_ref()[i].value());
-            let Enclosure { value, rate } = Enclosure::of_polynomial(&taylor(r, m), radius);
+        bounds.extend((0..self.dense[0].len()).map(|i| {
+            let [r0, r1, r2, r3, r4] = &self.dense;
+            let dense = [r0[i], r1[i], r2[i], r3[i], r4[i]];
+            let Enclosure { value, rate } = Enclosure::of_polynomial(&taylor(dense.map(|r| r.value()), m), radius);
             Enclosure { value, rate: rate * per_second }
         }));
     }
+}
+
+#[inline(always)]
+fn states_of<S: Scalar, const N: usize>(dense: &[Vec<S>; 5], thetas: &[f64], states: &mut [Vec<S>]) {
+    for (state, &theta) in states.iter_mut().zip(thetas) {
+        state_of::<S, N>(dense, theta, state);
+    }
+}
+
+/// The dense output of `N` states; 0 stands for any number.
+#[inline(always)]
+fn state_of<S: Scalar, const N: usize>([r0, r1, r2, r3, r4]: &[Vec<S>; 5], theta: f64, x: &mut [S]) {
+    let n = if N == 0 { x.len() } else { N };
+    let (x, r0, r1, r2, r3, r4) = (&mut x[..n], &r0[..n], &r1[..n], &r2[..n], &r3[..n], &r4[..n]);
+    for j in 0..n {
+        x[j] = value([r0[j], r1[j], r2[j], r3[j], r4[j]], theta);
+    }
+}
+
+/// The dense output of a state at a share of the step.
+#[inline(always)]
+fn value<S: Scalar>([r0, r1, r2, r3, r4]: [S; 5], theta: f64) -> S {
+    let back = 1.0 - theta;
+    r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
 }
 
 /// Coefficients of the dense output in powers of `theta - m`.
@@ -112,7 +124,7 @@ mod tests {
     fn bounds_hold_the_dense_output_and_its_slope() {
         let mut step = Step::new(&[0.0]);
         step.begin(2.0, 0.5);
-        step.dense = [[1.0], [-2.0], [3.0], [0.5], [-4.0]];
+        step.dense = [1.0, -2.0, 3.0, 0.5, -4.0].map(|r| vec![r]);
         let mut bounds = Vec::new();
         let at = |theta: f64| {
             let mut x = [0.0];

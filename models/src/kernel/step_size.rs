@@ -75,16 +75,15 @@ fn exp2(x: f64) -> f64 {
 /// A first guess of the step size (algorithm II.4.14 of the source), with times in units of the interval and each state in
 /// units of its size, or where it starts at 0 of what it becomes at its first rate in a thousandth of the interval: so that the
 /// guess depends on no unit.
-pub(super) fn first_step<S: Scalar, D: Dynamics<S>>(
+pub(super) fn first_step<S: Scalar, D: Dynamics<S> + ?Sized>(
     f: &D,
     (t, end): (f64, f64),
-    x: &D::State,
-    slope: &D::State,
+    x: &[S],
+    slope: &[S],
     order: f64,
 ) -> f64 {
     let span = end - t;
-    let slope = slope.as_ref();
-    let size = |i: usize| match x.as_ref()[i].value().abs() {
+    let size = |i: usize| match x[i].value().abs() {
         0.0 => 1e-3 * span * slope[i].value().abs(),
         size => size,
     };
@@ -95,17 +94,17 @@ pub(super) fn first_step<S: Scalar, D: Dynamics<S>>(
         let n = v.len().max(1) as f64;
         ((0..v.len()).map(|i| ratio(i) * ratio(i)).sum::<f64>() / n).sqrt()
     };
-    let (mut stage, mut derivative) = (x.clone(), x.clone());
-    let (d0, d1) = (scaled(x.as_ref()), span * scaled(slope));
+    let (mut stage, mut derivative) = (x.to_vec(), x.to_vec());
+    let (d0, d1) = (scaled(x), span * scaled(slope));
     let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { (0.01 * d0 / d1).min(1.0) };
-    for (i, s) in stage.as_mut().iter_mut().enumerate() {
-        *s = x.as_ref()[i] + slope[i] * (h0 * span);
+    for (i, s) in stage.iter_mut().enumerate() {
+        *s = x[i] + slope[i] * (h0 * span);
     }
     f.derivative(t + h0 * span, &stage, &mut derivative);
-    for (i, s) in stage.as_mut().iter_mut().enumerate() {
-        *s = derivative.as_ref()[i] - slope[i];
+    for (i, s) in stage.iter_mut().enumerate() {
+        *s = derivative[i] - slope[i];
     }
-    let d2 = span * scaled(stage.as_ref()) / h0;
+    let d2 = span * scaled(&stage) / h0;
     let largest = d1.max(d2);
     let h1 = if largest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { math::powf(0.01 / largest, 1.0 / order) };
     let h = (100.0 * h0).min(h1).min(1.0) * span;

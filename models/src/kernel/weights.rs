@@ -16,7 +16,7 @@ use super::Dynamics;
 /// No error is asked for that rounding hides: the rates of states that are differences of large numbers are rough, and a step
 /// of length `h` leaves `h` times that roughness whatever its length (see [`Weights::feel`]).
 #[derive(Debug, Clone)]
-pub(super) struct Weights {
+pub struct Weights {
     relative: f64,
     /// A floor is the first number, plus the second times the scale of its state.
     floor: [f64; 2],
@@ -49,8 +49,8 @@ const OFTEN: usize = 64;
 const PERTURBATION: f64 = 16.0 * f64::EPSILON;
 
 impl Weights {
-    pub(super) fn new<S: Scalar, D: Dynamics<S>>(f: &D, x: &D::State, span: f64, tolerance: &Tolerance) -> Self {
-        let n = x.as_ref().len();
+    pub(super) fn new<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, x: &[S], span: f64, tolerance: &Tolerance) -> Self {
+        let n = x.len();
         let scales = (0..n).map(|i| f.scale(i).unwrap_or(0.0)).collect();
         let mut weights = Self {
             relative: tolerance.relative,
@@ -64,30 +64,41 @@ impl Weights {
             smooth: f64::INFINITY,
             attempts: 0,
         };
-        weights.follow(x.as_ref());
+        weights.follow(x);
         weights
     }
 
     /// Takes the sizes of an accepted state into account.
     #[inline]
     pub(super) fn follow<S: Scalar>(&mut self, x: &[S]) {
-        let (scales, floors) = (&mut self.scales[..x.len()], &mut self.floors[..x.len()]);
-        for (j, x) in x.iter().enumerate() {
-            scales[j] = larger(scales[j], x.value().abs());
+        by_size!(x.len(), S, N => self.follow_of::<S, N>(x));
+    }
+
+    #[inline(always)]
+    fn follow_of<S: Scalar, const N: usize>(&mut self, x: &[S]) {
+        let n = if N == 0 { x.len() } else { N };
+        let (scales, floors, x) = (&mut self.scales[..n], &mut self.floors[..n], &x[..n]);
+        for j in 0..n {
+            scales[j] = larger(scales[j], x[j].value().abs());
             floors[j] = self.floor[0] + self.floor[1] * scales[j];
         }
     }
 
     /// Finds out how rough the rates are, every so many attempts and where steps are rejected again and again: the rates are
     /// compared with those of a state whose components differ by a few units in the last place, each by another share.
-    pub(super) fn feel<S: Scalar, D: Dynamics<S>>(&mut self, f: &D, (t, x): (f64, &D::State), rejected: usize) -> bool {
+    pub(super) fn feel<S: Scalar, D: Dynamics<S> + ?Sized>(
+        &mut self,
+        f: &D,
+        (t, x): (f64, &[S]),
+        rejected: usize,
+    ) -> bool {
         self.attempts += 1;
         if self.attempts < OFTEN && rejected != 3 {
             return false;
         }
         self.attempts = 0;
-        let (mut moved, mut here, mut there) = (x.clone(), x.clone(), x.clone());
-        for (i, x) in moved.as_mut().iter_mut().enumerate() {
+        let (mut moved, mut here, mut there) = (x.to_vec(), x.to_vec(), x.to_vec());
+        for (i, x) in moved.iter_mut().enumerate() {
             // Shares of the golden ratio: no two states move alike, so that their differences move too.
             #[allow(clippy::cast_precision_loss)]
             let share = 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
@@ -95,7 +106,7 @@ impl Weights {
         }
         f.derivative(t, x, &mut here);
         f.derivative(t, &moved, &mut there);
-        let differences = here.as_ref().iter().zip(there.as_ref()).map(|(a, b)| (a.value() - b.value()).abs());
+        let differences = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs());
         for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
             *roughness = if difference.is_finite() { difference } else { 0.0 };
         }
@@ -105,21 +116,11 @@ impl Weights {
         true
     }
 
-    /// Root mean square of the errors of `n` states over their weights in a step of length `h`; each comes with the sizes of
-    /// its state at both ends of the step, and of its rate at the end.
-    #[inline(always)] // With the number of states known, the divisions go in pairs.
-    #[allow(clippy::cast_precision_loss)]
-    pub(super) fn norm(&self, h: f64, n: usize, error: impl Fn(usize) -> (f64, [f64; 3])) -> f64 {
+    /// The norm of the errors of `n` states in a step of length `h`, before any is added.
+    #[inline(always)]
+    pub(super) fn norm(&self, h: f64, n: usize) -> Norm<'_> {
         let (floors, roughness) = (&self.floors[..n], &self.roughness[..n]);
-        let brief = BRIEF * self.span;
-        let mut sum = 0.0;
-        for j in 0..n {
-            let (error, [before, after, rate]) = error(j);
-            let size = larger(larger(before, after), brief * rate);
-            let ratio = error / (floors[j] + self.relative * size + h * roughness[j]);
-            sum += ratio * ratio;
-        }
-        (sum / n.max(1) as f64).sqrt()
+        Norm { floors, roughness, relative: self.relative, brief: BRIEF * self.span, h, sum: 0.0 }
     }
 
     /// The relative tolerance.
@@ -139,6 +140,33 @@ impl Weights {
             && x.iter()
                 .zip(limits)
                 .any(|(x, (floor, roughness))| h * roughness > floor + self.relative * x.value().abs())
+    }
+}
+
+/// The root mean square of errors over their weights, as it is summed up.
+pub(super) struct Norm<'a> {
+    floors: &'a [f64],
+    roughness: &'a [f64],
+    relative: f64,
+    brief: f64,
+    h: f64,
+    sum: f64,
+}
+
+impl Norm<'_> {
+    /// Adds the error of a state, with its values at both ends of the step and its rate at the end.
+    #[inline(always)] // With the number of states known, the divisions go in pairs.
+    pub(super) fn add(&mut self, state: usize, error: f64, [before, after, rate]: [f64; 3]) {
+        let size = larger(larger(before.abs(), after.abs()), self.brief * rate.abs());
+        let ratio = error / (self.floors[state] + self.relative * size + self.h * self.roughness[state]);
+        self.sum += ratio * ratio;
+    }
+
+    /// The root mean square of the errors that were added.
+    #[inline(always)]
+    #[allow(clippy::cast_precision_loss)]
+    pub(super) fn of_errors(self) -> f64 {
+        (self.sum / self.floors.len().max(1) as f64).sqrt()
     }
 }
 

@@ -8,7 +8,6 @@ use mops_core::{Case, Model, ModelOptions, Response, Trace};
 use super::{check_tangents_by, respond};
 use crate::furuta_2_joint::{Furuta2JointOptions, Lumped, TwoBodies};
 use crate::furuta_3_joint::{Furuta3JointOptions, ThreeBodies};
-use crate::kernel::drive::Drive;
 use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::Bodies;
 
@@ -65,12 +64,12 @@ fn start([phi, dphi, theta, dtheta]: [f64; 4]) -> [(&'static str, f64); 4] {
     [("phi0", phi), ("dphi0", dphi), ("theta0", theta), ("dtheta0", dtheta)]
 }
 
-fn two_bodies(rods: Rods) -> TwoBodies<'static, f64> {
-    TwoBodies { lumped: Lumped::of(&rods), drive: Drive::new(None) }
+fn two_bodies(rods: Rods) -> TwoBodies<f64> {
+    TwoBodies(Lumped::of(&rods))
 }
 
-fn three_bodies(rods: Rods, spring: f64, damper: f64) -> ThreeBodies<'static, f64> {
-    ThreeBodies { lumped: Lumped::of(&rods), tilt: SpringDamper::new(spring, damper), drive: Drive::new(None) }
+fn three_bodies(rods: Rods, spring: f64, damper: f64) -> ThreeBodies<f64> {
+    ThreeBodies { lumped: Lumped::of(&rods), tilt: SpringDamper::new(spring, damper) }
 }
 
 fn near(value: f64, expected: f64, tolerance: f64) {
@@ -81,7 +80,7 @@ fn near(value: f64, expected: f64, tolerance: f64) {
 fn mass_matrix_and_forces_have_their_published_values() {
     // REFERENCE: the Lagrange equations by a computer algebra system, at this point.
     let (q, w) = ([0.1, 2.0, 0.05], [0.5, -3.0, 0.7]);
-    let (mass, force) = two_bodies(TWO_RODS).mass_and_force(0.0, &[q[0], q[1]], &[w[0], w[1]]);
+    let (mass, force) = two_bodies(TWO_RODS).mass_and_force(0.0, &[0.0], &[q[0], q[1]], &[w[0], w[1]]);
     for (value, expected) in [
         (mass[0][0], 0.001_880_320_659),
         (mass[0][1], -0.000_262_593_271),
@@ -91,7 +90,7 @@ fn mass_matrix_and_forces_have_their_published_values() {
     ] {
         near(value, expected, 1e-12);
     }
-    let (mass, force) = three_bodies(THREE_RODS, SPRING, DAMPER).mass_and_force(0.0, &q, &w);
+    let (mass, force) = three_bodies(THREE_RODS, SPRING, DAMPER).mass_and_force(0.0, &[0.0], &q, &w);
     for (value, expected) in [
         (mass[0][0], 0.007_113_936_166),
         (mass[0][1], -0.001_051_520_25),
@@ -177,14 +176,14 @@ fn the_equations_agree_with_newton_and_euler_in_any_state() {
         let w: Vector = std::array::from_fn(|i| 10.0 * spread(k, 3 + i));
         let a: Vector = std::array::from_fn(|i| 100.0 * spread(k, 6 + i));
         let expected = newton_euler(THREE_RODS, q, w, a);
-        let (mass, force) = bodies.mass_and_force(0.0, &q, &w);
+        let (mass, force) = bodies.mass_and_force(0.0, &[0.0], &q, &w);
         for i in 0..3 {
             // The torques are of the order of 1 N m.
             near(dot(mass[i], a) - force[i], expected[i], 1e-12);
         }
         let (q, w, a) = ([q[0], q[1], 0.0], [w[0], w[1], 0.0], [a[0], a[1], 0.0]);
         let expected = newton_euler(TWO_RODS, q, w, a);
-        let (mass, force) = planar.mass_and_force(0.0, &[q[0], q[1]], &[w[0], w[1]]);
+        let (mass, force) = planar.mass_and_force(0.0, &[0.0], &[q[0], q[1]], &[w[0], w[1]]);
         for i in 0..2 {
             near(mass[i][0] * a[0] + mass[i][1] * a[1] - force[i], expected[i], 1e-12);
         }

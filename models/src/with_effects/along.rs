@@ -1,6 +1,6 @@
 //! The linear system along a simulation: how small forces at the ports move the states and signals of a model with effects.
 
-use mops_core::{Along, Cancellation, DIRECTIONS, Dual, Failure, Job, Opening, Port, Scalar};
+use mops_core::{Along, Cancellation, DIRECTIONS, Dual, Failure, Job, Opening, Scalar};
 use nalgebra::DMatrix;
 
 use super::WithEffects;
@@ -54,7 +54,7 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
         self.cancellation.requested().map(|_| Failure::Cancelled)
     }
 
-    fn step(&mut self, step: &Step<Vec<f64>>, dynamics: &Driven<'a, f64>) {
+    fn step(&mut self, step: &Step<f64>, dynamics: &Driven<'a, f64>) {
         let end = step.start + step.taken;
         let mut x = vec![0.0; dynamics.size()];
         while self.next < self.times.len() && self.times[self.next] <= end + 1e-9 * (1.0 + end.abs()) {
@@ -87,14 +87,13 @@ impl WithEffects {
         let mut looks =
             Looks { times, cancellation: &job.case.cancellation, next: 0, found: Vec::with_capacity(times.len()) };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
-        integrate(&mut dynamics, 0.0, end, start, &self.tolerance(open), &mut looks)?;
+        integrate(&mut dynamics, 0.0, end, &start, &self.tolerance(open), &mut looks)?;
 
         let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
         let plant = Along::open(open, &parameters[..self.own()])?;
         let mut tangent = self.driven(plant, &acting, job, &parameters);
         tangent.start(&parameters)?;
-        let ports = self.model.interface().ports.iter();
-        let forces = ports.filter(|port| matches!(port, Port::Process { .. })).count();
+        let forces = self.model.interface().forces();
         Ok(looks.found.iter().map(|look| moment(&mut tangent, look, forces, job.signals)).collect())
     }
 }

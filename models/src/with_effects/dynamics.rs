@@ -3,12 +3,12 @@
 use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{Acting, At, Failure, Instant, Interface, Job, Opening, Plant, Scalar, Span};
+use mops_core::{Acting, At, EventInstant, Failure, Instant, Job, Model, Opening, Plant, Scalar, Span};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
-use crate::kernel::Dynamics;
 use crate::kernel::drive::Drive;
+use crate::kernel::{Dynamics, shown};
 
 /// An effect in a simulation.
 pub(super) struct Actor<S> {
@@ -64,7 +64,7 @@ impl WithEffects {
             }
         };
         let actors = acting.iter().map(actor).collect();
-        Driven::new(self.model.interface(), own, plant, actors, job)
+        Driven::new(self.model.as_ref(), own, plant, actors, job)
     }
 }
 
@@ -134,6 +134,8 @@ pub(super) struct Driven<'a, S> {
     forward: Vec<f64>,
     /// Forces from outside; none but where the equations are looked at.
     further: Vec<S>,
+    /// Rates of inputs that do not move.
+    still: Vec<f64>,
 }
 
 /// Inputs and forces of the moment.
@@ -145,12 +147,13 @@ struct Scratch<S> {
 
 impl<'a, S: Opening> Driven<'a, S> {
     pub(super) fn new(
-        of: &Interface,
+        model: &dyn Model,
         own: usize,
         plant: Box<dyn Plant<S> + 'a>,
         actors: Vec<Actor<S>>,
         job: &Job<'a>,
     ) -> Self {
+        let of = model.interface();
         let delay = |input: usize| {
             let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
@@ -163,12 +166,8 @@ impl<'a, S: Opening> Driven<'a, S> {
             command
         };
         let commands: Vec<_> = commands.map(command).collect();
-        let forces = of.ports.iter().filter(|p| matches!(p, mops_core::Port::Process { .. })).count();
-        let shown = |signal: &mops_core::Variable| {
-            let all = of.states.len() == own;
-            of.states.iter().position(|state| all && state.signal.as_ref() == Some(&signal.name))
-        };
-        let shows: Vec<Option<usize>> = of.signals.iter().map(shown).collect();
+        let forces = of.forces();
+        let shows = shown(of, &model.equation_states());
         let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
         let smooth = !actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
@@ -179,6 +178,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let damped = actors.iter().map(|a| a.acting.damped_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
+        let longest = longest.min(plant.longest_step());
         Self {
             plant,
             contacts: Contacts::default(),
@@ -198,6 +198,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
             further: Vec::new(),
+            still: vec![0.0; of.inputs.len()],
         }
     }
 
@@ -242,6 +243,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             x[first..first + count].copy_from_slice(&z);
         }
         self.settle_gaps(0.0, &x);
+        self.plant.can_start(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w })?;
         Ok(x)
     }
 
@@ -351,7 +353,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.balance(t, &x, &mut u, &mut w, &mut dx[..self.own]);
         self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
         self.derivative(t, &x, &mut dx);
-        let outputs = signals.iter().map(|&signal| self.signal(signal, t, &x)).collect();
+        let outputs = signals.iter().map(|&signal| self.measured(signal, t, &x)).collect();
         self.further.clear();
         (dx, outputs)
     }
@@ -400,7 +402,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 
     /// The value of a signal as it is measured; what is remembered comes in later.
-    pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+    pub(super) fn measured(&self, signal: usize, t: f64, x: &[S]) -> S {
         let here = |actor: &&Actor<S>| {
             matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
         };
@@ -521,10 +523,17 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 }
 
-impl<S: Opening> Dynamics<S> for Driven<'_, S> {
-    type State = Vec<S>;
+/// An event of the plant: what effects make of its inputs is taken as it is at that instant, whatever the parameters.
+fn event<'a, S: Scalar>(at: Instant<'a, S>, still: &'a [f64]) -> EventInstant<'a, S> {
+    EventInstant { at, du: still, delay: S::from(0.0) }
+}
 
-    fn derivative(&self, t: f64, x: &Vec<S>, dx: &mut Vec<S>) {
+impl<S: Opening> Dynamics<S> for Driven<'_, S> {
+    fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+        self.measured(signal, t, x)
+    }
+
+    fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, .. } = &mut *scratch;
         let (own, further) = dx.split_at_mut(self.own);
@@ -546,7 +555,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.guards() + self.contacts.len() + gaps
     }
 
-    fn guard(&self, index: usize, t: f64, x: &Vec<S>) -> S {
+    fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx } = &mut *scratch;
         let own = self.plant.guards();
@@ -562,7 +571,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.guard(index, &Instant { t, x: &x[..self.own], u, w })
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut Vec<S>) -> &str {
+    fn switch(&mut self, index: usize, t: f64, x: &mut [S]) -> &str {
         let own = self.plant.guards();
         let gaps = own + self.contacts.len();
         let (mut u, mut w) = (Vec::new(), Vec::new());
@@ -583,8 +592,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         }
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
-        let jumped = &mut x[..self.own];
-        self.plant.switch(index, &Instant { t, x: &before, u: &u, w: &w }, jumped).clone_into(&mut self.happened);
+        let event = event(Instant { t, x: &before, u: &u, w: &w }, &self.still);
+        self.plant.switch(index, &event, &mut x[..self.own]).clone_into(&mut self.happened);
         self.settle_gaps(t, x);
         &self.happened
     }
@@ -610,7 +619,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.enclose_guard(index, &Span { time, x: &x[..self.own], u: &u, w: &w })
     }
 
-    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut Vec<S>) -> Result<&str, String> {
+    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut [S]) -> Result<&str, String> {
         let own = self.plant.guards();
         if index >= own {
             let what = if index < own + self.contacts.len() {
@@ -624,8 +633,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let mut dx = vec![S::from(0.0); self.own];
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
-        let at = Instant { t, x: &before, u: &u, w: &w };
-        self.plant.rest(index, &at, close, &mut x[..self.own])?.clone_into(&mut self.happened);
+        let event = event(Instant { t, x: &before, u: &u, w: &w }, &self.still);
+        self.plant.rest(index, &event, close, &mut x[..self.own])?.clone_into(&mut self.happened);
         self.settle_gaps(t, x);
         Ok(&self.happened)
     }
@@ -642,7 +651,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // What an effect makes of a signal may be rough: it is resolved where samples are taken.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
-        self.breaks.iter().copied().find(|&at| at > t).map_or(inputs, |at| at.min(inputs))
+        let next = self.plant.next_break(t).min(inputs);
+        self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
     }
 
     fn longest_step(&self) -> f64 {
@@ -653,7 +663,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.damped_step
     }
 
-    fn pass_break(&mut self, t: f64, x: &mut Vec<S>) {
+    fn pass_break(&mut self, t: f64, x: &mut [S]) {
         let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
         let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
         // What is remembered is moved up to the break, and across it.

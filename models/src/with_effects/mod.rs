@@ -3,20 +3,17 @@
 mod along;
 mod contacts;
 mod dynamics;
-mod own;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Plant, Port, Scalar,
-    State, Trials, Unit, Variable, WithTangents,
+    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Port, Scalar, State,
+    Trials, Unit, Variable, WithTangents,
 };
 
-use crate::kernel::{self, Recording, Tolerance, record, wanted};
+use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
 pub use along::Moment;
-use dynamics::Driven;
-pub use own::{Own, OwnModel};
 
 /// A model with effects.
 ///
@@ -153,24 +150,9 @@ impl WithEffects {
         let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
-        let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
-        let recording = record(&mut dynamics, start, job.horizon, &self.tolerance(open), &signals, &output)?;
+        let recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
         Ok(dynamics.remembered(recording, &signals.signals))
     }
-}
-
-/// Simulates a plant without effects.
-fn alone<'a, S: Opening>(
-    interface: &Interface,
-    plant: Box<dyn Plant<S> + 'a>,
-    tolerance: &Tolerance,
-    job: &Job<'a>,
-) -> Result<Recording, Failure> {
-    let own = plant.start().len();
-    let mut dynamics = Driven::new(interface, own, plant, Vec::new(), job);
-    let start = dynamics.start(&[])?;
-    let output = |dynamics: &Driven<'_, S>, signal: usize, t: f64, x: &Vec<S>| dynamics.signal(signal, t, x);
-    record(&mut dynamics, start, job.horizon, tolerance, &wanted(job, &interface.signals), &output)
 }
 
 impl Site {
@@ -304,7 +286,7 @@ impl Model for WithEffects {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }
-        Some(kernel::tangents_of(|parameters| self.simulate(job, parameters), job.parameters, seeds))
+        Some(tangents_of(|parameters| self.simulate(job, parameters), job.parameters, seeds))
     }
 }
 

@@ -8,10 +8,10 @@ use mops_core::{
     Plant, Port, Scalar, Variable,
 };
 
-use super::{Own, OwnModel, WithEffects};
+use super::WithEffects;
 use crate::effects::effects;
 use crate::equations::EquationsOptions;
-use crate::kernel::mechanism;
+use crate::kernel::{PlantModel, Simulated, mechanism};
 use crate::tests::{check_tangents_by, respond};
 
 fn equations(text: &str) -> Arc<dyn Model> {
@@ -355,18 +355,18 @@ impl<S: Scalar> Plant<S> for At<S> {
     }
 }
 
-impl OwnModel for Pendulum {
+impl PlantModel for Pendulum {
     fn interface(&self) -> &Interface {
         &self.0
     }
-    fn plant<S: Scalar>(&self, parameters: &[S]) -> Result<impl Plant<S> + use<S>, Failure> {
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         Ok(At(parameters.try_into().expect("one parameter and two start values")))
     }
 }
 
 #[test]
 fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_text() {
-    let own: Arc<dyn Model> = Arc::new(Own(Pendulum::new()));
+    let own: Arc<dyn Model> = Arc::new(Simulated::new(Pendulum::new()));
     let text = equations(
         r#"
         states = { theta = "rad", dtheta = "rad/s" }

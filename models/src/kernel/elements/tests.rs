@@ -10,17 +10,15 @@ const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max
 
 /// Keeps a signal and the times of the events.
 struct Record<F> {
+    states: usize,
     signal: F,
     trace: Trace,
     events: Vec<f64>,
 }
 
-impl<D: Dynamics<f64>, F: Fn(&D, f64, &D::State) -> f64> Sink<f64, D> for Record<F>
-where
-    D::State: Default,
-{
-    fn step(&mut self, step: &Step<D::State>, dynamics: &D) {
-        let mut x = D::State::default();
+impl<D: Dynamics<f64>, F: Fn(&D, f64, &[f64]) -> f64> Sink<f64, D> for Record<F> {
+    fn step(&mut self, step: &Step<f64>, dynamics: &D) {
+        let mut x = vec![0.0; self.states];
         let values = Trace::NODES.map(|s| {
             step.state(s, &mut x);
             (self.signal)(dynamics, step.start + s * step.taken, &x)
@@ -33,16 +31,13 @@ where
     }
 }
 
-fn simulate<D: Dynamics<f64>, F: Fn(&D, f64, &D::State) -> f64>(
+fn simulate<D: Dynamics<f64>, F: Fn(&D, f64, &[f64]) -> f64>(
     mut dynamics: D,
-    start: D::State,
+    start: &[f64],
     end: f64,
     signal: F,
-) -> (Trace, Vec<f64>)
-where
-    D::State: Default,
-{
-    let mut record = Record { signal, trace: Trace::starting_at(0.0, 64), events: Vec::new() };
+) -> (Trace, Vec<f64>) {
+    let mut record = Record { states: start.len(), signal, trace: Trace::starting_at(0.0, 64), events: Vec::new() };
     integrate(&mut dynamics, 0.0, end, start, &TIGHT, &mut record).expect("it simulates");
     (record.trace, record.events)
 }
@@ -90,9 +85,8 @@ fn bearing_friction_refuses_what_makes_no_sense() {
 /// A mass on a spring and a damper.
 struct Sprung(SpringDamper<f64>);
 impl Dynamics<f64> for Sprung {
-    type State = [f64; 2];
-    fn derivative(&self, _: f64, x: &[f64; 2], dx: &mut [f64; 2]) {
-        *dx = [x[1], -self.0.torque(x[0], x[1])];
+    fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
+        dx.copy_from_slice(&[x[1], -self.0.torque(x[0], x[1])]);
     }
 }
 
@@ -101,7 +95,7 @@ fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
     // x'' + 2 D w x' + w^2 (x - 1) = 0 with w = 3, D = 0.2, from 2 at rest.
     let (w, d): (f64, f64) = (3.0, 0.2);
     let element = SpringDamper { spring: w * w, damper: 2.0 * d * w, rest: 1.0 };
-    let (x, _) = simulate(Sprung(element), [2.0, 0.0], 4.0, |_, _, x| x[0]);
+    let (x, _) = simulate(Sprung(element), &[2.0, 0.0], 4.0, |_, _, x| x[0]);
     let wd = w * (1.0 - d * d).sqrt();
     for t in [0.3_f64, 1.0, 2.7, 4.0] {
         let exact = 1.0 + math::exp(-d * w * t) * (math::cos(wd * t) + d * w / wd * math::sin(wd * t));
@@ -156,8 +150,7 @@ impl Element for Backlash<f64> {
 }
 
 impl<E: Element> Dynamics<f64> for Through<E> {
-    type State = [f64; 1];
-    fn derivative(&self, t: f64, _: &[f64; 1], dx: &mut [f64; 1]) {
+    fn derivative(&self, t: f64, _: &[f64], dx: &mut [f64]) {
         dx[0] = self.0.output(2.0 * math::sin(t));
     }
     fn longest_step(&self) -> f64 {
@@ -166,10 +159,10 @@ impl<E: Element> Dynamics<f64> for Through<E> {
     fn guards(&self) -> usize {
         1
     }
-    fn guard(&self, _: usize, t: f64, _: &[f64; 1]) -> f64 {
+    fn guard(&self, _: usize, t: f64, _: &[f64]) -> f64 {
         self.0.guard(2.0 * math::sin(t), 2.0 * math::cos(t))
     }
-    fn switch(&mut self, _: usize, t: f64, _: &mut [f64; 1]) -> &str {
+    fn switch(&mut self, _: usize, t: f64, _: &mut [f64]) -> &str {
         self.0.switch(2.0 * math::sin(t));
         ""
     }
@@ -179,7 +172,7 @@ use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
 #[test]
 fn a_saturated_sine_is_cut_where_it_meets_the_limit() {
-    let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0)), [0.0], TAU, |_, _, x| x[0]);
+    let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
@@ -191,7 +184,7 @@ fn a_saturated_sine_is_cut_where_it_meets_the_limit() {
 
 #[test]
 fn a_dead_zone_answers_only_beyond_its_edges() {
-    let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0)), [0.0], TAU, |_, _, x| x[0]);
+    let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
@@ -202,7 +195,7 @@ fn a_dead_zone_answers_only_beyond_its_edges() {
 #[test]
 fn play_is_crossed_at_every_reversal() {
     let (y, events) =
-        simulate(Through(Backlash::new(1.0, 0.0)), [0.0], TAU, |through, t, _| through.0.output(2.0 * math::sin(t)));
+        simulate(Through(Backlash::new(1.0, 0.0)), &[0.0], TAU, |through, t, _| through.0.output(2.0 * math::sin(t)));
     // Touches at sin = 1/4, reverses at pi/2, touches below where 2 sin t = 1.5 - 0.5, reverses at 3 pi/2, and above.
     let exact = [math::asin(0.25), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
     assert_eq!(events.len(), exact.len(), "{events:?}");
@@ -228,8 +221,7 @@ fn a_backlash_that_is_moved_by_a_jump_is_pushed_along() {
 /// `T y' = 1 - y`.
 struct Lagging<S>(Lag<S>);
 impl<S: Scalar> Dynamics<S> for Lagging<S> {
-    type State = [S; 1];
-    fn derivative(&self, _: f64, x: &[S; 1], dx: &mut [S; 1]) {
+    fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
         dx[0] = self.0.derivative(S::from(1.0), x[0]);
     }
 }
@@ -238,7 +230,7 @@ impl<S: Scalar> Dynamics<S> for Lagging<S> {
 fn a_lag_approaches_a_step_exponentially() {
     let start = [Dual::<1>::from(0.0)];
     let mut lag = Lagging(Lag { time: Dual::variable(0.5, 0) });
-    let (y, _) = integrate(&mut lag, 0.0, 2.0, start, &TIGHT, &mut ()).unwrap();
+    let (y, _) = integrate(&mut lag, 0.0, 2.0, &start, &TIGHT, &mut ()).unwrap();
     // y = 1 - exp(-t/T), dy/dT = -t/T^2 exp(-t/T).
     near(y[0].value, 1.0 - math::exp(-4.0), 1e-10);
     near(y[0].tangent[0], -8.0 * math::exp(-4.0), 1e-8);
@@ -247,8 +239,7 @@ fn a_lag_approaches_a_step_exponentially() {
 /// `y' = -y(t - T)`, `y = 1` up to 0.
 struct Delayed<S>(Delay<S>);
 impl<S: Scalar> Dynamics<S> for Delayed<S> {
-    type State = [S; 1];
-    fn derivative(&self, t: f64, _: &[S; 1], dx: &mut [S; 1]) {
+    fn derivative(&self, t: f64, _: &[S], dx: &mut [S]) {
         dx[0] = -self.0.at(t);
     }
     fn longest_step(&self) -> f64 {
@@ -257,13 +248,13 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
     fn next_break(&self, t: f64) -> f64 {
         self.0.next_break(t)
     }
-    fn pass_break(&mut self, t: f64, _: &mut [S; 1]) {
+    fn pass_break(&mut self, t: f64, _: &mut [S]) {
         self.0.pass_break(t);
     }
     fn remembers(&self) -> bool {
         true
     }
-    fn accepted(&mut self, step: &Step<[S; 1]>) {
+    fn accepted(&mut self, step: &Step<S>) {
         let mut x = [S::from(0.0)];
         let nodes = Delay::<S>::NODES.map(|s| {
             step.state(s, &mut x);
@@ -280,21 +271,20 @@ fn a_delayed_feedback_is_its_polynomials() {
         1.0 - t + math::powi((t - 1.0).max(0.0), 2) / 2.0 - math::powi((t - 2.0).max(0.0), 3) / 6.0
             + math::powi((t - 3.0).max(0.0), 4) / 24.0
     };
-    let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), [1.0], 4.0, |_, _, x| x[0]);
+    let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), &[1.0], 4.0, |_, _, x| x[0]);
     for t in [0.5, 1.0, 1.3, 2.2, 3.0, 4.0] {
         near(y.at(t), exact(t), 1e-9);
     }
     // dy/dT at t = 2.5: -(t - T) + (t - 2T)^2 at T = 1.
     let mut dynamics = Delayed(Delay::new(Dual::<1>::variable(1.0, 0), Dual::from(1.0)));
-    let (y, _) = integrate(&mut dynamics, 0.0, 2.5, [Dual::from(1.0)], &TIGHT, &mut ()).unwrap();
+    let (y, _) = integrate(&mut dynamics, 0.0, 2.5, &[Dual::from(1.0)], &TIGHT, &mut ()).unwrap();
     near(y[0].tangent[0], -1.5 + 0.25, 1e-8);
 }
 
 /// A step from 0 to 1 at 0.3 s, delayed by half a second, integrated.
 struct DelayedStep(Delay<f64>, f64);
 impl Dynamics<f64> for DelayedStep {
-    type State = [f64; 1];
-    fn derivative(&self, t: f64, _: &[f64; 1], dx: &mut [f64; 1]) {
+    fn derivative(&self, t: f64, _: &[f64], dx: &mut [f64]) {
         dx[0] = self.0.at(t);
     }
     fn longest_step(&self) -> f64 {
@@ -303,21 +293,21 @@ impl Dynamics<f64> for DelayedStep {
     fn next_break(&self, t: f64) -> f64 {
         self.0.next_break(t).min(if t < 0.3 { 0.3 } else { f64::INFINITY })
     }
-    fn pass_break(&mut self, t: f64, _: &mut [f64; 1]) {
+    fn pass_break(&mut self, t: f64, _: &mut [f64]) {
         self.0.pass_break(t);
         self.1 = f64::from(u8::from(t >= 0.3));
     }
     fn remembers(&self) -> bool {
         true
     }
-    fn accepted(&mut self, step: &Step<[f64; 1]>) {
+    fn accepted(&mut self, step: &Step<f64>) {
         self.0.push(step.start, step.start + step.taken, [self.1; 5]);
     }
 }
 
 #[test]
 fn a_jump_comes_out_of_a_delay_as_a_jump() {
-    let (y, _) = simulate(DelayedStep(Delay::new(0.5, 0.0), 0.0), [0.0], 2.0, |_, _, x| x[0]);
+    let (y, _) = simulate(DelayedStep(Delay::new(0.5, 0.0), 0.0), &[0.0], 2.0, |_, _, x| x[0]);
     near(y.at(0.8), 0.0, 1e-14);
     near(y.at(2.0), 1.2, 1e-12);
 }

@@ -4,12 +4,15 @@ use super::*;
 use mops_core::Halt;
 use mops_core::math;
 
-/// A state that rests, or runs with the clock: either way steps are as long as they may be.
-struct Idle(f64);
-impl<S: Scalar> Dynamics<S> for Idle {
-    type State = [S; 1];
-    fn derivative(&self, _: f64, _: &[S; 1], dx: &mut [S; 1]) {
-        *dx = [S::from(self.0)];
+/// A state that rests, or runs with the clock, at this rate: either way steps are as long as they may be. The signal is a
+/// function of time and state.
+struct Idle<F>(f64, F);
+impl<S: Scalar, F: Fn(f64, S) -> S> Dynamics<S> for Idle<F> {
+    fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
+        dx[0] = S::from(self.0);
+    }
+    fn signal(&self, _: usize, t: f64, x: &[S]) -> S {
+        self.1(t, x[0])
     }
 }
 
@@ -18,8 +21,7 @@ const TOLERANCE: Tolerance = Tolerance { max_steps: 1000, ..Tolerance::DEFAULT }
 /// The largest difference between the recorded signal and the function of time and state it is, over a thousand times.
 fn difference<S: Scalar>(start: S, rate: f64, horizon: f64, f: impl Fn(f64, S) -> S) -> [f64; 2] {
     let signals = vec![(0, "y".to_owned())].into();
-    let output = |_: &Idle, _: usize, t: f64, x: &[S; 1]| f(t, x[0]);
-    let recording = record(&mut Idle(rate), [start], horizon, &TOLERANCE, &signals, &output).unwrap();
+    let recording = record(&mut Idle(rate, &f), &[start], horizon, &TOLERANCE, &signals).unwrap();
     let traces = std::iter::once(&recording.response).chain(&recording.tangents).map(|r| &r.traces[0].1);
     let mut largest = [0.0_f64; 2];
     for (k, trace) in traces.enumerate() {
@@ -62,39 +64,41 @@ fn a_signal_that_bends_more_than_the_states_is_exact_with_its_tangents() {
 #[test]
 fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
     let signals = vec![(0, "y".to_owned())].into();
-    let output = |_: &Idle, _: usize, t: f64, _: &[f64; 1]| if t < 7.3 { 0.0 } else { 1.0 };
-    let recording = record(&mut Idle(0.0), [0.0], 10.0, &TOLERANCE, &signals, &output).unwrap();
+    let jump = |t: f64, _: f64| if t < 7.3 { 0.0 } else { 1.0 };
+    let recording = record(&mut Idle(0.0, jump), &[0.0], 10.0, &TOLERANCE, &signals).unwrap();
     let trace = &recording.response.traces[0].1;
     assert!(trace.knots().len() < 200, "{}", trace.knots().len());
     assert!((trace.at(7.29), trace.at(7.31)) == (0.0, 1.0));
 }
 
-/// `y' = 1` in steps of 1 s.
-struct Clock;
-impl<S: Scalar> Dynamics<S> for Clock {
-    type State = [S; 1];
-    fn derivative(&self, _: f64, _: &[S; 1], dx: &mut [S; 1]) {
-        *dx = [S::from(1.0)];
+/// `y' = 1` in steps of 1 s. The signals are all `y`; whoever reads one at a time is told.
+struct Clock<F>(F);
+impl<S: Scalar, F: Fn(f64)> Dynamics<S> for Clock<F> {
+    fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
+        dx[0] = S::from(1.0);
     }
     fn longest_step(&self) -> f64 {
         1.0
+    }
+    fn signal(&self, _: usize, t: f64, x: &[S]) -> S {
+        self.0(t);
+        x[0]
     }
 }
 
 #[test]
 fn what_is_recorded_is_limited_tangents_and_signals_counted() {
     let endless = Tolerance { max_steps: usize::MAX, ..TOLERANCE };
-    let output = |_: &Clock, _: usize, _: f64, x: &[f64; 1]| x[0];
-    let slopes = |_: &Clock, _: usize, _: f64, x: &[Dual<3>; 1]| x[0];
     for signals in [1, 2, 7] {
         let wanted = (0..signals).map(|i| (i, format!("y{i}"))).collect::<Vec<_>>().into();
         let room = 100 * signals * SEGMENT;
         // Steps of 1 s: 100 of them fit in, and with three tangents a quarter.
-        let run = |end: f64| record_within(room, &mut Clock, ([0.0], end), &endless, &wanted, &output);
+        let run = |end: f64| record_within(room, &mut Clock(|_| ()), (&[0.0], end), &endless, &wanted);
         assert!(run(95.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((95.0..=105.0).contains(&t), "{t}");
-        let run = |end: f64| record_within(room, &mut Clock, ([0.0.into()], end), &endless, &wanted, &slopes);
+        let start = [Dual::<3>::from(0.0)];
+        let run = |end: f64| record_within(room, &mut Clock(|_| ()), (&start, end), &endless, &wanted);
         assert!(run(20.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((20.0..=30.0).contains(&t), "{t}");
@@ -111,19 +115,18 @@ fn a_simulation_ends_at_the_step_after_the_request() {
             wanted.cancellation = request.patient();
         }
         // Asked for while the simulation goes: at 50 s.
-        let output = |_: &Clock, _: usize, t: f64, x: &[f64; 1]| {
+        let mut clock = Clock(|t: f64| {
             if t > 50.0 {
                 request.request(why);
             }
             if t > 80.0 {
                 request.insist();
             }
-            x[0]
-        };
+        });
         let end = if patient { 70.0 } else { 1e300 };
-        let found = record(&mut Clock, [0.0], end, &endless, &wanted, &output);
+        let found = record(&mut clock, &[0.0], end, &endless, &wanted);
         assert_eq!(found.err(), (!patient).then_some(Failure::Cancelled));
         request.insist();
-        assert_eq!(record(&mut Clock, [0.0], 1.0, &endless, &wanted, &output).err(), Some(Failure::Cancelled));
+        assert_eq!(record(&mut clock, &[0.0], 1.0, &endless, &wanted).err(), Some(Failure::Cancelled));
     }
 }

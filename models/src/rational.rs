@@ -8,7 +8,7 @@ use serde::de::{self, Deserializer, Visitor};
 /// A transfer function, by poles and zeros or by coefficients.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
-pub(crate) struct Plant {
+pub(crate) struct PlantOptions {
     /// Real poles, 1/s.
     poles: Option<Vec<Coefficient>>,
     /// Real zeros, 1/s.
@@ -94,7 +94,7 @@ impl Slot {
 
 impl TransferFunction {
     /// Checks the plant; `names` gets the parameters it names, which are none of the `taken` ones.
-    pub fn new(plant: &Plant, taken: &[&str], names: &mut Vec<String>) -> Result<Self, Mistake> {
+    pub fn new(plant: &PlantOptions, taken: &[&str], names: &mut Vec<String>) -> Result<Self, Mistake> {
         let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, Mistake> {
             list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
         };

@@ -1,0 +1,186 @@
+//! A plant together with what drives its inputs.
+
+use std::cell::RefCell;
+
+use mops_core::enclosure::Enclosure;
+use mops_core::{EventInstant, Failure, Instant, Plant, Scalar, Span};
+
+use super::Dynamics;
+use super::drive::Drive;
+
+/// A plant whose inputs are driven, without forces from outside: what a simulation integrates.
+pub struct Driven<'a, S, P> {
+    /// The plant.
+    pub plant: P,
+    drives: Vec<Drive<'a, S>>,
+    /// The inputs since the last break, where none of them varies up to the next.
+    constant: Option<Vec<S>>,
+    /// The inputs where they were last asked for.
+    inputs: RefCell<Vec<S>>,
+    /// Bounds of inputs and forces, to look at guards with.
+    bounds: RefCell<Vec<Enclosure>>,
+    /// Forces from outside: all 0.
+    forces: Vec<S>,
+    /// For each signal the state that it shows as it is.
+    shows: &'a [Option<usize>],
+    /// By how much the events of the moment come later: tangents without a value.
+    delay: S,
+}
+
+impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
+    /// The plant with its inputs in the order of [`mops_core::Interface::inputs`], a number of forces that may act from outside,
+    /// and for each signal the state that it shows as it is; signals beyond these are computed.
+    pub fn new(plant: P, drives: Vec<Drive<'a, S>>, forces: usize, shows: &'a [Option<usize>]) -> Self {
+        let zero = S::from(0.0);
+        let inputs = RefCell::new(vec![zero; drives.len()]);
+        let bounds = RefCell::default();
+        Self { plant, drives, constant: None, inputs, bounds, forces: vec![zero; forces], shows, delay: zero }
+    }
+
+    /// Looks at the plant at a time and a state.
+    #[inline(always)]
+    fn look<R>(&self, t: f64, x: &[S], at: impl FnOnce(&P, &Instant<'_, S>) -> R) -> R {
+        if let Some(u) = &self.constant {
+            return at(&self.plant, &Instant { t, x, u, w: &self.forces });
+        }
+        let mut inputs = self.inputs.borrow_mut();
+        self.take_inputs(t, &mut inputs);
+        at(&self.plant, &Instant { t, x, u: &inputs, w: &self.forces })
+    }
+
+    #[inline(always)]
+    fn take_inputs(&self, t: f64, inputs: &mut [S]) {
+        for (u, drive) in inputs.iter_mut().zip(&self.drives) {
+            *u = drive.at(t);
+        }
+    }
+
+    /// Whether a simulation can begin at these states, at time 0.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    pub fn can_start(&self, x: &[S]) -> Result<(), Failure> {
+        self.look(0.0, x, |plant, at| plant.can_start(at))
+    }
+
+    fn rates_of_inputs(&self, t: f64) -> Vec<f64> {
+        self.drives.iter().map(|drive| drive.slope(t)).collect()
+    }
+
+    /// Changes the plant at an event.
+    fn at_event<'p, R>(&'p mut self, t: f64, x: &[S], change: impl FnOnce(&'p mut P, &EventInstant<'_, S>) -> R) -> R {
+        let du = self.rates_of_inputs(t);
+        let moved = |(drive, rate): (&Drive<'_, S>, &f64)| match S::DIRECTIONS {
+            0 => drive.at(t),
+            _ => drive.at(t) + self.delay * *rate,
+        };
+        let u: Vec<S> = self.drives.iter().zip(&du).map(moved).collect();
+        let at = Instant { t, x, u: &u, w: &self.forces };
+        change(&mut self.plant, &EventInstant { at, du: &du, delay: self.delay })
+    }
+}
+
+impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
+    // Written out, as closures are not compiled into the stages.
+    #[inline(always)]
+    fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
+        if let Some(u) = &self.constant {
+            return self.plant.rates(&Instant { t, x, u, w: &self.forces }, dx);
+        }
+        let mut inputs = self.inputs.borrow_mut();
+        self.take_inputs(t, &mut inputs);
+        self.plant.rates(&Instant { t, x, u: &inputs, w: &self.forces }, dx);
+    }
+
+    fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+        self.look(t, x, |plant, at| plant.signal(signal, at))
+    }
+
+    fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
+        let mut values = [S::from(0.0); 5];
+        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
+            *value = self.look(t, x, |plant, at| plant.signal(signal, at));
+        }
+        values
+    }
+
+    fn guards(&self) -> usize {
+        self.plant.guards()
+    }
+
+    fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
+        self.look(t, x, |plant, at| plant.guard(index, at))
+    }
+
+    fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
+        let mut values = [S::from(0.0); 3];
+        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
+            *value = self.look(t, x, |plant, at| plant.guard(index, at));
+        }
+        values
+    }
+
+    fn guard_rate(&self, index: usize, t: f64, x: &[S]) -> Option<f64> {
+        let du = self.rates_of_inputs(t);
+        self.look(t, x, |plant, at| plant.guard_rate(index, at, &du))
+    }
+
+    fn switch(&mut self, index: usize, t: f64, x: &mut [S]) -> &str {
+        let before = x.to_vec();
+        self.at_event(t, &before, |plant, event| plant.switch(index, event, x))
+    }
+
+    fn has_bounds(&self) -> bool {
+        self.plant.has_bounds()
+    }
+
+    fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        let mut bounds = self.bounds.borrow_mut();
+        bounds.clear();
+        bounds.extend(self.drives.iter().map(|drive| drive.enclose(time)));
+        bounds.resize(self.drives.len() + self.forces.len(), Enclosure::from(0.0));
+        let (u, w) = bounds.split_at(self.drives.len());
+        self.plant.enclose_guard(index, &Span { time, x, u, w })
+    }
+
+    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut [S]) -> Result<&str, String> {
+        let before = x.to_vec();
+        self.at_event(t, &before, |plant, event| plant.rest(index, event, close, x))
+    }
+
+    fn scale(&self, state: usize) -> Option<f64> {
+        self.plant.scale(state)
+    }
+
+    fn delay_events(&mut self, delay: S) {
+        self.delay = delay;
+    }
+
+    fn shows(&self, signal: usize) -> Option<usize> {
+        self.shows.get(signal).copied().flatten()
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        self.drives.iter().map(|drive| drive.next_break(t)).fold(self.plant.next_break(t), f64::min)
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.drives.iter().map(Drive::longest_step).fold(self.plant.longest_step(), f64::min)
+    }
+
+    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        self.plant.jacobian_pattern()
+    }
+
+    fn jacobian(&self, t: f64, x: &[S], entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        self.look(t, x, |plant, at| plant.jacobian(at, entry))
+    }
+
+    fn pass_break(&mut self, t: f64, x: &mut [S]) {
+        self.drives.iter_mut().for_each(|drive| drive.pass_break(t));
+        let mut inputs = self.inputs.borrow_mut();
+        self.take_inputs(t, &mut inputs);
+        self.constant = self.drives.iter().all(Drive::is_constant).then(|| inputs.clone());
+        self.plant.settle(&Instant { t, x, u: &inputs, w: &self.forces });
+    }
+}

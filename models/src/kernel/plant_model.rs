@@ -1,0 +1,208 @@
+//! Models that are given by their plants.
+
+use mops_core::{
+    Along, Analysis, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar, Variable,
+    WithTangents,
+};
+
+use super::drive::Drive;
+use super::{Driven, Dynamics, Recording, Tolerance, local, record, tangents_of, wanted};
+
+/// A plant that is written once over the scalar, with what it offers and takes; [`Simulated`] makes a model of it.
+///
+/// The states are named by [`Interface::states`]; where that names signals for them, these have their units. What
+/// [`Interface::ports`] lists takes effects, and tells the order of the forces `w` that the plant adds to its equations.
+pub trait PlantModel: Send + Sync {
+    /// What the model offers and takes.
+    fn interface(&self) -> &Interface;
+
+    /// The plant at these values of the parameters.
+    ///
+    /// # Errors
+    /// Parameters for which it is not defined.
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure>;
+
+    /// The plant to which effects are added, where it is another object.
+    ///
+    /// # Errors
+    /// As [`PlantModel::plant`].
+    fn open_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        self.plant(parameters)
+    }
+
+    /// The states of the plant, in their order.
+    fn states(&self) -> Vec<Variable> {
+        let Interface { states, signals, .. } = self.interface();
+        let variable = |name: &str, signal: Option<&String>| {
+            let shown = signals.iter().find(|v| signal.is_some_and(|signal| v.name == *signal));
+            shown.map_or_else(|| Variable::new(name, "1", "state"), |v| Variable { name: name.to_owned(), ..v.clone() })
+        };
+        states.iter().map(|state| variable(&state.name, state.signal.as_ref())).collect()
+    }
+
+    /// What drives an input where a case does not, by its index; nothing if `None`.
+    fn input(&self, _index: usize) -> Option<&Input> {
+        None
+    }
+
+    /// Accuracy and limits of its simulations.
+    fn tolerance(&self) -> Tolerance {
+        Tolerance::default()
+    }
+
+    /// Assumptions made in reading the model, one sentence each.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// The model of a plant: simulated, with exact tangents, linearised, and open at its ports.
+///
+/// A pendulum with viscous friction, open at its joint:
+///
+/// ```
+/// use mops_core::{Failure, Instant, Interface, Parameter, Plant, Scalar, Variable};
+/// use mops_models::kernel::{PlantModel, Simulated, mechanism};
+///
+/// /// `J theta'' = u - d sin(theta) - b theta' + w`, `w` a torque that effects add.
+/// struct Pendulum(Interface);
+///
+/// impl Pendulum {
+///     fn new() -> Self {
+///         let joint = mechanism::Joint { angle: "theta", about: "pendulum", start: 0.5, events: [""; 4] };
+///         let parameters = [("J", "kg m2", "inertia"), ("d", "N m", "gravity torque"), ("b", "N m s/rad", "friction")];
+///         let parameters = parameters.map(|(name, unit, about)| Parameter::new(name, unit, about)).to_vec();
+///         let torque = Variable::new("u", "N m", "torque");
+///         let interface = mechanism::interface(&[joint], parameters, vec![torque]);
+///         Self(Interface { ports: mechanism::ports(&["theta"], &["u"]), horizon: Some(5.0), ..interface })
+///     }
+/// }
+///
+/// struct At<S>([S; 5]);
+///
+/// impl<S: Scalar> Plant<S> for At<S> {
+///     fn start(&self) -> Vec<S> {
+///         self.0[3..].to_vec()
+///     }
+///     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+///         let [inertia, gravity, friction, ..] = self.0;
+///         dx[0] = at.x[1];
+///         dx[1] = (at.u[0] - gravity * at.x[0].sin() - friction * at.x[1] + at.w[0]) / inertia;
+///     }
+/// }
+///
+/// impl PlantModel for Pendulum {
+///     fn interface(&self) -> &Interface {
+///         &self.0
+///     }
+///     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+///         Ok(At(parameters.try_into().expect("three parameters and two start values")))
+///     }
+/// }
+///
+/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which takes effects.
+/// use mops_core::{Catalogue, EffectDraft, ModelDraft};
+/// let catalogue = Catalogue {
+///     effects: mops_models::effects::effects(),
+///     augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
+///     ..Catalogue::default()
+/// };
+/// let bearing = [EffectDraft::new("bearing", "coulomb-friction", "joint:theta")];
+/// let model = ModelDraft::from(Simulated::new(Pendulum::new())).with_effects(&catalogue, &bearing)?;
+/// assert_eq!(model.model.interface().parameters.last().unwrap().variable.name, "bearing.c");
+/// # Ok::<(), mops_core::Mistake>(())
+/// ```
+pub struct Simulated<M> {
+    of: M,
+    /// For each signal the state that it shows as it is.
+    shows: Vec<Option<usize>>,
+}
+
+impl<M: PlantModel> Simulated<M> {
+    /// The model of this plant.
+    pub fn new(of: M) -> Self {
+        let shows = shown(of.interface(), &of.states());
+        Self { of, shows }
+    }
+
+    /// What it was made of.
+    pub fn plant_model(&self) -> &M {
+        &self.of
+    }
+
+    fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        let interface = self.of.interface();
+        let plant = self.of.plant(parameters)?;
+        let start = plant.start();
+        let input =
+            |(i, input): (usize, &Variable)| Drive::new(job.case.input(&input.name).or_else(|| self.of.input(i)));
+        let drives = interface.inputs.iter().enumerate().map(input).collect();
+        let mut driven = Driven::new(plant, drives, interface.forces(), &self.shows);
+        driven.can_start(&start)?;
+        let wanted = wanted(job, &interface.signals);
+        let tolerance = self.of.tolerance();
+        let recording = record(&mut driven as &mut dyn Dynamics<S>, &start, job.horizon, &tolerance, &wanted);
+        recording.map_err(|failure| driven.plant.explain(failure))
+    }
+}
+
+/// For each signal of a model the state that it shows as it is: the one that names it, or one without a start value of its name.
+pub(crate) fn shown(interface: &Interface, states: &[Variable]) -> Vec<Option<usize>> {
+    let signal_of = |state: &Variable| match interface.states.iter().find(|s| s.name == state.name) {
+        Some(named) => named.signal.clone(),
+        None => Some(state.name.clone()),
+    };
+    let signals: Vec<Option<String>> = states.iter().map(signal_of).collect();
+    interface.signals.iter().map(|v| signals.iter().position(|signal| signal.as_ref() == Some(&v.name))).collect()
+}
+
+impl<M: PlantModel> Model for Simulated<M> {
+    fn interface(&self) -> &Interface {
+        self.of.interface()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.of.notes()
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
+        self.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response))
+    }
+
+    fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
+        if seeds.is_empty() {
+            return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
+        }
+        Some(tangents_of(|parameters| self.simulate(job, parameters), job.parameters, seeds))
+    }
+
+    fn equation_states(&self) -> Vec<Variable> {
+        self.of.states()
+    }
+
+    fn start_values(&self, parameters: &[f64]) -> Option<Vec<f64>> {
+        self.of.plant(parameters).ok().map(|plant| plant.start())
+    }
+
+    fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
+        Some(local::local(&self.of, at))
+    }
+
+    fn ported(&self) -> Option<&dyn Open> {
+        (!self.of.interface().ports.is_empty()).then_some(self)
+    }
+}
+
+impl<M: PlantModel> Open for Simulated<M> {
+    fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
+        Ok(Box::new(self.of.open_plant(parameters)?))
+    }
+
+    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure> {
+        Ok(Box::new(self.of.open_plant(parameters)?))
+    }
+
+    fn tolerance(&self) -> Tolerance {
+        self.of.tolerance()
+    }
+}
