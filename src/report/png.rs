@@ -1,6 +1,7 @@
 //! A scene as a PNG: strokes by their distance from every pixel, letters by the bundled font, so that it needs no system font.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::path::Path;
 use std::sync::Once;
 
@@ -28,14 +29,22 @@ pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
         // Fails only for bytes that are no font.
         let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
     });
-    let size = SIZE.map(|length| (SCALE * length) as u32);
+    let [width, height] = SIZE.map(|length| (SCALE * length) as u32);
+    let mut pixels = vec![0; 3 * (width * height) as usize];
+    let mut paper = BitMapBackend::with_buffer(&mut pixels, (width, height));
+    paper.draw_rect((0, 0), (width as i32, height as i32), &WHITE, true).map_err(failed)?;
+    for mark in &scene.marks {
+        draw(&mut paper, mark)?;
+    }
+    paper.present().map_err(failed)?;
+    drop(paper);
     files::make(path, |path| {
-        let mut paper = BitMapBackend::new(path, (size[0], size[1]));
-        paper.draw_rect((0, 0), (size[0] as i32, size[1] as i32), &WHITE, true).map_err(failed)?;
-        for mark in &scene.marks {
-            draw(&mut paper, mark)?;
-        }
-        paper.present().map_err(failed)
+        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut image = encoder.write_header()?;
+        image.write_image_data(&pixels)?;
+        Ok(image.finish()?)
     })
 }
 
