@@ -41,8 +41,10 @@ mod bench;
 mod cli;
 mod diagnosis;
 mod files;
+mod numbers;
 mod plain;
 mod report;
+mod search;
 mod solve;
 mod store;
 mod tasks;
@@ -62,7 +64,8 @@ pub use mops_discrepancy as discrepancy;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
-pub use solve::{Keeping, Options, Solved, Unsuitable, solve, suits};
+pub use search::{Keeping, Options, Solved, Unsuitable, suits};
+pub use solve::solve;
 
 /// Everything that comes with mops: models, criteria, solvers and studies.
 pub fn catalogue() -> Catalogue {

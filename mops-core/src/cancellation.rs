@@ -3,7 +3,14 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use crate::solver::Halt;
+/// The run is over before the solver is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Halt {
+    /// The budget, of evaluations or of time, is spent.
+    Budget,
+    /// The user ended it.
+    Interrupted,
+}
 
 /// A request to end, shared by all clones. A simulation asks for it at every step and then fails with
 /// [`crate::Failure::Cancelled`]; a run keeps no such simulation, and ends.

@@ -2,17 +2,19 @@
 
 use std::sync::Arc;
 
+use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 use toml::de::ValueDeserializer;
 
 use crate::criterion::CriterionSpec;
-use crate::effect::Effect;
-use crate::file::schema_of;
+use crate::effect::{Effect, Placement};
+use crate::mistake::Mistake;
 use crate::model::Model;
-use crate::placement::Augment;
 use crate::solver::Solver;
-use crate::study::Mistake;
+
+/// Makes a model with effects of a model that has ports: the seam to the simulation, which core does not know.
+pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, Mistake>;
 
 /// Options of a kind of model, as they stand in a study file; their documentation is the kind's page in the manual.
 pub trait ModelOptions: DeserializeOwned + JsonSchema {
@@ -192,4 +194,12 @@ impl Catalogue {
         self.solvers.push(kind);
         self
     }
+}
+
+/// The schema of a type, complete in itself.
+pub fn schema_of<T: JsonSchema>() -> Schema {
+    let mut settings = SchemaSettings::draft07();
+    settings.inline_subschemas = true;
+    settings.meta_schema = None;
+    settings.into_generator().into_root_schema_for::<T>()
 }

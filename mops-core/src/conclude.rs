@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::catalogue::SolverChoice;
+use crate::evaluation::Evaluation;
 use crate::experiment::{Channel, Role};
 use crate::front;
 use crate::identification::{self, Local, Point, SensitivityReport};
@@ -10,12 +11,13 @@ use crate::math;
 use crate::model::Analysis;
 use crate::outcome::{
     self, CalibrationReport, ChannelReport, ExperimentReport, FailureReport, Findings, Outcome, ParameterReport,
-    Pareto, StartReport,
+    StartReport,
 };
-use crate::problem::{Evaluation, Problem};
+use crate::problem::Problem;
 use crate::run::{Budget, Run};
 use crate::solver::{Oracle, Stop};
 use crate::study::{Study, Task};
+use crate::trade_offs::Pareto;
 
 /// How a run ended, as far as the run itself does not know.
 #[derive(Debug, Clone, Copy)]

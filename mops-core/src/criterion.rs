@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
+use crate::mistake::Mistake;
 use crate::model::{Analysis, AnalysisKind, Interface};
 use crate::samples::Samples;
-use crate::study::Mistake;
 use crate::unit::Unit;
 
 /// A criterion as the study gives it: names and quantities not yet checked against a model.

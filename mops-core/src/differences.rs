@@ -1,8 +1,9 @@
 //! Slopes by differences, for problems whose models give no exact ones.
 
+use crate::cancellation::Halt;
+use crate::evaluation::Evaluation;
 use crate::math;
-use crate::problem::Evaluation;
-use crate::solver::{Halt, Linearisation, Oracle};
+use crate::solver::{Linearisation, Oracle};
 
 /// How slopes are taken from values that are exact to `noise`, relative to their size.
 ///

@@ -1,7 +1,8 @@
 //! What a run evaluates: a study's problem, or a problem with a known answer.
 
+use crate::evaluation::Evaluation;
 use crate::known::{Kept, KeptSlopes, Known, RowSlopes};
-use crate::problem::{Evaluation, Problem, Slopes};
+use crate::problem::{Problem, Slopes};
 use crate::solver::Shape;
 
 /// Rows of scaled values over the unit box. A pure function: the same point gives the same bits on every thread.

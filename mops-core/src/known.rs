@@ -3,8 +3,8 @@
 
 use crate::cancellation::Cancellation;
 use crate::criterion::Value;
-use crate::model::Failure;
-use crate::problem::Evaluation;
+use crate::evaluation::Evaluation;
+use crate::failure::Failure;
 
 /// The value of a row, by index, or why it has none.
 pub type RowValue = (usize, Result<Value, String>);

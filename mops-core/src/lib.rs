@@ -14,15 +14,18 @@ mod diagnostic;
 mod differences;
 mod effect;
 pub mod enclosure;
+mod evaluation;
 mod evaluator;
 mod experiment;
 pub mod expression;
+mod failure;
 pub mod file;
 pub mod front;
 pub mod identification;
 mod known;
 pub mod linear;
 mod linearised;
+mod mistake;
 mod model;
 mod outcome;
 mod placement;
@@ -46,10 +49,10 @@ mod tuner;
 mod uncertainty;
 mod unit;
 
-pub use cancellation::Cancellation;
+pub use cancellation::{Cancellation, Halt};
 pub use case::Case;
 pub use catalogue::{
-    Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, Shipped, SolverChoice, SolverKind,
+    Augment, Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, Shipped, SolverChoice, SolverKind,
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
@@ -60,26 +63,29 @@ pub use differences::Differences;
 pub use effect::{
     Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
 };
+pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
+pub use failure::Failure;
 pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
+pub use mistake::Mistake;
 pub use model::{
-    Analysis, AnalysisKind, Event, Failure, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
-    Variable, WithTangents, Work,
+    Analysis, AnalysisKind, Event, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State, Variable,
+    WithTangents, Work,
 };
 pub use mops_math as math;
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
-    Outcome, ParameterReport, Pareto, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
+    Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
-pub use placement::{Augment, EffectDraft};
+pub use placement::EffectDraft;
 pub use plant::{EventInstant, Instant, Open, Opening, Plant, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
-pub use problem::{Evaluation, FEASIBLE, Merit, Problem, Reading, Slopes};
+pub use problem::{Problem, Slopes};
 pub use random::{Stream, stream};
 pub use robustness::{
     AddedReport, CoordinateReport, DistributionReport, EffectReport, EffectsReport, Estimated, FailedAt,
@@ -90,17 +96,17 @@ pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch
 pub use samples::Samples;
 pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
 pub use slopes::{CriterionSlopes, SlopesReport};
-pub use solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
+pub use solver::{Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
     Axis, AxisDraft, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DiagnosisTask, Distribution, DistributionDraft,
-    Draft, ExcitationDraft, ExcitationTask, Free, JobPlan, Measured, Mistake, ModelDraft, MonteCarloTask, Objective,
-    ParameterSource, Place, RegressionDraft, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod,
-    SensitivityTask, Study, SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft, Uncertain, UncertainDraft,
-    UncertaintyTask, WorstCaseTask,
+    Draft, ExcitationDraft, ExcitationTask, Free, JobPlan, Measured, ModelDraft, MonteCarloTask, ParameterSource,
+    Place, RegressionDraft, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod, SensitivityTask, Study,
+    SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft, Uncertain, UncertainDraft, UncertaintyTask,
+    WorstCaseTask,
 };
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
-pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, TradeOffs};
+pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, Pareto, TradeOffs};
 pub use tuner::{Grid, Scale, Tuner};
 pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};
 pub use unit::{Quantity, Unit};

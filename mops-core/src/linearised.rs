@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 
 use crate::case::Case;
 use crate::diagnostic::suggestion;
+use crate::failure::Failure;
 use crate::linear::{Balance, NoEquilibrium, Point, StateSpace, equilibrium};
-use crate::model::{Analysis, AnalysisKind, Failure, Interface, Job, Local, Model, OperatingPoint, Variable};
-use crate::study::Mistake;
+use crate::mistake::Mistake;
+use crate::model::{Analysis, AnalysisKind, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::unit::Quantity;
 
 /// What is linearised: where, and between which inputs and signals.

@@ -5,27 +5,15 @@ use serde_json::{Map, Value, json};
 
 use crate::criterion::Usage;
 use crate::demand::Demand;
+use crate::evaluation::Evaluation;
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
-use crate::problem::Evaluation;
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
 use crate::slopes::SlopesReport;
 use crate::solver::Stop;
 use crate::study::{Study, Task};
-use crate::trade_offs::TradeOffs;
+use crate::trade_offs::{Pareto, TradeOffs};
 use crate::uncertainty::UncertaintyReport;
-
-/// Whether the result can be improved in one criterion without loss in another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Pareto {
-    /// To first order no direction improves one criterion and worsens none.
-    CertifiedLocal,
-    /// Nothing was shown.
-    NotShown,
-    /// A direction that improves is known.
-    No,
-}
 
 /// The result of a run.
 #[derive(Debug, Clone, Serialize)]
@@ -332,7 +320,7 @@ pub(crate) fn tuners(study: &Study, at: &Evaluation) -> Vec<TunerReport> {
 
 /// The criteria of an evaluation.
 pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport> {
-    let report = |(row, reading): (&crate::study::Row, &Option<crate::problem::Reading>)| {
+    let report = |(row, reading): (&crate::study::Row, &Option<crate::evaluation::Reading>)| {
         let plan = &study.jobs[row.job];
         let scaled = reading.map_or(f64::NAN, |r| r.scaled);
         let (demand, good, bad) = match row.demand {

@@ -5,12 +5,9 @@ use std::sync::Arc;
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::effect::Placement;
+use crate::mistake::Mistake;
 use crate::model::{Interface, Model};
 use crate::port::Port;
-use crate::study::Mistake;
-
-/// Makes a model with effects of a model that has ports: the seam to the simulation, which core does not know.
-pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, Mistake>;
 
 /// An effect at a place of a model, as it is written down: nothing checked yet.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! A model opened at its ports: what effects that it lacks act on.
 
 use crate::enclosure::Enclosure;
-use crate::model::Failure;
+use crate::failure::Failure;
 use crate::scalar::{Along, Scalar};
 
 /// Where a plant is looked at.

@@ -5,15 +5,16 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use rayon::prelude::*;
 
+use crate::cancellation::Halt;
 use crate::differences::Differences;
+use crate::evaluation::{Evaluation, Merit, Objective};
 use crate::evaluator::Evaluator;
+use crate::failure::Failure;
 use crate::front;
 use crate::known::{Kept, KeptSlopes, Store};
-use crate::model::Failure;
-use crate::problem::{Evaluation, Merit, Problem, Slopes};
+use crate::problem::{Problem, Slopes};
 use crate::random::{Stream, stream};
-use crate::solver::{Halt, Linearisation, Oracle, Progress, Shape, Solver, Stop};
-use crate::study::Objective;
+use crate::solver::{Linearisation, Oracle, Progress, Shape, Solver, Stop};
 
 /// What a run may cost.
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
+use crate::cancellation::Halt;
 use crate::criterion::Usage;
-use crate::problem::{Evaluation, Merit};
+use crate::evaluation::{Evaluation, Merit, Objective};
 use crate::random::Stream;
-use crate::study::Objective;
 
 /// What a solver knows of the problem: sizes and kinds, no names.
 ///
@@ -108,15 +108,6 @@ pub trait Oracle {
 
     /// The random stream of that label; always the same one under the same seed.
     fn stream(&self, label: &str) -> Stream;
-}
-
-/// The run is over before the solver is done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Halt {
-    /// The budget, of evaluations or of time, is spent.
-    Budget,
-    /// The user ended it.
-    Interrupted,
 }
 
 /// Why a run stopped.

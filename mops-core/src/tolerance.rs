@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use crate::study::Mistake;
+use crate::mistake::Mistake;
 use crate::unit::{Quantity, Unit};
 
 /// Accuracy and limits of a simulation.

@@ -3,9 +3,21 @@
 use serde::Serialize;
 
 use crate::criterion::Usage;
+use crate::evaluation::Evaluation;
 use crate::front;
-use crate::outcome::Pareto;
-use crate::problem::{Evaluation, Problem};
+use crate::problem::Problem;
+
+/// Whether the result can be improved in one criterion without loss in another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pareto {
+    /// To first order no direction improves one criterion and worsens none.
+    CertifiedLocal,
+    /// Nothing was shown.
+    NotShown,
+    /// A direction that improves is known.
+    No,
+}
 
 /// The block `trade_offs` of a result: beside the points of its `front`, in their order.
 #[derive(Debug, Clone, Serialize)]

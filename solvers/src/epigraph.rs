@@ -14,25 +14,7 @@ use nalgebra::DMatrix;
 
 use crate::active_set::{ActiveSet, Constraints, dot};
 use crate::definite::cholesky;
-pub use crate::rows::{Linear, Rows};
-
-/// What the rows weigh at the solution.
-#[derive(Debug, Clone, Default)]
-pub struct Multipliers {
-    /// Of the objective rows; they sum to 1.
-    pub objectives: Vec<f64>,
-    /// Of the inequalities.
-    pub inequalities: Vec<f64>,
-    /// Of the equalities, signed.
-    pub equalities: Vec<f64>,
-}
-
-impl Multipliers {
-    /// The sum of those of constraints.
-    pub fn of_constraints(&self) -> f64 {
-        self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
-    }
-}
+use crate::rows::{Linear, Multipliers, Rows};
 
 /// The solution of the subproblem.
 #[derive(Debug, Clone, Default)]

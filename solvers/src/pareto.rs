@@ -4,7 +4,8 @@ use mops_core::{Linearisation, Objective, Oracle, Pareto, Shape, Usage};
 use nalgebra::DMatrix;
 
 use crate::active_set::dot;
-use crate::epigraph::{Direction, Linear, Rows, Subproblem};
+use crate::epigraph::{Direction, Subproblem};
+use crate::rows::{Linear, Rows};
 
 /// Improvement per unit of step, relative to the steepest slope of its row, below which a direction is none: the accuracy
 /// of slopes by differences.

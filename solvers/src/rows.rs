@@ -3,7 +3,6 @@
 use mops_core::{Linearisation, Objective, Shape, Usage};
 
 use crate::active_set::dot;
-use crate::epigraph::Multipliers;
 
 /// A function's value and slope.
 #[derive(Debug, Default)]
@@ -203,6 +202,24 @@ fn clear(rows: &mut Vec<Linear>, index: usize, n: usize) {
     row.value = 0.0;
     row.slope.clear();
     row.slope.resize(n, 0.0);
+}
+
+/// What the rows weigh at the solution.
+#[derive(Debug, Clone, Default)]
+pub struct Multipliers {
+    /// Of the objective rows; they sum to 1.
+    pub objectives: Vec<f64>,
+    /// Of the inequalities.
+    pub inequalities: Vec<f64>,
+    /// Of the equalities, signed.
+    pub equalities: Vec<f64>,
+}
+
+impl Multipliers {
+    /// The sum of those of constraints.
+    pub fn of_constraints(&self) -> f64 {
+        self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
+    }
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use super::places::places;
 use super::study::{StudyArguments, open};
 use super::tables::{number, table};
 use super::{Trouble, print};
-use crate::solve::suits;
+use crate::search::suits;
 
 /// What is checked.
 #[derive(Args)]

@@ -12,7 +12,8 @@ use super::past::Past;
 use super::tables::{number, table};
 use super::{Trouble, cannot_write, print, print_json};
 use crate::files;
-use crate::report::{Responses, Rows, comparison_page, significant};
+use crate::numbers::significant;
+use crate::report::{Responses, Rows, comparison_page};
 
 /// What is compared.
 #[derive(Args)]

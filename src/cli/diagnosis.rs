@@ -4,7 +4,7 @@ use mops_discrepancy::{Diagnosis, Verdict};
 
 use super::tables::{number, table};
 use crate::diagnosis::{errors, words};
-use crate::report::significant;
+use crate::numbers::significant;
 
 /// Effects of the ranking that are printed.
 const SHOWN: usize = 6;

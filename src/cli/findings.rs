@@ -5,7 +5,8 @@ use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
 
 use super::robustness;
 use super::tables::{number, table};
-use crate::report::{combination, significant};
+use crate::numbers::significant;
+use crate::report::combination;
 
 /// Everything that was found beside criteria and tuners; empty where there is nothing.
 pub(super) fn text(outcome: &Outcome) -> String {

@@ -8,7 +8,8 @@ use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
 use super::Trouble;
 use super::study::{Home, StudyArguments};
-use crate::solve::{Keeping, Options, Solved, Unsuitable, solve, solves};
+use crate::search::{Keeping, Options, Solved, Unsuitable, solves};
+use crate::solve::solve;
 use crate::store::{Identity, Keeper, Opened, Refusal, RunRow, RunState, Start, row};
 
 /// What a run begins with.

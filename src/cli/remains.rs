@@ -16,7 +16,7 @@ use super::{Trouble, cannot_write};
 use crate::diagnosis::{Original, predictions, repaired, source};
 use crate::files::{self, Beside};
 use crate::report::Report;
-use crate::solve::Solved;
+use crate::search::Solved;
 use crate::toml_text::settled;
 
 /// How long a full disk is waited for.

@@ -9,7 +9,7 @@ use mops_core::{Catalogue, Diagnostic, Stop, suggestion};
 use super::past::Past;
 use super::{Trouble, cannot_write, keep, print};
 use crate::report::Report;
-use crate::solve::{Options, Solved};
+use crate::search::{Options, Solved};
 use crate::store::{self, Identity, Keeper, RunRow, RunState};
 
 /// Which page is written.

@@ -7,7 +7,7 @@ use mops_core::{
 
 use super::findings::{known, sentences, share};
 use super::tables::{number, table};
-use crate::report::significant;
+use crate::numbers::significant;
 
 /// Everything that was found where parameters are uncertain; empty where nothing was looked for.
 pub(super) fn text(found: &Findings) -> String {

@@ -14,8 +14,8 @@ use super::remains::{PATIENCE, Remains};
 use super::study::{StudyArguments, home, open_as, without_settings};
 use super::terminal::{print_json, say};
 use super::{Trouble, diagnosis, findings, keep, print, tables};
-use crate::report::file_name;
-use crate::solve::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
+use crate::numbers::file_name;
+use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
 use crate::watch::{Both, Page};
 

@@ -13,7 +13,8 @@ use super::study::{StudyArguments, open};
 use super::tables::{criteria, number, table};
 use super::{Trouble, cannot_write, print};
 use crate::files;
-use crate::report::{Curve, FileNames, Ink, Plot, points};
+use crate::numbers::FileNames;
+use crate::report::{Curve, Ink, Plot, points};
 
 /// What is simulated.
 #[derive(Args)]

@@ -5,7 +5,7 @@ use mops_core::{CriterionReport, Outcome, Task, Usage};
 
 /// A number to six significant digits.
 pub(super) fn number(value: f64) -> String {
-    crate::report::significant(value, 6)
+    crate::numbers::significant(value, 6)
 }
 
 /// A table with a header, columns of numbers to the right.
@@ -83,7 +83,7 @@ fn criteria_without(
 /// The value of a criterion, with as many digits as it takes to tell it from a demand that it misses.
 fn beside_its_demand(criterion: &CriterionReport) -> String {
     let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
-    crate::report::apart(criterion.value, limit, 6)
+    crate::numbers::apart(criterion.value, limit, 6)
 }
 
 /// A table without some of its columns; those of numbers are the ones that hold nothing else.

@@ -2,7 +2,7 @@
 
 use mops_discrepancy::{Diagnosis, ExperimentError, WindowErrors};
 
-use crate::report::significant;
+use crate::numbers::significant;
 
 /// Error of one channel, or of a whole experiment, before and after.
 pub(crate) struct Line<'a> {

@@ -2,7 +2,7 @@
 
 use mops_discrepancy::{Diagnosis, Prediction};
 
-use crate::report::{FileNames, significant};
+use crate::numbers::{FileNames, significant};
 
 /// The content of `predictions/NAME.csv` for every experiment, with its NAME: the time, then a column per measured output.
 /// The rows are the samples of the first channel; where another channel has no sample at that time, its cell is empty.

@@ -3,7 +3,7 @@
 use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict, together};
 
-use crate::report::significant;
+use crate::numbers::significant;
 
 /// Rivals whose BIC lies no farther behind than this cannot be told from an effect. Source: R. E. Kass, A. E. Raftery,
 /// Bayes Factors, JASA 90 (1995), section 3.2: a difference up to 2 is worth no more than a bare mention.

@@ -3,9 +3,9 @@
 use maud::{Markup, html};
 use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
 
-use super::numbers::{number, percent, significant};
 use super::page::scrolling;
 use super::sensitivity;
+use crate::numbers::{number, percent, significant};
 
 /// Parameters, then experiments.
 pub(super) fn section(calibration: &CalibrationReport) -> Markup {

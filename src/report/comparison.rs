@@ -2,9 +2,9 @@
 
 use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
 
-use super::numbers::{labelled, with_unit};
 use super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
 use super::sampling;
+use crate::numbers::{labelled, with_unit};
 
 /// The two analyses that are compared.
 pub(super) struct Both {

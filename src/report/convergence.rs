@@ -3,8 +3,8 @@
 use mops_core::{FEASIBLE, Merit, Objective, Record, Study, Task, Usage};
 
 use super::figures::{Figure, Group};
-use super::numbers::counted;
 use super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use crate::numbers::counted;
 
 /// The plots of objective and violation over evaluations.
 pub(super) fn group(study: &Study, archive: &[Record]) -> Group {

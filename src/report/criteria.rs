@@ -4,8 +4,8 @@ use maud::{Markup, html};
 use mops_core::{CriterionReport, Task, Usage};
 
 use super::Report;
-use super::numbers::{apart, number, significant, with_unit};
 use super::page::scrolling;
+use crate::numbers::{apart, number, significant, with_unit};
 
 /// What a criterion is asked for, with its unit; `None` where it is only watched and nothing was asked.
 pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {

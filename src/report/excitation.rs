@@ -5,10 +5,10 @@ use mops_core::ExcitationFindings;
 use mops_core::identification::{ExcitationReport, RegressionReport};
 
 use super::figures::{Figure, Group};
-use super::numbers::{number, percent, significant};
 use super::page::scrolling;
 use super::plot::{Curve, CurveStyle, Level, Plot};
 use super::sensitivity::sentences;
+use crate::numbers::{number, percent, significant};
 
 /// The findings of the task.
 pub(super) fn section(found: &ExcitationFindings) -> Markup {

@@ -6,9 +6,9 @@ use super::Report;
 use super::bode;
 use super::comparison::Both;
 use super::front;
-use super::numbers::{counted, with_unit};
 use super::plot::Plot;
 use super::uncertainty::{self, Around};
+use crate::numbers::{counted, with_unit};
 
 /// More jobs than this are not shown, but only those that come closest to their demands or miss them most.
 const MOST_JOBS: usize = 30;

@@ -6,10 +6,10 @@ use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
 
 use super::Report;
 use super::figures::{Figure, Group};
-use super::numbers::{labelled, number, significant};
 use super::page::scrolling;
 use super::plot::{Curve, CurveStyle, Ink, Level, Plot, Third, Upright};
 use super::sampling::{points, within_columns};
+use crate::numbers::{labelled, number, significant};
 
 /// More criteria than this are not drawn in pairs.
 const MOST_PAIRED: usize = 4;

@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use mops_core::{CriterionReport, Outcome, Usage};
 
-use super::numbers::{significant, with_unit};
 use super::page::scrolling;
+use crate::numbers::{significant, with_unit};
 
 /// A row for every case, a column for every criterion, and the worst of both; `None` of a single case, or where nothing is
 /// demanded.

@@ -14,7 +14,6 @@ mod figures;
 mod front;
 mod legend;
 mod matrix;
-mod numbers;
 mod page;
 mod pictures;
 mod plot;
@@ -45,9 +44,9 @@ use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 use mops_discrepancy::Diagnosis;
 
 use crate::files;
+use crate::numbers::FileNames;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
-pub(crate) use numbers::{FileNames, apart, file_name, significant};
 pub(crate) use page::document;
 use pictures::Pictures;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};

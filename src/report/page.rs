@@ -5,11 +5,11 @@ use mops_core::{CalibrationReport, Task};
 
 use super::Report;
 use super::figures::{Figure, Group};
-use super::numbers::significant;
 use super::verdict::{self, Tone};
 use super::{
     calibration, criteria, diagnosis, excitation, front, matrix, robustness, sensitivity, slopes, tuners, uncertainty,
 };
+use crate::numbers::significant;
 
 /// What the page shows beside the tables.
 pub(super) struct Pictures {

@@ -6,8 +6,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::numbers::file_name;
 use crate::files;
+use crate::numbers::file_name;
 
 /// The file that lists the pictures of a folder, a name without ending in each line.
 const LIST: &str = ".pictures";

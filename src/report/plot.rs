@@ -172,7 +172,7 @@ impl Plot {
             if let (Some(low), Some(high), Some(last)) =
                 (values().reduce(f64::min), values().reduce(f64::max), values().next_back())
             {
-                let [low, high, last] = [low, high, last].map(super::numbers::number);
+                let [low, high, last] = [low, high, last].map(crate::numbers::number);
                 text.push_str(&format!(" {}: from {low} to {high}, {last} at the end.", curve.name));
             }
         }

@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use mops_core::identification::{SensitivityReport, TunerSensitivity};
 
-use super::numbers::{number, percent, significant};
 use super::page::{rich, scrolling};
+use crate::numbers::{number, percent, significant};
 
 /// More tuners than this make tables that nobody reads.
 const MOST_TUNERS: usize = 24;

@@ -3,10 +3,10 @@
 use maud::{Markup, PreEscaped, html};
 use mops_core::{Analysis, Problem};
 
-use super::numbers::labelled;
 use super::page::{document, scrolling, section};
 use super::plot::{Curve, Ink, Plot};
 use super::sampling;
+use crate::numbers::labelled;
 
 /// A run whose responses are drawn.
 pub(crate) struct Responses {

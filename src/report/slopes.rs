@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use mops_core::SlopesReport;
 
-use super::numbers::significant;
 use super::page::scrolling;
+use crate::numbers::significant;
 
 /// A row for every criterion in its case, a column for every tuner.
 pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Markup {

@@ -3,9 +3,9 @@
 use mops_core::{FEASIBLE, SweepAxis, SweepReport};
 
 use super::figures::{Figure, Group};
-use super::numbers::labelled;
 use super::plot::{Curve, CurveStyle, Ink, Plot, Surface};
 use super::surface::border;
+use crate::numbers::labelled;
 
 /// The plot of a sweep.
 pub(super) fn group(sweep: &SweepReport, best_name: &str) -> Group {

@@ -11,7 +11,8 @@ use mops_core::{
 };
 
 use super::plot::{Curve, CurveStyle, Plot, Third};
-use super::{Level, Report, numbers};
+use super::{Level, Report};
+use crate::numbers;
 
 /// `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
 pub(super) struct Lag(Interface);

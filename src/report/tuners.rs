@@ -4,8 +4,8 @@ use maud::{Markup, html};
 use mops_core::{Scale, Tuner};
 
 use super::Report;
-use super::numbers::number;
 use super::page::scrolling;
+use crate::numbers::number;
 
 /// All tuners, and where they stand within their bounds.
 pub(super) fn table(report: &Report<'_>) -> Markup {

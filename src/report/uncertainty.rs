@@ -4,10 +4,10 @@ use maud::{Markup, html};
 use mops_core::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
 
 use super::figures::{Figure, Group};
-use super::numbers::{labelled, number, significant};
 use super::page::scrolling;
 use super::plot::{Curve, CurveStyle, Ink, Plot};
 use super::sensitivity::sentences;
+use crate::numbers::{labelled, number, significant};
 
 /// Title of the section.
 pub(super) const TITLE: &str = "Uncertainty of the estimates";

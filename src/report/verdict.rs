@@ -3,7 +3,7 @@
 use mops_core::{CriterionReport, Outcome, Pareto, Record, Role, Stop, Task, Usage};
 
 use super::Report;
-use super::numbers::{counted, percent, significant, with_unit};
+use crate::numbers::{counted, percent, significant, with_unit};
 
 /// How good the news is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

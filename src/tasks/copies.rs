@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mops_core::{Cancellation, Evaluation, Halt, Kept, Known, Problem, RowSlopes, Scenario, Store, Study};
 
-use crate::solve::Options;
+use crate::search::Options;
 
 /// A store in which a point goes by the values of all tuners and, where they are set, of the uncertain parameters after them.
 #[derive(Clone)]

@@ -7,7 +7,7 @@ use mops_core::{DiagnosisTask, Effect, Mistake, Study, Watch, suggestion};
 use mops_discrepancy::Diagnosis;
 
 use crate::diagnosis::block;
-use crate::solve::{Options, Solved, Unsuitable, look};
+use crate::search::{Options, Solved, Unsuitable, look};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();

@@ -3,7 +3,7 @@
 use mops_core::identification::{excitations, regressions};
 use mops_core::{ExcitationFindings, Study, Watch};
 
-use crate::solve::{Options, Solved, look};
+use crate::search::{Options, Solved, look};
 
 pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     let inputs = excitations(&study, &study.tasks.excitation.question);

@@ -10,8 +10,8 @@ use mops_core::{
 
 use super::batches::{Stage, each};
 use super::copies::{Copies, evaluate_at};
-use crate::report::significant;
-use crate::solve::{Options, Solved};
+use crate::numbers::significant;
+use crate::search::{Options, Solved};
 
 /// Trajectories of Morris, and samples of Sobol, where nothing is said.
 const TRAJECTORIES: usize = 20;

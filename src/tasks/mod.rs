@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
-use crate::solve::{Options, Solved, Unsuitable, look, search};
+use crate::search::{Options, Solved, Unsuitable, look, search};
 
 /// Does the task of the study.
 ///

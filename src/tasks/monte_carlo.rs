@@ -11,8 +11,8 @@ use mops_core::{
 use super::at;
 use super::batches::{Stage, each};
 use super::copies::{Copies, evaluate_at};
-use crate::report::significant;
-use crate::solve::{Options, Solved, Unsuitable};
+use crate::numbers::significant;
+use crate::search::{Options, Solved, Unsuitable};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let task = study.tasks.monte_carlo.clone();

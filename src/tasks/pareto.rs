@@ -6,8 +6,8 @@ use mops_core::math;
 use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
 use mops_solvers::certificate;
 
-use crate::report::significant;
-use crate::solve::{Options, Solved, Unsuitable, search};
+use crate::numbers::significant;
+use crate::search::{Options, Solved, Unsuitable, search};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();

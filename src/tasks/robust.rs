@@ -10,8 +10,8 @@ use mops_core::{
 use super::batches::Stage;
 use super::copies::Copies;
 use super::worst_case::{NO_GUARANTEE, Question, Region, Worst, sentence};
-use crate::report::significant;
-use crate::solve::{Keeping, Options, Solved, Unsuitable, search};
+use crate::numbers::significant;
+use crate::search::{Keeping, Options, Solved, Unsuitable, search};
 
 /// Outer approximation: solve for the cases at hand, search the box for worse ones, add them, and so on. The worst over the
 /// cases at hand is what no design can do better in, as far as the solver finds the optimum; the worst that is found in the

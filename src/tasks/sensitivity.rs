@@ -5,7 +5,7 @@ use mops_core::identification::{Point, sensitivity_at};
 use mops_core::{Place, SensitivityMethod, Study, Watch};
 
 use super::{at, global_sensitivity};
-use crate::solve::{Options, Solved, Unsuitable};
+use crate::search::{Options, Solved, Unsuitable};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let task = study.tasks.sensitivity;

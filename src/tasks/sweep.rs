@@ -3,8 +3,8 @@
 use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Study, SweepAxis, SweepReport, Watch};
 
 use super::at;
-use crate::report::significant;
-use crate::solve::{Options, Solved, Unsuitable};
+use crate::numbers::significant;
+use crate::search::{Options, Solved, Unsuitable};
 
 /// Share of all points, the lowest, that count as the valley.
 const VALLEY: f64 = 0.05;

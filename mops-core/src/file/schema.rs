@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use schemars::generate::SchemaSettings;
-use schemars::{JsonSchema, Schema};
+use schemars::Schema;
 use serde_json::{Map, Value, json};
 
 use super::entries::Entries;
@@ -15,17 +14,9 @@ use super::sections::{
     TunerSection,
 };
 use super::tasks::{DiagnosisSection, ExcitationSection, ParetoSection, SensitivitySection, SweepSection};
-use crate::catalogue::Catalogue;
+use crate::catalogue::{Catalogue, schema_of};
 use crate::effect::Effect;
 use crate::unit::Quantity;
-
-/// The schema of a type, complete in itself.
-pub fn schema_of<T: JsonSchema>() -> Schema {
-    let mut settings = SchemaSettings::draft07();
-    settings.inline_subschemas = true;
-    settings.meta_schema = None;
-    settings.into_generator().into_root_schema_for::<T>()
-}
 
 /// The schema of a whole study file, for editors.
 pub fn study_schema(catalogue: &Catalogue) -> Value {

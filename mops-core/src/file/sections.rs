@@ -7,9 +7,11 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 
 use super::entries::Entries;
 use crate::criterion::Usage;
+use crate::evaluation::Objective;
 use crate::experiment::{Hold, Input, Role};
 use crate::linearised::Linearise;
-use crate::study::{Mistake, Objective, Task};
+use crate::mistake::Mistake;
+use crate::study::Task;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 

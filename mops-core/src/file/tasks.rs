@@ -8,9 +8,10 @@ use super::tree::Node;
 use super::{Diagnostic, read_seconds};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
+use crate::mistake::Mistake;
 use crate::study::{
-    AxisDraft, DiagnosisTask, ExcitationDraft, Mistake, ParetoTask, Place, RegressionDraft, SensitivityMethod,
-    SensitivityTask, SweepDraft, Task, TasksDraft,
+    AxisDraft, DiagnosisTask, ExcitationDraft, ParetoTask, Place, RegressionDraft, SensitivityMethod, SensitivityTask,
+    SweepDraft, Task, TasksDraft,
 };
 use crate::unit::Quantity;
 

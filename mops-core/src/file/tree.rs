@@ -10,10 +10,11 @@ use serde_json::json;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-use super::schema::{documentation, schema_of};
+use super::schema::documentation;
 use super::{UNIT_HELP, shape, syntax};
+use crate::catalogue::schema_of;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
-use crate::study::Mistake;
+use crate::mistake::Mistake;
 use crate::unit::Quantity;
 
 /// A study's text, with every setting of the command line as a line of its own at the end, so that mistakes in

@@ -6,21 +6,8 @@ use super::report::ExcitationReport;
 use super::words::{counted, percent};
 use crate::case::Case;
 use crate::experiment::Input;
-use crate::study::Study;
+use crate::study::{ExcitationQuestion, Study};
 use crate::tuner::Tuner;
-
-/// Which inputs are looked at, and how.
-#[derive(Debug, Clone, Default)]
-pub struct ExcitationQuestion {
-    /// The inputs; all where absent.
-    pub inputs: Option<Vec<String>>,
-    /// Time between two samples, s; that of the recording where absent.
-    pub sample_time: Option<f64>,
-    /// Standard deviation of the noise on inputs, in the models' units.
-    pub noise: Vec<(String, f64)>,
-    /// Number of parameters to be estimated; that of the tuners that act in the case where absent.
-    pub parameters: Option<usize>,
-}
 
 /// How rich the inputs of every case are.
 pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<ExcitationReport> {

@@ -7,8 +7,9 @@ use super::local::{Local, Point, counting, local};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
 use super::sensitivity::{Coordinate, Eigen};
 use super::sentences::sentences;
+use crate::evaluation::Evaluation;
 use crate::math;
-use crate::problem::{Evaluation, Problem};
+use crate::problem::Problem;
 
 /// Share of the value up to which an estimate counts as determined.
 const TRUSTED: f64 = 0.1;

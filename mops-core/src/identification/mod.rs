@@ -24,7 +24,7 @@ mod words;
 pub use blind::{BlindDirection, Limit};
 pub use covariance::Covariance;
 pub use excitation::{Excitation, excitation};
-pub use excited::{ExcitationQuestion, excitation_report, excitations, spacing};
+pub use excited::{excitation_report, excitations, spacing};
 pub use fitted::regressions;
 pub(crate) use insight::report as report_of;
 pub use insight::sensitivity_at;

@@ -1,8 +1,8 @@
 //! What `task = "diagnosis"` is asked: as it is written down, and checked.
 
-use super::draft::Mistake;
 use super::{Study, Task};
 use crate::experiment::Role;
+use crate::mistake::Mistake;
 use crate::model::AnalysisKind;
 
 /// More effects than this are never added at once.

@@ -1,70 +1,15 @@
 //! A study as it is written down, in a file or in Rust: nothing checked yet.
 
-use std::ops::Range;
-
-use super::{Objective, Study, Task, TasksDraft};
+use super::{Study, Task, TasksDraft};
 use crate::catalogue::Catalogue;
 use crate::criterion::{CriterionSpec, Usage};
+use crate::evaluation::Objective;
 use crate::experiment::{Input, ResponseData, Role};
+use crate::mistake::Mistake;
 use crate::model::Model;
 use crate::placement::EffectDraft;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
-
-/// A mistake in a study, with the keys that lead to its place: `criteria`, `overshoot`, `overshoot`, `signal`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Mistake {
-    /// Keys from the study down.
-    pub path: Vec<String>,
-    /// The fact.
-    pub message: String,
-    /// The way out.
-    pub help: Option<String>,
-    /// Bytes of the text under the last key, where the mistake is in a part of it.
-    pub span: Option<Range<usize>>,
-}
-
-impl Mistake {
-    /// A mistake at a key.
-    pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { path: vec![key.into()], message: message.into(), help: None, span: None }
-    }
-
-    /// A mistake in the thing itself rather than under one of its keys.
-    pub fn here(message: impl Into<String>) -> Self {
-        Self { path: Vec::new(), message: message.into(), help: None, span: None }
-    }
-
-    /// Adds the way out.
-    #[must_use]
-    pub fn with_help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
-        self
-    }
-
-    /// Narrows the place to these bytes of the text under the key.
-    #[must_use]
-    pub fn at(mut self, span: Range<usize>) -> Self {
-        self.span = Some(span);
-        self
-    }
-
-    /// Puts the mistake under one more key.
-    #[must_use]
-    pub fn within(mut self, key: &str) -> Self {
-        self.path.insert(0, key.to_owned());
-        self
-    }
-}
-
-impl std::fmt::Display for Mistake {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.path.join("."), self.message)?;
-        self.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
-    }
-}
-
-impl std::error::Error for Mistake {}
 
 /// A study as it is written down. [`Draft::build`] checks it.
 #[derive(Default)]

@@ -16,12 +16,12 @@ use serde::{Deserialize, Serialize};
 
 pub use diagnosis::DiagnosisTask;
 pub use distribution::{Distribution, Uncertain};
-pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, Mistake, ModelDraft, TunerDraft};
+pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, ModelDraft, TunerDraft};
 pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 pub use scenarios::Scenario;
 pub use tasks::{
-    Axis, AxisDraft, ExcitationDraft, ExcitationTask, ParetoTask, Place, RegressionDraft, RegressionTask,
-    SensitivityTask, SweepDraft, SweepTask, Tasks, TasksDraft,
+    Axis, AxisDraft, ExcitationDraft, ExcitationQuestion, ExcitationTask, ParetoTask, Place, RegressionDraft,
+    RegressionTask, SensitivityTask, SweepDraft, SweepTask, Tasks, TasksDraft,
 };
 pub use uncertain::{DistributionDraft, UncertainDraft};
 
@@ -29,8 +29,8 @@ use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::criterion::{Criterion, Usage, Value};
 use crate::demand::{Demand, Scaled};
+use crate::evaluation::{FEASIBLE, Objective, Reading};
 use crate::model::Model;
-use crate::problem::{FEASIBLE, Reading};
 use crate::scalar::Scalar;
 use crate::tuner::Tuner;
 use crate::unit::Unit;
@@ -58,20 +58,6 @@ pub enum Task {
     MonteCarlo,
     /// Find the designs that no other is better than in every criterion, and what one criterion costs in terms of another.
     Pareto,
-}
-
-/// How the scaled values become one number to minimise.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Objective {
-    /// The largest weighted scaled value.
-    #[default]
-    Max,
-    /// The sum of the weighted scaled values.
-    Sum,
-    /// None: each counts for itself, and the run keeps the front of points that no other is better than in all of them.
-    /// The point reported is that of the front whose largest is least.
-    Each,
 }
 
 /// A study whose every name, size, bound and unit has been checked.

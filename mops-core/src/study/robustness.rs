@@ -3,10 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::draft::Mistake;
 use super::tasks::Place;
-use super::{Objective, Study, Task, Tasks};
+use super::{Study, Task, Tasks};
 use crate::diagnostic::suggestion;
+use crate::evaluation::Objective;
+use crate::mistake::Mistake;
 use crate::statistics::Sampling;
 
 /// More samples than this are refused: nobody waits for them by intention.

@@ -1,7 +1,8 @@
 //! The study over its uncertain parameters at a design, and with some of their values as cases.
 
 use super::distribution::Uncertain;
-use super::{JobPlan, Objective, ParameterSource, Study};
+use super::{JobPlan, ParameterSource, Study};
+use crate::evaluation::Objective;
 use crate::tuner::{Grid, Scale, Tuner};
 
 impl Study {

@@ -2,14 +2,14 @@
 
 use super::diagnosis::{self, DiagnosisTask};
 use super::distribution::Uncertain;
-use super::draft::Mistake;
 use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 use super::uncertain::{self, UncertainDraft};
-use super::{Objective, Row, Study, Task};
+use super::{Row, Study, Task};
 use crate::criterion::Usage;
 use crate::diagnostic::suggestion;
+use crate::evaluation::Objective;
 use crate::experiment::Role;
-use crate::identification::ExcitationQuestion;
+use crate::mistake::Mistake;
 use crate::tuner::Grid;
 use crate::unit::Quantity;
 
@@ -87,6 +87,19 @@ pub struct ExcitationDraft {
     pub parameters: Option<usize>,
     /// FIR and ARX models, by name.
     pub regressions: Vec<(String, RegressionDraft)>,
+}
+
+/// Which inputs are looked at, and how.
+#[derive(Debug, Clone, Default)]
+pub struct ExcitationQuestion {
+    /// The inputs; all where absent.
+    pub inputs: Option<Vec<String>>,
+    /// Time between two samples, s; that of the recording where absent.
+    pub sample_time: Option<f64>,
+    /// Standard deviation of the noise on inputs, in the models' units.
+    pub noise: Vec<(String, f64)>,
+    /// Number of parameters to be estimated; that of the tuners that act in the case where absent.
+    pub parameters: Option<usize>,
 }
 
 /// Which inputs are looked at.

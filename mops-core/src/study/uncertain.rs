@@ -2,9 +2,9 @@
 
 use super::Study;
 use super::distribution::{Distribution, Uncertain};
-use super::draft::Mistake;
 use crate::diagnostic::suggestion;
 use crate::math;
+use crate::mistake::Mistake;
 use crate::unit::Quantity;
 
 /// An uncertain parameter as it is written down.

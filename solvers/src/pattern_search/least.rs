@@ -7,7 +7,8 @@ use nalgebra::DMatrix;
 use super::barrier::{Promise, violation};
 use super::models::Models;
 use crate::definite::cholesky;
-use crate::epigraph::{Direction, Multipliers, Rows, Subproblem};
+use crate::epigraph::{Direction, Subproblem};
+use crate::rows::{Multipliers, Rows};
 
 /// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
 pub struct Aim<'a> {

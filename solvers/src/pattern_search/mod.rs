@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::definite::factored;
-use crate::epigraph::Rows;
+use crate::rows::Rows;
 use crate::sqp::SqpOptions;
 use crate::start::usable_start;
 use crate::texture::{Texture, texture};

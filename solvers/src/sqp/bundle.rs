@@ -1,6 +1,6 @@
 //! Pieces of criteria beyond their kinks.
 
-use crate::epigraph::Rows;
+use crate::rows::Rows;
 
 /// Points beyond kinks, with the rows there; what a criterion of several pieces needs besides the rows here.
 ///

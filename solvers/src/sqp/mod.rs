@@ -9,7 +9,8 @@ use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::epigraph::{Direction, Rows};
+use crate::epigraph::Direction;
+use crate::rows::Rows;
 use crate::start::usable_start;
 use state::{SATISFIED, State};
 
@@ -249,7 +250,7 @@ const KINK: f64 = 0.02;
 
 /// Whether a slope changes by as much as a tenth of the steepest.
 fn turns(before: &Rows, after: &Rows) -> bool {
-    let pairs = |rows: fn(&Rows) -> &Vec<crate::epigraph::Linear>| rows(before).iter().zip(rows(after));
+    let pairs = |rows: fn(&Rows) -> &Vec<crate::rows::Linear>| rows(before).iter().zip(rows(after));
     let all = pairs(|rows| &rows.objectives).chain(pairs(|rows| &rows.inequalities));
     all.into_iter().any(|(a, b)| {
         let size = a.slope.iter().chain(&b.slope).fold(0.0_f64, |most, s| most.max(s.abs()));

@@ -1,6 +1,6 @@
 //! Factors that bring the slopes of all rows to the order of 1.
 
-use crate::epigraph::{Linear, Rows};
+use crate::rows::{Linear, Rows};
 
 /// One factor for the objective, one for every constraint; those of constraints shrink only.
 ///

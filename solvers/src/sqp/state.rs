@@ -5,7 +5,8 @@ use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape};
 use super::bundle::Bundle;
 use super::hessian::Hessian;
 use super::scaling::Scaling;
-use crate::epigraph::{Direction, Rows, Subproblem};
+use crate::epigraph::{Direction, Subproblem};
+use crate::rows::Rows;
 
 pub(super) struct State {
     /// Values and slopes at the iterate.

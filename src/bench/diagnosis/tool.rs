@@ -6,7 +6,8 @@ use mops_core::file::{self, Files};
 use mops_core::{Catalogue, Quiet, Study, Watch};
 use mops_discrepancy::{Diagnosis, Verdict, brute_force};
 
-use crate::solve::{Options, solve};
+use crate::search::Options;
+use crate::solve::solve;
 
 /// Where the tools find what they need.
 #[derive(Clone, Copy)]

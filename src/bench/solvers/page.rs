@@ -2,7 +2,8 @@
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
-use crate::report::{Curve, CurveStyle, Ink, Plot, Upright, significant};
+use crate::numbers::significant;
+use crate::report::{Curve, CurveStyle, Ink, Plot, Upright};
 
 /// Inks that differ.
 const INKS: usize = 6;

@@ -48,7 +48,7 @@ pub(crate) fn suites() -> Vec<Suite> {
         name: "control",
         about: "20 studies of control design and calibration whose optimum is known; slopes as in `mops run`",
         accuracy: 1e-3,
-        budget: |_| crate::solve::DEFAULT_EVALUATIONS,
+        budget: |_| crate::search::DEFAULT_EVALUATIONS,
         relative: false,
         content: Content::Studies(mops_studies::control),
     };

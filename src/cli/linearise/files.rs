@@ -6,7 +6,7 @@ use mops_core::StateSpace;
 use serde_json::Value;
 
 use crate::cli::{Trouble, cannot_write, linear_plots};
-use crate::report::FileNames;
+use crate::numbers::FileNames;
 
 /// Writes the files; returns a sentence on what is there, and notes on what is not.
 ///

@@ -3,10 +3,10 @@
 use maud::{Markup, html};
 use mops_discrepancy::Diagnosis;
 
-use super::super::numbers::{number, significant};
 use super::super::page::scrolling;
 use crate::diagnosis::errors::lines;
 use crate::diagnosis::words::times;
+use crate::numbers::{number, significant};
 
 /// All experiments and channels.
 pub(super) fn table(diagnosis: &Diagnosis) -> Markup {

@@ -12,10 +12,10 @@ use maud::{Markup, html};
 use mops_discrepancy::{Diagnosis, Found, Verdict};
 
 use super::figures::Group;
-use super::numbers::significant;
 use super::page::{figures, rich, section};
 use super::verdict::Tone;
 use crate::diagnosis::words;
+use crate::numbers::significant;
 
 /// The plots of a diagnosis, in the order of the page.
 pub(super) struct Pictures {

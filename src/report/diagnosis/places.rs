@@ -4,11 +4,11 @@ use maud::{Markup, html};
 use mops_discrepancy::{Curve as Points, Diagnosis, Evidence};
 
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{labelled, significant};
 use super::super::page::{rich, scrolling};
 use super::super::plot::{Curve, CurveStyle, Ink, Plot};
 use super::super::sampling::thinned;
 use crate::diagnosis::words;
+use crate::numbers::{labelled, significant};
 
 /// Signals of more places than this are not drawn.
 const MOST_PLACES: usize = 3;

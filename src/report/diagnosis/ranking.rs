@@ -3,10 +3,10 @@
 use maud::{Markup, html};
 use mops_discrepancy::{Diagnosis, Ranked};
 
-use super::super::numbers::{number, percent, significant, with_unit};
 use super::super::page::scrolling;
 use super::places::{bar, named};
 use crate::diagnosis::words;
+use crate::numbers::{number, percent, significant, with_unit};
 
 /// Effects in the table; the others stand below it, to be opened.
 const SHOWN: usize = 10;

@@ -4,10 +4,10 @@ use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Prediction};
 
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{labelled, with_unit};
 use super::super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
 use super::super::sampling::thinned;
 use super::spectrum::{autocorrelation, band, even, spectrum};
+use crate::numbers::{labelled, with_unit};
 
 /// More experiments than this are not drawn.
 const MOST: usize = 4;

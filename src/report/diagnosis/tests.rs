@@ -6,7 +6,7 @@ use mops_discrepancy::Diagnosis;
 use super::super::Report;
 use super::super::tests::Lag;
 use crate::diagnosis::made_up;
-use crate::solve::Options;
+use crate::search::Options;
 use crate::tasks::diagnosis::of;
 
 /// Writes the report into a folder that lives as long as the answer.

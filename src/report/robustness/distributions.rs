@@ -5,11 +5,11 @@ use mops_core::math;
 use mops_core::{DistributionReport, MonteCarloReport, ShareReport};
 
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{labelled, number, significant};
 use super::super::page::scrolling;
 use super::super::plot::{Curve, CurveStyle, Ink, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
+use crate::numbers::{labelled, number, significant};
 
 /// Points of an empirical distribution function that are drawn.
 const DRAWN: usize = 400;

@@ -4,11 +4,11 @@ use maud::{Markup, html};
 use mops_core::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, SensitivityMethod};
 
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{labelled, significant};
 use super::super::page::scrolling;
 use super::super::plot::{Curve, CurveStyle, Ink, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
+use crate::numbers::{labelled, significant};
 
 pub(super) fn section(found: &GlobalSensitivityReport) -> Section {
     let morris = found.method == SensitivityMethod::Morris;

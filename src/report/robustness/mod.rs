@@ -10,9 +10,9 @@ use mops_core::{Outcome, UncertainReport};
 
 use super::Report;
 use super::figures::Group;
-use super::numbers::{number, significant};
 use super::page::scrolling;
 use super::verdict::Tone;
+use crate::numbers::{number, significant};
 
 /// A section of the page: its title, what is said, and its plots.
 pub(super) struct Section {

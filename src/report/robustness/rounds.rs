@@ -4,11 +4,11 @@ use maud::{Markup, html};
 use mops_core::RobustReport;
 
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{number, significant};
 use super::super::page::scrolling;
 use super::super::plot::{Curve, CurveStyle, Ink, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters, worst};
+use crate::numbers::{number, significant};
 
 pub(super) fn section(found: &RobustReport) -> Section {
     let content = html! {

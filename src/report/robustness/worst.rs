@@ -7,12 +7,12 @@ use mops_core::{CoordinateReport, Problem, UncertainReport, WorstCaseReport, Wor
 
 use super::super::Report;
 use super::super::figures::{Figure, Group};
-use super::super::numbers::{labelled, number, significant};
 use super::super::page::scrolling;
 use super::super::plot::{Curve, CurveStyle, Ink, Level, Plot};
 use super::super::sampling;
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
+use crate::numbers::{labelled, number, significant};
 
 pub(super) fn section(report: &Report<'_>, found: &WorstCaseReport) -> Section {
     let content = html! {

@@ -10,8 +10,8 @@ use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use profile::Profiles;
 
-use crate::report::significant;
-use crate::solve::Solved;
+use crate::numbers::significant;
+use crate::search::Solved;
 
 /// What all three rest on.
 struct Calibrated<'a> {

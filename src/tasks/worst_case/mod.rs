@@ -11,8 +11,8 @@ pub(super) use search::{Question, Region, Worst};
 
 use super::at;
 use super::batches::{Stage, each};
-use crate::report::significant;
-use crate::solve::{Options, Solved, Unsuitable};
+use crate::numbers::significant;
+use crate::search::{Options, Solved, Unsuitable};
 
 /// Values along each parameter through a worst case.
 const SLICE: usize = 61;

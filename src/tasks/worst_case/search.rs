@@ -12,7 +12,7 @@ use mops_core::{
 };
 
 use super::climb::{End, Goal, local, whole};
-use crate::solve::Options;
+use crate::search::Options;
 use crate::tasks::batches::{Stage, each};
 use crate::tasks::copies::{Copies, evaluate};
 

@@ -6,8 +6,9 @@ use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment, Input, ResponseData};
+use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Parameter, Variable};
-use crate::study::draft::{CaseDraft, ChannelDraft, Measured, Mistake};
+use crate::study::draft::{CaseDraft, ChannelDraft, Measured};
 use crate::unit::Unit;
 
 pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {

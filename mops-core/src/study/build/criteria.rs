@@ -9,8 +9,9 @@ use crate::case::Case;
 use crate::criterion::{Criterion, Sense, Usage};
 use crate::demand::Demand;
 use crate::diagnostic::suggestion;
+use crate::mistake::Mistake;
 use crate::model::AnalysisKind;
-use crate::study::draft::{CriterionDraft, Mistake};
+use crate::study::draft::CriterionDraft;
 use crate::study::{Row, Study};
 use crate::unit::{Quantity, Unit};
 

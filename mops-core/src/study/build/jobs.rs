@@ -2,8 +2,8 @@
 
 use super::values::signal_names;
 use crate::diagnostic::suggestion;
+use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Interface, Variable};
-use crate::study::draft::Mistake;
 use crate::study::{JobPlan, ParameterSource, Study};
 use crate::unit::Unit;
 

@@ -11,9 +11,11 @@ use std::sync::Arc;
 
 use crate::case::Case;
 use crate::criterion::Usage;
+use crate::evaluation::Objective;
+use crate::mistake::Mistake;
 use crate::model::{Interface, Model};
-use crate::study::draft::{CaseDraft, Draft, Mistake};
-use crate::study::{JobPlan, Objective, Study, Task, Tasks, diagnosis, tasks};
+use crate::study::draft::{CaseDraft, Draft};
+use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
 use cases::{assumed_units, build_case};
 use criteria::add_rows;
 use jobs::{complete, job};

@@ -2,7 +2,7 @@
 
 use crate::expression::Expression;
 use crate::expression::units::{Conflict, Dimensions, Measure, Named};
-use crate::study::draft::Mistake;
+use crate::mistake::Mistake;
 use crate::tuner::Tuner;
 
 /// Checks that an expression measures what the tuner `name` does, which it sets. Tuners that are `loose` have no unit, neither

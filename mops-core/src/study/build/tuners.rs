@@ -7,8 +7,9 @@ use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment};
 use crate::expression::Expression;
 use crate::math;
+use crate::mistake::Mistake;
 use crate::model::Parameter;
-use crate::study::draft::{Free, Mistake, TunerDraft};
+use crate::study::draft::{Free, TunerDraft};
 use crate::tuner::{Grid, Scale, Tuner};
 use crate::unit::{Quantity, Unit};
 

@@ -1,8 +1,9 @@
 //! Names, units and ranges of single values.
 
 use crate::diagnostic::suggestion;
+use crate::mistake::Mistake;
 use crate::model::{Parameter, Variable};
-use crate::study::draft::{CaseDraft, Mistake};
+use crate::study::draft::CaseDraft;
 use crate::unit::{Quantity, Unit};
 
 pub(super) fn section(case: &CaseDraft) -> &'static str {

@@ -1,7 +1,7 @@
 //! Numbers and names as a reader wants them: significant digits, units, percent, and names that every file system takes.
 
 /// A number to five significant digits without trailing zeros: `0.86341`, `12`, `1.2e-7`.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     significant(value, 5)
 }
 
@@ -42,22 +42,22 @@ fn trimmed(number: &str) -> &str {
 }
 
 /// A number with its unit; a pure number alone.
-pub(super) fn with_unit(value: f64, unit: &str) -> String {
+pub(crate) fn with_unit(value: f64, unit: &str) -> String {
     if unit == "1" || unit.is_empty() { number(value) } else { format!("{} {unit}", number(value)) }
 }
 
 /// A quantity with its unit in brackets, for an axis; a pure number alone.
-pub(super) fn labelled(name: &str, unit: &str) -> String {
+pub(crate) fn labelled(name: &str, unit: &str) -> String {
     if unit == "1" || unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
 /// A share as percent, to two significant digits: `3.1 %`.
-pub(super) fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
 /// A count with its noun: `1 case`, `3 cases`.
-pub(super) fn counted(count: usize, noun: &str) -> String {
+pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 

@@ -5,12 +5,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{
-    Analysis, CaseDraft, CriterionDraft, Draft, Failure, Interface, Job, Known, Model, ModelDraft, Parameter, Response,
-    RowSlopes, Trace, TunerDraft, Variable,
+    Analysis, CaseDraft, CriterionDraft, Draft, Failure, Halt, Interface, Job, Known, Model, ModelDraft, Parameter,
+    Response, RowSlopes, Trace, TunerDraft, Variable,
 };
 use mops_criteria::overshoot::Overshoot;
 
 use super::*;
+use crate::solve;
 
 /// `y = s + k^2 s (1 - s)`; at its simulation `last` somebody asks for the end.
 struct Watched {
