@@ -238,6 +238,11 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
         }
     }
 
+    fn guard_shows(&self, joint: usize) -> Option<(usize, f64)> {
+        let slides = self.coulomb[joint].value() != 0.0 && !self.is_stuck(joint);
+        slides.then(|| (SPEED[joint], self.contact[joint].sign()))
+    }
+
     fn switch(&mut self, joint: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         if self.is_stuck(joint) {
             let torque = self.holding_torque(&event.at, joint);

@@ -77,6 +77,12 @@ pub trait Plant<S: Scalar> {
         S::from(1.0)
     }
 
+    /// The state that a guard is, and the factor that it has: the speed of a joint that slides. `None` where it must be computed; the
+    /// search for events then reads one state instead of all.
+    fn guard_shows(&self, _index: usize) -> Option<(usize, f64)> {
+        None
+    }
+
     /// The rate of a guard along the solution, per s; `du` are the rates of the inputs. `None` where only values of the guard
     /// tell it.
     fn guard_rate(&self, _index: usize, _at: &Instant<'_, S>, _du: &[f64]) -> Option<f64> {
@@ -173,6 +179,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
         (**self).guard(index, at)
+    }
+    fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
+        (**self).guard_shows(index)
     }
     fn guard_rate(&self, index: usize, at: &Instant<'_, S>, du: &[f64]) -> Option<f64> {
         (**self).guard_rate(index, at, du)

@@ -112,6 +112,10 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         self.look(t, x, |plant, at| plant.guard(index, at))
     }
 
+    fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
+        self.plant.guard_shows(index)
+    }
+
     fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
         let mut values = [S::from(0.0); 3];
         for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {

@@ -170,9 +170,8 @@ impl<S: Scalar> Events<S> {
         let has_bounds = dynamics.has_bounds();
         if has_bounds {
             step.enclose(0.0, 1.0, &mut self.whole);
-        } else {
-            step.states_at(&INNER, &mut self.inner);
         }
+        let mut has_inner = false;
         for index in 0..self.values.len() {
             let mut value = |theta: f64| {
                 if theta >= 1.0 {
@@ -202,7 +201,14 @@ impl<S: Scalar> Events<S> {
             } else if has_bounds || end < 1.0 {
                 let inner = INNER.map(|place| value(place * end));
                 looks(&mut value, ends, inner)
+            } else if let Some((state, factor)) = dynamics.guard_shows(index) {
+                let inner = INNER.map(|place| (step.component(place, state) * factor).value());
+                looks(&mut value, ends, inner)
             } else {
+                if !has_inner {
+                    step.states_at(&INNER, &mut self.inner);
+                    has_inner = true;
+                }
                 let inner = dynamics.guard_at(index, &INNER.map(|place| step.time(place)), &self.inner);
                 looks(&mut value, ends, inner.map(Scalar::value))
             };

@@ -197,6 +197,13 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Plant<S> for Mechanism<S, B, N>
         }
     }
 
+    fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
+        match self.guards[index] {
+            Guard::Contact(i) if self.contact[i] != Contact::Stuck => Some((2 * i + 1, self.contact[i].sign())),
+            _ => None,
+        }
+    }
+
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         let at = event.at;
         match self.guards[index] {

@@ -110,6 +110,11 @@ pub trait Dynamics<S: Scalar> {
         ""
     }
 
+    /// As [`mops_core::Plant::guard_shows`].
+    fn guard_shows(&self, _index: usize) -> Option<(usize, f64)> {
+        None
+    }
+
     /// The values of a guard at several instants; provided here as [`Dynamics::signal_at`].
     #[doc(hidden)]
     fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
