@@ -34,7 +34,7 @@ pub struct Keeping {
     pub study: Study,
     /// Its points.
     pub store: Arc<dyn Store>,
-    /// The point of the unit box at which a search begins, instead of the start values; with one, the outcome tells how many
+    /// The point of the unit box at which a search begins, instead of the start values; with one, the outcome reports how many
     /// points were known.
     pub begin: Option<Vec<f64>>,
 }
@@ -192,7 +192,7 @@ fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Op
     SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
 }
 
-/// Whether the best point is Pareto-optimal, as far as it can be told.
+/// Whether the best point is Pareto-optimal, as far as that is known.
 fn pareto(run: &Run<'_>, stop: Stop, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
     let problem = run.problem();
     match run.best().filter(|best| best.merit.is_feasible()) {

@@ -384,7 +384,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         vec![S::from(0.0); self.denominator.len() + 2]
     }
 
-    // At each of the six stages of a step, with a number of states that is known there: as calls they cost a tenth of a simulation.
+    // At each of the six stages of a step, with a number of states that is known there.
     #[inline(always)]
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let n = at.x.len() - 2;

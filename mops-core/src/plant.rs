@@ -1,4 +1,4 @@
-//! A model opened at its ports: what effects that it lacks act on.
+//! The plant of a model: its equations at given parameters, with inputs and forces as arguments.
 
 use crate::enclosure::Enclosure;
 use crate::failure::Failure;
@@ -45,8 +45,8 @@ pub struct Span<'a> {
 /// A plant: `x' = f(t, x, u, w)` at given parameters, in modes of its own between which guards switch.
 ///
 /// It is written once over [`Scalar`], so that it runs with values and with exact tangents, those of jumps at events included.
-/// All of its state that is not in `x` is its mode, which changes in [`Plant::switch`], [`Plant::rest`] and [`Plant::settle`]
-/// alone; between them it is smooth.
+/// All of its state that is not in `x` is its mode, which changes in [`Plant::switch`], [`Plant::rest`], [`Plant::settle`] and
+/// [`Plant::linearised_at`] alone; between them it is smooth.
 pub trait Plant<S: Scalar> {
     /// The states at time 0.
     fn start(&self) -> Vec<S>;

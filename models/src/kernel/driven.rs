@@ -92,36 +92,22 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         self.plant.rates(&Instant { t, x, u: &inputs, w: &self.forces }, dx);
     }
 
+    #[inline]
     fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         self.look(t, x, |plant, at| plant.signal(signal, at))
-    }
-
-    fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
-        let mut values = [S::from(0.0); 5];
-        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
-            *value = self.look(t, x, |plant, at| plant.signal(signal, at));
-        }
-        values
     }
 
     fn guards(&self) -> usize {
         self.plant.guards()
     }
 
+    #[inline]
     fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
         self.look(t, x, |plant, at| plant.guard(index, at))
     }
 
     fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
         self.plant.guard_shows(index)
-    }
-
-    fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
-        let mut values = [S::from(0.0); 3];
-        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
-            *value = self.look(t, x, |plant, at| plant.guard(index, at));
-        }
-        values
     }
 
     fn guard_rate(&self, index: usize, t: f64, x: &[S]) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
 
 /// Evaluates an expression with the constant `$N` as the number of states, where it is small and there are no tangents; else with 0,
-/// which stands for any number. Loops over few states of a known number take half the time; with tangents it matters little.
+/// which stands for any number. The compiler unrolls loops over a known number of states.
 macro_rules! by_size {
     ($states:expr, $S:ty, $N:ident => $body:expr) => {
         match if <$S as mops_core::Scalar>::DIRECTIONS == 0 { $states } else { 0 } {
@@ -77,7 +77,7 @@ pub trait Dynamics<S: Scalar> {
     fn derivative(&self, t: f64, x: &[S], dx: &mut [S]);
 
     /// A step of the explicit method, tried: the state after it goes to `next`, and the norm of its errors comes back. Provided here,
-    /// so that the stages are compiled together with the equations: as calls these would cost a third of a simulation.
+    /// so that the stages are compiled together with the equations: as calls these are 6 % of the instructions of `pid-design`.
     #[doc(hidden)]
     fn attempt(&self, method: &mut DormandPrince<S>, at: Attempt<'_, S>, next: &mut [S]) -> f64 {
         by_size!(at.x.len(), S, N => method.attempt_of::<Self, N>(self, at, next))
@@ -91,7 +91,11 @@ pub trait Dynamics<S: Scalar> {
     /// The values of a signal at several instants. Provided here, so that it is compiled together with the signal.
     #[doc(hidden)]
     fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
-        std::array::from_fn(|k| self.signal(signal, times[k], &states[k]))
+        let mut values = [S::from(0.0); 5];
+        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
+            *value = self.signal(signal, t, x);
+        }
+        values
     }
 
     /// Number of guards in the present mode.
@@ -118,7 +122,11 @@ pub trait Dynamics<S: Scalar> {
     /// The values of a guard at several instants; provided here as [`Dynamics::signal_at`].
     #[doc(hidden)]
     fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
-        std::array::from_fn(|k| self.guard(index, times[k], &states[k]))
+        let mut values = [S::from(0.0); 3];
+        for ((value, &t), x) in values.iter_mut().zip(times).zip(states) {
+            *value = self.guard(index, t, x);
+        }
+        values
     }
 
     /// The rate of a guard along the solution, per s; `None` where only values of the guard tell it.

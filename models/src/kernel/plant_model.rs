@@ -11,7 +11,7 @@ use super::{Driven, Dynamics, Recording, Tolerance, local, record, tangents_of, 
 /// A plant that is written once over the scalar, with what it offers and takes; [`Simulated`] makes a model of it.
 ///
 /// The states are named by [`Interface::states`]; where that names signals for them, these have their units. What
-/// [`Interface::ports`] lists takes effects, and tells the order of the forces `w` that the plant adds to its equations.
+/// [`Interface::ports`] lists takes effects, in the order of the forces `w` that the plant adds to its equations.
 pub trait PlantModel: Send + Sync {
     /// What the model offers and takes.
     fn interface(&self) -> &Interface;

@@ -71,7 +71,7 @@ fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
     assert!((trace.at(7.29), trace.at(7.31)) == (0.0, 1.0));
 }
 
-/// `y' = 1` in steps of 1 s. The signals are all `y`; whoever reads one at a time is told.
+/// `y' = 1` in steps of 1 s. Every signal is `y`; each look calls the function with its time.
 struct Clock<F>(F);
 impl<S: Scalar, F: Fn(f64)> Dynamics<S> for Clock<F> {
     fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
