@@ -7,6 +7,7 @@ use super::layout::Layout;
 use super::program::Program;
 use super::system::{Contact, System};
 use super::tape::compile;
+use crate::kernel::groups;
 
 /// Where a signal comes from.
 #[derive(Debug)]
@@ -102,25 +103,14 @@ pub struct Compiled {
 /// A column of the Jacobian, and its rows.
 pub type Column = (usize, Vec<usize>);
 
-/// Groups of columns of which no two meet in a row, taken greedily.
-///
-/// Source: A. Curtis, M. Powell, J. Reid, On the estimation of sparse Jacobian matrices, IMA J. Appl. Math. 13 (1974) 117.
+/// Groups of columns of which no two meet in a row.
 fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
     let mut rows = vec![Vec::new(); states];
     for &(row, column) in pattern {
         rows[column].push(row);
     }
-    let mut groups: Vec<(Vec<bool>, Vec<Column>)> = Vec::new();
-    for (column, rows) in rows.into_iter().enumerate() {
-        let free = groups.iter().position(|(taken, _)| rows.iter().all(|&row| !taken[row]));
-        let group = free.unwrap_or(groups.len());
-        if free.is_none() {
-            groups.push((vec![false; states], Vec::new()));
-        }
-        rows.iter().for_each(|&row| groups[group].0[row] = true);
-        groups[group].1.push((column, rows));
-    }
-    groups.into_iter().map(|(_, columns)| columns).collect()
+    let columns = |group: Vec<usize>| group.into_iter().map(|column| (column, rows[column].clone())).collect();
+    groups(&rows).into_iter().map(columns).collect()
 }
 
 impl Compiled {

@@ -345,7 +345,7 @@ fn solve<S: Scalar>(factors: &Banded, b: &mut [S], column: &mut [f64]) {
 /// Columns in groups of which no two meet in a row, the first that fits taken for each.
 ///
 /// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974) 117-119.
-fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
+pub(crate) fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(Vec<usize>, Vec<bool>)> = Vec::new();
     for (column, of_column) in rows.iter().enumerate() {
         let fits = |(_, taken): &&mut (Vec<usize>, Vec<bool>)| of_column.iter().all(|&row| !taken[row]);

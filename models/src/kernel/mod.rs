@@ -61,6 +61,7 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 
 use dormand_prince::DormandPrince;
 pub use driven::Driven;
+pub(crate) use esdirk::groups;
 use integrate::Attempt;
 pub use integrate::integrate;
 pub(crate) use local::rests;
