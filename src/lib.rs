@@ -61,6 +61,7 @@ use std::process::ExitCode;
 pub use mops_core::*;
 pub use mops_criteria as criteria;
 pub use mops_discrepancy as discrepancy;
+pub use mops_effects as effects;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
@@ -73,7 +74,7 @@ pub fn catalogue() -> Catalogue {
         models: mops_models::kinds(),
         criteria: mops_criteria::kinds(),
         solvers: mops_solvers::kinds(),
-        effects: mops_models::effects::effects(),
+        effects: mops_effects::effects(),
         augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
         studies: mops_studies::shipped(),
     }

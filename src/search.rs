@@ -63,7 +63,7 @@ impl Default for Options {
             solver,
             max_evaluations: DEFAULT_EVALUATIONS,
             jobs: None,
-            effects: mops_models::effects::effects(),
+            effects: mops_effects::effects(),
             keeping: None,
             cancellation: Cancellation::default(),
         }

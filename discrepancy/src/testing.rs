@@ -7,7 +7,7 @@ use mops_core::{
     Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role,
     Scale, Study, Task, Tasks, Tuner, Unit, stream,
 };
-use mops_models::effects::effects;
+use mops_effects::effects;
 use mops_models::equations::EquationsOptions;
 
 use crate::base::{first_locals, pieces};

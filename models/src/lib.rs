@@ -1,6 +1,5 @@
 //! The simulation kernel of mops, and its models: one file each.
 
-pub mod effects;
 pub mod equations;
 pub mod furuta;
 pub mod furuta_2_joint;

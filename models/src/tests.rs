@@ -1,5 +1,6 @@
 //! Models against closed forms, published values and an independent integration.
 
+mod effects_simulated;
 mod furuta_bodies;
 mod state_feedback;
 

@@ -2,7 +2,7 @@
 
 use mops_core::Role;
 use mops_core::math;
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::base;
 use crate::meter::Meter;

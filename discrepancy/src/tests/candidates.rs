@@ -1,7 +1,7 @@
 //! Where effects are tried, and at which values.
 
 use mops_core::{Dimension, Trials};
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::candidate::{Candidate, Sizes, candidates};
 use crate::testing::{catalogue, model};

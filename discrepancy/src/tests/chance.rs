@@ -1,6 +1,6 @@
 //! The best of many candidates gains by chance alone: noise shows how much, as the unknowns leave it.
 
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::candidate::{Candidate, candidates};
 use crate::meter::Meter;

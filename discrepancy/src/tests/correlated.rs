@@ -1,6 +1,6 @@
 //! Residuals next to each other that are alike are not worth as much as many of their own.
 
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::meter::Meter;
 use crate::search::{Limits, Search, Trial};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{Effect, Hold, Input};
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::meter::Meter;
 use crate::screen::screen;

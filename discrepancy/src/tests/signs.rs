@@ -2,7 +2,7 @@
 
 use mops_core::math;
 use mops_core::{EffectClass, Hold, Input};
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::testing::{Record, integrated, study, subject, white};
 use crate::{Options, Verdict, diagnose};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{Hold, Input, Job, Model, Trials};
-use mops_models::effects::effects;
+use mops_effects::effects;
 
 use crate::candidate::candidates;
 use crate::fit::dot;

@@ -103,7 +103,7 @@ pub trait PlantModel: Send + Sync {
 /// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which takes effects.
 /// use mops_core::{Catalogue, EffectDraft, ModelDraft};
 /// let catalogue = Catalogue {
-///     effects: mops_models::effects::effects(),
+///     effects: mops_effects::effects(),
 ///     augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
 ///     ..Catalogue::default()
 /// };

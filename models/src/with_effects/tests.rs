@@ -8,8 +8,9 @@ use mops_core::{
     Plant, Port, Scalar, Variable,
 };
 
+use mops_effects::effects;
+
 use super::WithEffects;
-use crate::effects::effects;
 use crate::equations::EquationsOptions;
 use crate::kernel::{PlantModel, Simulated, mechanism};
 use crate::tests::{check_tangents_by, respond};

@@ -1,7 +1,7 @@
 //! What the test bed and the catalogue call the same things.
 
 use mops_core::math;
-use mops_models::effects::effects;
+use mops_effects::effects;
 use mops_testbed::TrueEffect;
 
 /// Kinds of effect in the catalogue that are this effect of the test bed.

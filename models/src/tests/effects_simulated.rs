@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{Analysis, Case, Effect, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind, Strength};
+use mops_effects::effects;
 
-use super::effects;
 use crate::equations::EquationsOptions;
 use crate::with_effects::WithEffects;
 
@@ -434,42 +434,6 @@ fn what_stores_energy_gives_it_back() {
         let energy: Vec<f64> = x.iter().zip(&v).map(|(x, v)| v * v + potential(*x)).collect();
         let start = 0.8 * 0.8 + potential(0.1);
         close(&energy, &vec![start; energy.len()], 1e-5);
-    }
-}
-
-#[test]
-fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
-    let cases: [(&str, &[f64], f64, f64); 23] = [
-        ("input-bias", &[0.3], 1.0, 1.3),
-        ("input-gain", &[-0.2], 2.0, 1.6),
-        ("input-saturation", &[1.5], -2.0, -1.5),
-        ("input-saturation", &[1.5], 1.2, 1.2),
-        ("input-dead-zone", &[0.5], -2.0, -1.5),
-        ("input-dead-zone", &[0.5], 0.4, 0.0),
-        ("input-asymmetry", &[0.25], 2.0, 2.5),
-        ("input-asymmetry", &[0.25], -2.0, -1.5),
-        ("quadratic-input", &[0.1], -2.0, -2.4),
-        ("input-quantisation", &[0.25], 0.9, 1.0),
-        ("sensor-bias", &[0.3], 1.0, 1.3),
-        ("sensor-gain", &[-0.2], 2.0, 1.6),
-        ("sensor-saturation", &[1.5, 0.0], 2.0, 1.5),
-        ("sensor-saturation", &[1.5, 0.0], -2.0, -1.5),
-        ("sensor-saturation", &[1.5, 1.0], 2.0, 1.5),
-        ("sensor-saturation", &[1.5, 1.0], -2.0, -2.0),
-        ("sensor-saturation", &[-1.5, -1.0], -2.0, -1.5),
-        ("sensor-saturation", &[-1.5, -1.0], 2.0, 2.0),
-        ("sensor-quantisation", &[0.25], -0.9, -1.0),
-        ("sensor-dead-zone", &[0.5, 1.0], 2.0, 1.5),
-        ("sensor-dead-zone", &[0.5, 1.0], 1.3, 1.0),
-        ("sensor-gap", &[0.5, 1.0], 1.3, 1.0),
-        ("sensor-gap", &[0.5, 1.0], 1.6, 1.6),
-    ];
-    for (name, strengths, value, expected) in cases {
-        let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
-        let mut seen = [0.0; 11];
-        seen[0] = value;
-        let found = effect.act(strengths).value(&super::at(&seen), &[]);
-        assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");
     }
 }
 

@@ -1,7 +1,5 @@
 //! What holds for every effect of the catalogue.
 
-mod simulated;
-
 use std::collections::BTreeSet;
 
 use mops_core::math;
@@ -292,4 +290,40 @@ fn a_gust_pushes_as_long_and_as_hard_as_its_integral_says() {
     let h = 1e-4;
     let push: f64 = (0..20_000).map(|k| gust.value(&At { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
     assert!((push - 3.0 * 0.45 / 2.0).abs() < 1e-9, "{push}");
+}
+
+#[test]
+fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
+    let cases: [(&str, &[f64], f64, f64); 23] = [
+        ("input-bias", &[0.3], 1.0, 1.3),
+        ("input-gain", &[-0.2], 2.0, 1.6),
+        ("input-saturation", &[1.5], -2.0, -1.5),
+        ("input-saturation", &[1.5], 1.2, 1.2),
+        ("input-dead-zone", &[0.5], -2.0, -1.5),
+        ("input-dead-zone", &[0.5], 0.4, 0.0),
+        ("input-asymmetry", &[0.25], 2.0, 2.5),
+        ("input-asymmetry", &[0.25], -2.0, -1.5),
+        ("quadratic-input", &[0.1], -2.0, -2.4),
+        ("input-quantisation", &[0.25], 0.9, 1.0),
+        ("sensor-bias", &[0.3], 1.0, 1.3),
+        ("sensor-gain", &[-0.2], 2.0, 1.6),
+        ("sensor-saturation", &[1.5, 0.0], 2.0, 1.5),
+        ("sensor-saturation", &[1.5, 0.0], -2.0, -1.5),
+        ("sensor-saturation", &[1.5, 1.0], 2.0, 1.5),
+        ("sensor-saturation", &[1.5, 1.0], -2.0, -2.0),
+        ("sensor-saturation", &[-1.5, -1.0], -2.0, -1.5),
+        ("sensor-saturation", &[-1.5, -1.0], 2.0, 2.0),
+        ("sensor-quantisation", &[0.25], -0.9, -1.0),
+        ("sensor-dead-zone", &[0.5, 1.0], 2.0, 1.5),
+        ("sensor-dead-zone", &[0.5, 1.0], 1.3, 1.0),
+        ("sensor-gap", &[0.5, 1.0], 1.3, 1.0),
+        ("sensor-gap", &[0.5, 1.0], 1.6, 1.6),
+    ];
+    for (name, strengths, value, expected) in cases {
+        let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
+        let mut seen = [0.0; 11];
+        seen[0] = value;
+        let found = effect.act(strengths).value(&at(&seen), &[]);
+        assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");
+    }
 }
