@@ -37,18 +37,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bench;
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))] // Helpers of the command line stay in smaller builds.
+
+#[cfg(feature = "cli")]
 mod cli;
 mod diagnosis;
 mod files;
 mod numbers;
 mod plain;
-mod report;
+#[cfg(feature = "report")]
+pub mod report;
 mod search;
 mod solve;
+#[cfg(feature = "store")]
 mod store;
 mod tasks;
+#[cfg(feature = "cli")]
+pub mod terminal;
+#[cfg(feature = "cli")]
 mod toml_text;
+#[cfg(feature = "watch")]
 mod watch;
 
 /// The fragments of the guide in Rust, compiled and run.
@@ -56,16 +64,16 @@ mod watch;
 #[doc = include_str!("../docs/guide/7-in-rust.md")]
 mod guide {}
 
-use std::process::ExitCode;
-
 pub use mops_core::*;
 pub use mops_criteria as criteria;
 pub use mops_discrepancy as discrepancy;
 pub use mops_effects as effects;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
+pub use mops_studies as studies;
+#[cfg(feature = "report")]
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
-pub use search::{Keeping, Options, Solved, Unsuitable, suits};
+pub use search::{DEFAULT_EVALUATIONS, Keeping, Options, Solved, Unsuitable, suits};
 pub use solve::solve;
 
 /// Everything that comes with mops: models, criteria, solvers and studies.
@@ -80,7 +88,8 @@ pub fn catalogue() -> Catalogue {
     }
 }
 
+#[cfg(feature = "cli")]
 /// The command line over a catalogue; a crate with kinds of its own calls it from its `main`.
-pub fn main(catalogue: Catalogue) -> ExitCode {
+pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
     cli::main(&catalogue)
 }

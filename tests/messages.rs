@@ -623,7 +623,6 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             called("a solver that cannot do it", &["run", "pid-design", "--quiet", "--solver", "levenberg-marquardt"]),
             Case::new("a solver of the study that cannot do it", &broken(DESIGN, "[cases]", "[solver.nsga2]\n[cases]"))
                 .called(&["check", "study.toml"]),
-            called("no budget", &["bench", "minimax", "--budget", "0"]),
             called("no evaluation", &["run", "study.toml", "--max-evaluations", "0"]),
             called("an unknown tuner", &["simulate", "study.toml", "--at", "Tx=1"]),
             called("a tuner without a value", &["simulate", "study.toml", "--at", "Ti"]),
@@ -635,13 +634,6 @@ fn a_command_line_that_asks_for_what_is_not_there() {
             called("a kind that is not there", &["describe", "settle-time"]),
             called("a data file that is not there", &["data", "swing.csv"]),
             called("an unknown command", &["rum", "study.toml"]),
-            called("slopes of studies that have their own", &["bench", "control", "--gradients"]),
-            called("a front under noise", &["bench", "zdt", "--noise", "0.1"]),
-            called("noise that is all there is", &["bench", "minimax", "--noise", "2"]),
-            called(
-                "a solver for none of the problems",
-                &["bench", "minimax", "--solver", "nsga2", "--problems", "CB2"],
-            ),
         ],
     );
 }

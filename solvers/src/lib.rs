@@ -1,6 +1,7 @@
 //! Solvers of mops: one file each, behind one seam ([`mops_core::Solver`]).
 
 mod active_set;
+#[cfg(feature = "argmin")]
 mod argmin_adapter;
 pub mod auto;
 pub mod cma_es;
@@ -9,16 +10,20 @@ pub mod differential_evolution;
 mod directions;
 pub mod epigraph;
 pub mod evolution;
+#[cfg(feature = "argmin")]
 pub mod for_argmin;
 pub mod genetic;
+#[cfg(feature = "argmin")]
 pub mod l_bfgs;
 pub mod levenberg_marquardt;
 mod multistart;
+#[cfg(feature = "argmin")]
 pub mod nelder_mead;
 pub mod nsga2;
 pub mod nsga3;
 mod own;
 mod pareto;
+#[cfg(feature = "argmin")]
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
@@ -52,9 +57,12 @@ pub fn kinds() -> Vec<SolverKind> {
         SolverKind::of::<nsga2::Nsga2Options>(),
         SolverKind::of::<nsga3::Nsga3Options>(),
         SolverKind::of::<levenberg_marquardt::LevenbergMarquardtOptions>(),
+        #[cfg(feature = "argmin")]
         SolverKind::of::<nelder_mead::NelderMeadOptions>(),
+        #[cfg(feature = "argmin")]
         SolverKind::of::<particle_swarm::ParticleSwarmOptions>(),
         SolverKind::of::<simulated_annealing::SimulatedAnnealingOptions>(),
+        #[cfg(feature = "argmin")]
         SolverKind::of::<l_bfgs::LBfgsOptions>(),
     ]
 }

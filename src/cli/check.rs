@@ -11,9 +11,8 @@ use mops_core::{
 use super::families::folded;
 use super::places::places;
 use super::study::{StudyArguments, open};
-use super::tables::{number, table};
-use super::{Trouble, print};
 use crate::search::suits;
+use crate::terminal::{CommandError, number, print, table};
 
 /// What is checked.
 #[derive(Args)]
@@ -22,7 +21,7 @@ pub(super) struct Arguments {
     study: StudyArguments,
 }
 
-pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let file = open(catalogue, &arguments.study)?;
     let study = &file.study;
     suits(study, &file.solver).map_err(|why| file.locate(&why.0))?;

@@ -9,11 +9,10 @@ use mops_core::{Catalogue, Diagnostic, Problem};
 use serde_json::{Value, json};
 
 use super::past::Past;
-use super::tables::{number, table};
-use super::{Trouble, cannot_write, print, print_json};
 use crate::files;
 use crate::numbers::significant;
 use crate::report::{Responses, Rows, comparison_page};
+use crate::terminal::{CommandError, number, print, print_json, table};
 
 /// What is compared.
 #[derive(Args)]
@@ -36,7 +35,7 @@ struct Line {
     values: Vec<Option<f64>>,
 }
 
-pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let runs = arguments.folders.iter().map(|folder| Past::of(folder)).collect::<Result<Vec<_>, _>>()?;
     let results: Vec<&Value> = runs.iter().map(|run| run.ended().unwrap_or(&Value::Null)).collect();
     if results.iter().all(|result| result.is_null()) {
@@ -65,7 +64,7 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
         let (responses, silent) = responses(catalogue, &runs, &results);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
         let page = comparison_page(&names, &tables, &responses, &silent);
-        files::write(path, page).map_err(cannot_write(path))?;
+        files::write(path, page).map_err(CommandError::cannot_write(path))?;
         if !arguments.json {
             print(&format!("\nthe responses are drawn in {}\n", path.display()))?;
         }

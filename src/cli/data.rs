@@ -9,8 +9,8 @@ use mops_core::data::DataFile;
 use mops_core::identification::{excitation_report, spacing};
 use mops_core::math;
 
-use super::tables::{number, table};
-use super::{Trouble, findings, print};
+use super::findings;
+use crate::terminal::{CommandError, number, print, table};
 
 /// What is shown.
 #[derive(Args)]
@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     excitation: Option<String>,
 }
 
-pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let file = DataFile::read(&arguments.file)?;
     let names = file.column_names();
     if let Some(column) = &arguments.excitation {

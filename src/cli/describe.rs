@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::{Catalogue, Diagnostic, ModelKind, suggestion};
 
+use super::effect;
 use super::places::places;
-use super::{Trouble, effect, print};
+use crate::terminal::{CommandError, print};
 
 /// What is described.
 #[derive(Args)]
@@ -16,7 +17,7 @@ pub(super) struct Arguments {
     name: String,
 }
 
-pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let name = arguments.name.as_str();
     let models = catalogue.models.iter().map(|k| (k.name, k.schema));
     let criteria = catalogue.criteria.iter().map(|k| (k.name, k.schema));

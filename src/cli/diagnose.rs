@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::Catalogue;
 
-use super::Trouble;
 use super::run::{Common, Search, go};
+use crate::terminal::CommandError;
 
 /// What can be said to a diagnosis.
 #[derive(Args)]
@@ -15,6 +15,6 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-pub(super) fn diagnose(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn diagnose(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     go(catalogue, &arguments.common, &Search::Diagnosis)
 }

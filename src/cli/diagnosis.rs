@@ -2,9 +2,9 @@
 
 use mops_discrepancy::{Diagnosis, Verdict};
 
-use super::tables::{number, table};
 use crate::diagnosis::{errors, words};
 use crate::numbers::significant;
+use crate::terminal::{number, table};
 
 /// Effects of the ranking that are printed.
 const SHOWN: usize = 6;

@@ -1,8 +1,7 @@
 //! The manual page of an effect that a model may lack.
 
+use crate::terminal::number;
 use mops_core::{Dimension, Effect, PortKind, Scope, Strength};
-
-use super::tables::number;
 
 /// Its definition, formula, places, strengths and source.
 pub(super) fn page(effect: &dyn Effect) -> String {

@@ -4,9 +4,9 @@ use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityR
 use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
 
 use super::robustness;
-use super::tables::{number, table};
 use crate::numbers::significant;
 use crate::report::combination;
+use crate::terminal::{number, table};
 
 /// Everything that was found beside criteria and tuners; empty where there is nothing.
 pub(super) fn text(outcome: &Outcome) -> String {

@@ -9,8 +9,7 @@ use mops_core::{Catalogue, Diagnostic};
 use serde_json::{Value, json};
 
 use super::past::{Past, date};
-use super::tables::{number, table};
-use super::{Trouble, print, print_json};
+use crate::terminal::{CommandError, number, print, print_json, table};
 
 /// Folders within folders that are looked into, at most.
 const DEPTH: usize = 8;
@@ -26,7 +25,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let folder = &arguments.folder;
     if !folder.is_dir() {
         return Err(Diagnostic::new(format!("there is no folder `{}`", folder.display()))

@@ -6,11 +6,11 @@ use clap::Args;
 use mops_core::file::StudyFile;
 use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
-use super::Trouble;
 use super::study::{Home, StudyArguments};
 use crate::search::{Keeping, Options, Solved, Unsuitable, solves};
 use crate::solve::solve;
 use crate::store::{Identity, Keeper, Opened, Refusal, RunRow, RunState, Start, row};
+use crate::terminal::CommandError;
 
 /// What a run begins with.
 #[derive(Args)]
@@ -40,7 +40,7 @@ impl Beginning {
     }
 }
 
-impl From<Refusal> for Trouble {
+impl From<Refusal> for CommandError {
     fn from(refusal: Refusal) -> Self {
         match refusal {
             Refusal::Mistake(diagnostic) => diagnostic.into(),
@@ -70,7 +70,7 @@ pub(super) fn open(
     (file, study): (&StudyFile, &StudyArguments),
     home: &Home,
     options: &Options,
-) -> Result<Keeper, Trouble> {
+) -> Result<Keeper, CommandError> {
     if !keeps(&file.study) && *start != Start::Fresh {
         return Err(Diagnostic::new("this task keeps no evaluations that a later run could use")
             .with_help("leave --resume and --reuse out: the same seed gives the same result")

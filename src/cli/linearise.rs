@@ -18,9 +18,8 @@ use serde_json::{Value, json};
 
 use self::feedback::Wanted;
 use self::text::MANY;
-use super::limits::{Limit, or_end};
 use super::study::{StudyArguments, open};
-use super::{Trouble, print};
+use crate::terminal::{CommandError, Limit, or_end, print};
 
 /// What is linearised, and what is done with it.
 #[derive(Args)]
@@ -62,7 +61,7 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
 }
 
-pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     or_end(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
     let (job, model) = chosen(&study, arguments)?;
@@ -117,7 +116,7 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
 }
 
 /// Prints zeros and transfer functions of the channels, and gives them as JSON: of `all`, or of those that are shown.
-fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Value>, Trouble> {
+fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Value>, CommandError> {
     let mut values = Vec::new();
     let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
     for (count, (i, o)) in pairs.enumerate() {
@@ -216,10 +215,17 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
 }
 
 /// The system, with all inputs and outputs.
-fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &Arguments) -> Result<Resting, Trouble> {
+fn found(
+    study: &Study,
+    job: usize,
+    parameters: &[f64],
+    at: Named,
+    arguments: &Arguments,
+) -> Result<Resting, CommandError> {
     let plan = &study.jobs[job];
     let (model, case) = (&study.models[plan.model].1, &study.cases[plan.case]);
-    let undefined = |failure: Failure| Trouble::Failure(format!("the model cannot be linearised there: {failure}"));
+    let undefined =
+        |failure: Failure| CommandError::Failure(format!("the model cannot be linearised there: {failure}"));
     if model.interface().analysis == AnalysisKind::Linear {
         if let Some((name, _)) = at.first() {
             return Err(Diagnostic::new(format!("`--at {name}`: a linear model has no such tuner or parameter"))
@@ -247,7 +253,7 @@ fn found(study: &Study, job: usize, parameters: &[f64], at: Named, arguments: &A
     let told = |Mistake { message, help, .. }: Mistake| Diagnostic { help, ..Diagnostic::new(message) };
     let found = Linearised::new(Arc::clone(model), &options).map_err(told)?.at(case, parameters).map_err(undefined)?;
     match found.rough.iter().find(|rough| rough.is_rate) {
-        Some(rough) => Err(Trouble::Failure(format!(
+        Some(rough) => Err(CommandError::Failure(format!(
             "the model cannot be linearised there: {rough}; --at chooses another operating point"
         ))),
         None => Ok(found),

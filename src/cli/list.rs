@@ -2,11 +2,9 @@
 
 use std::process::ExitCode;
 
+use crate::terminal::{CommandError, print, table};
 use clap::{Args, ValueEnum};
 use mops_core::Catalogue;
-
-use super::tables::table;
-use super::{Trouble, print};
 
 /// What is listed.
 #[derive(Args)]
@@ -25,7 +23,7 @@ enum Sort {
     Effects,
 }
 
-pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let first_line = |schema: schemars::Schema| {
         let about = schema.as_value().get("description").and_then(|d| d.as_str()).unwrap_or_default();
         first_statement(about)

@@ -1,6 +1,5 @@
 //! The command line: what can be typed, and which file does it.
 
-mod bench;
 mod check;
 mod compare;
 mod data;
@@ -12,7 +11,6 @@ mod families;
 mod findings;
 mod history;
 mod keep;
-mod limits;
 mod linear_plots;
 mod linearise;
 mod list;
@@ -21,25 +19,21 @@ mod pareto;
 mod past;
 mod pick;
 mod places;
-mod progress;
 mod remains;
 mod report;
 mod robustness;
 mod run;
 mod schema;
 mod simulate;
-mod sparkline;
 mod study;
 mod tables;
-mod terminal;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use mops_core::{Catalogue, Diagnostic};
+use mops_core::Catalogue;
 
-use terminal::{print, print_json, say};
+use crate::terminal::print;
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
@@ -95,8 +89,6 @@ enum Command {
     Linearise(linearise::Arguments),
     /// Show what is in a data file: columns, units, ranges, gaps, sample time, noise.
     Data(data::Arguments),
-    /// Measure how well mops does what it says, over many cases whose truth is known.
-    Bench(bench::Arguments),
     /// Print the JSON schema of study files, for completion in an editor.
     Schema,
     /// Print a completion script for a shell.
@@ -104,26 +96,6 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
-}
-
-/// Why a command ends without its result.
-enum Trouble {
-    /// The user's mistake: status 2.
-    Mistake(Box<Diagnostic>),
-    /// The run or the machine: status 3.
-    Failure(String),
-}
-
-impl From<Diagnostic> for Trouble {
-    fn from(diagnostic: Diagnostic) -> Self {
-        Self::Mistake(Box::new(diagnostic))
-    }
-}
-
-/// A file that cannot be written.
-fn cannot_write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Trouble {
-    let path: PathBuf = path.to_owned();
-    move |error| Trouble::Failure(format!("{} cannot be written: {error}", path.display()))
 }
 
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
@@ -142,7 +114,6 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),
         Command::Linearise(arguments) => linearise::linearise(catalogue, &arguments),
         Command::Data(arguments) => data::data(&arguments),
-        Command::Bench(arguments) => bench::bench(catalogue, &arguments),
         Command::Schema => schema::schema(catalogue),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -150,15 +121,5 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
             print(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
     };
-    match outcome {
-        Ok(code) => code,
-        Err(Trouble::Mistake(diagnostic)) => {
-            study::show(&diagnostic);
-            ExitCode::from(2)
-        }
-        Err(Trouble::Failure(message)) => {
-            say(&format!("error: {message}"));
-            ExitCode::from(3)
-        }
-    }
+    outcome.unwrap_or_else(|error| error.report())
 }

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::{Catalogue, Diagnostic, suggestion};
 
-use super::{Trouble, cannot_write, print, schema};
+use super::schema;
 use crate::files;
+use crate::terminal::{CommandError, print};
 
 /// What is written.
 #[derive(Args)]
@@ -22,7 +23,7 @@ pub(super) struct Arguments {
 /// The commented study; `{name}` is replaced.
 const TEMPLATE: &str = include_str!("new.toml");
 
-pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let Arguments { folder, from } = arguments;
     if folder.exists() {
         return Err(Diagnostic::new(format!("`{}` is already there", folder.display()))
@@ -56,8 +57,8 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     for (path, bytes) in files.into_iter().chain([schema]) {
         let path = folder.join(path);
         let parent = path.parent().expect("it lies in the folder");
-        std::fs::create_dir_all(parent).map_err(cannot_write(parent))?;
-        files::write(&path, bytes).map_err(cannot_write(&path))?;
+        std::fs::create_dir_all(parent).map_err(CommandError::cannot_write(parent))?;
+        files::write(&path, bytes).map_err(CommandError::cannot_write(&path))?;
     }
     let study = folder.join("study.toml");
     print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()))?;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::Catalogue;
 
-use super::Trouble;
 use super::run::{Common, Effort, Search, go};
+use crate::terminal::CommandError;
 
 /// What can be said to the search for a front.
 #[derive(Args)]
@@ -33,7 +33,7 @@ pub(super) struct Arguments {
     points: Option<u16>,
 }
 
-pub(super) fn pareto(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn pareto(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let Arguments { common, effort, points } = arguments;
     go(catalogue, common, &Search::Pareto { effort, points: *points })
 }

@@ -12,11 +12,9 @@ use mops_core::{
 };
 use serde_json::Value;
 
-use super::limits::{Limit, within};
 use super::study::{StudyArguments, open_as};
-use super::tables::{number, table};
-use super::{Trouble, cannot_write, print};
 use crate::files;
+use crate::terminal::{CommandError, Limit, number, print, table, within};
 use crate::toml_text::{self, TomlText, key, quoted};
 
 /// What can be said to the choice of a point.
@@ -62,7 +60,7 @@ fn demand(text: &str) -> Result<(String, String), String> {
     }
 }
 
-pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let front = front(&arguments.folder)?;
     let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
     let out = target(arguments)?;
@@ -82,8 +80,9 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
     print(&told(&file.study, (index, front.len()), &at, refined.as_ref()))?;
     let chosen = refined.as_ref().unwrap_or(&at);
-    let text = fs::read_to_string(&path).map_err(|error| Trouble::Failure(format!("{}: {error}", path.display())))?;
-    files::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(cannot_write(&out))?;
+    let text =
+        fs::read_to_string(&path).map_err(|error| CommandError::Failure(format!("{}: {error}", path.display())))?;
+    files::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(CommandError::cannot_write(&out))?;
     print(&format!("\na study that starts there is in {}\n", out.display()))?;
     Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -12,11 +12,11 @@ use mops_core::{Effect, MonteCarloReport, Shipped, Task};
 use mops_discrepancy::Diagnosis;
 
 use super::study::Home;
-use super::{Trouble, cannot_write};
 use crate::diagnosis::{Original, predictions, repaired, source};
 use crate::files::{self, Beside};
 use crate::report::Report;
 use crate::search::Solved;
+use crate::terminal::CommandError;
 use crate::toml_text::settled;
 
 /// How long a full disk is waited for.
@@ -41,8 +41,8 @@ pub(super) struct Remains<'a> {
 impl Remains<'_> {
     /// Writes result.json; what was there before stays until all of it is on the disk. A full disk is waited for as long as
     /// `patience` says.
-    pub(super) fn write_result(&self, patience: Duration) -> Result<(), Trouble> {
-        fs::create_dir_all(self.folder).map_err(cannot_write(self.folder))?;
+    pub(super) fn write_result(&self, patience: Duration) -> Result<(), CommandError> {
+        fs::create_dir_all(self.folder).map_err(CommandError::cannot_write(self.folder))?;
         let path = self.folder.join("result.json");
         let json = serde_json::to_string_pretty(&self.solved.outcome).expect("a result is JSON") + "\n";
         let until = Instant::now() + patience;
@@ -54,24 +54,24 @@ impl Remains<'_> {
             });
             match written {
                 Err(error) if is_full(&error) && Instant::now() < until => thread::sleep(Duration::from_millis(100)),
-                written => return written.map_err(cannot_write(&path)),
+                written => return written.map_err(CommandError::cannot_write(&path)),
             }
         }
     }
 
     /// Writes what stands beside the result: evaluations, samples, report and plots, and what the task adds.
-    pub(super) fn write_others(&self) -> Result<(), Trouble> {
+    pub(super) fn write_others(&self) -> Result<(), CommandError> {
         let (folder, solved) = (self.folder, self.solved);
         let evaluations = folder.join("evaluations.csv");
-        write_evaluations(&evaluations, solved).map_err(cannot_write(&evaluations))?;
+        write_evaluations(&evaluations, solved).map_err(CommandError::cannot_write(&evaluations))?;
         if let Some(found) = &solved.outcome.found.monte_carlo {
             let samples = folder.join("samples.csv");
-            write_samples(&samples, found).map_err(cannot_write(&samples))?;
+            write_samples(&samples, found).map_err(CommandError::cannot_write(&samples))?;
         }
         let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
         Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text: self.text }
             .write(folder)
-            .map_err(cannot_write(folder))?;
+            .map_err(CommandError::cannot_write(folder))?;
         if let Some(diagnosis) = diagnosis {
             let (text, settings, study) = (self.plain, self.own, problem.study());
             let original = Original { text, settings, study, effects: self.effects };
@@ -119,9 +119,9 @@ fn leave(
     original: &Original<'_>,
     home: &Home,
     export: bool,
-) -> Result<(), Trouble> {
+) -> Result<(), CommandError> {
     let predicted = folder.join("predictions");
-    fs::create_dir_all(&predicted).map_err(cannot_write(&predicted))?;
+    fs::create_dir_all(&predicted).map_err(CommandError::cannot_write(&predicted))?;
     for (name, table) in predictions(diagnosis) {
         write(&predicted.join(format!("{name}.csv")), table.as_bytes())?;
     }
@@ -143,7 +143,7 @@ fn leave(
 }
 
 /// Writes `study.toml`: the study of a front, with its settings, so that a point can be picked from it later.
-fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), Trouble> {
+fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), CommandError> {
     let text = match home {
         Home::File(study) => settled(text, settings, &|path| seen_from(folder, study, path)),
         Home::Shipped(shipped) => {
@@ -154,17 +154,17 @@ fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> R
     write(&folder.join("study.toml"), text.into_text().as_bytes())
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Trouble> {
-    files::write(path, bytes).map_err(cannot_write(path))
+fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
+    files::write(path, bytes).map_err(CommandError::cannot_write(path))
 }
 
 /// The data of a shipped study: the repaired one needs them in its own folder.
-fn copy_data(folder: &Path, shipped: &Shipped) -> Result<(), Trouble> {
+fn copy_data(folder: &Path, shipped: &Shipped) -> Result<(), CommandError> {
     let is_data = |name: &str| ["csv", "mat"].iter().any(|end| Path::new(name).extension().is_some_and(|e| e == *end));
     for (name, bytes) in shipped.files.iter().filter(|(name, _)| is_data(name)) {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
-        fs::create_dir_all(parent).map_err(cannot_write(parent))?;
+        fs::create_dir_all(parent).map_err(CommandError::cannot_write(parent))?;
         write(&path, bytes)?;
     }
     Ok(())

@@ -6,11 +6,12 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::{Catalogue, Diagnostic, Stop, suggestion};
 
+use super::keep;
 use super::past::Past;
-use super::{Trouble, cannot_write, keep, print};
 use crate::report::Report;
 use crate::search::{Options, Solved};
 use crate::store::{self, Identity, Keeper, RunRow, RunState};
+use crate::terminal::{CommandError, print};
 
 /// Which page is written.
 #[derive(Args)]
@@ -25,21 +26,21 @@ pub(super) struct Again {
     pub text: String,
 }
 
-pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let folder = &arguments.folder;
     let past = Past::of(folder)?;
     let Again { solved, text } = again(catalogue, &past)?;
     let _claim = store::claim(folder)?;
     let Solved { outcome, problem, best, archive, front, .. } = &solved;
     let report = Report { outcome, problem, best, archive, front, diagnosis: None, text: &text };
-    report.write(folder).map_err(cannot_write(folder))?;
+    report.write(folder).map_err(CommandError::cannot_write(folder))?;
     let count = outcome.evaluations;
     print(&format!("report.html and the plots of {count} evaluations are in {}\n", folder.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Goes through a run again: every point is answered from its database, and nothing is searched beyond them.
-fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, Trouble> {
+fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, CommandError> {
     let folder = &past.folder;
     let mut file = past.study(catalogue)?;
     let Some((run, goes_on)) = &past.run else { unreachable!("a study was found in it") };

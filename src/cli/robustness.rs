@@ -6,8 +6,8 @@ use mops_core::{
 };
 
 use super::findings::{known, sentences, share};
-use super::tables::{number, table};
 use crate::numbers::significant;
+use crate::terminal::{number, table};
 
 /// Everything that was found where parameters are uncertain; empty where nothing was looked for.
 pub(super) fn text(found: &Findings) -> String {

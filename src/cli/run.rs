@@ -8,15 +8,13 @@ use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
 use mops_core::{Catalogue, Diagnostic, Halt, Mistake, Stop, Study, Task, Watch, suggestion};
 
-use super::limits::{Limit, listen};
-use super::progress::Progress;
 use super::remains::{PATIENCE, Remains};
 use super::study::{StudyArguments, home, open_as, without_settings};
-use super::terminal::{print_json, say};
-use super::{Trouble, diagnosis, findings, keep, print, tables};
+use super::{diagnosis, findings, keep, tables};
 use crate::numbers::file_name;
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
+use crate::terminal::{CommandError, Limit, Progress, listen, print, print_json, say};
 use crate::watch::{Both, Page};
 
 /// What `mops diagnose` sets.
@@ -120,12 +118,12 @@ impl Search<'_> {
     }
 }
 
-pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     go(catalogue, &arguments.common, &Search::Task(&arguments.effort))
 }
 
 /// Runs the study and leaves the result behind.
-pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, Trouble> {
+pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, CommandError> {
     let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
     if arguments.export.is_some() && file.study.task != Task::Diagnosis {
         return Err(Diagnostic::new(
@@ -224,7 +222,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     let result = match &held {
         // A full disk was waited for already, where evaluations had to go.
         Ok(_) => remains.write_result(if opened.is_whole() { PATIENCE } else { Duration::ZERO }),
-        Err(why) => Err(Trouble::Failure(why.clone())),
+        Err(why) => Err(CommandError::Failure(why.clone())),
     };
     if arguments.json {
         said.of(print_json(&solved.outcome));
@@ -250,7 +248,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
 }
 
 /// The exit status of a run whose result is written.
-fn status(solved: &Solved, folder: &Path, ended_early: bool) -> Result<ExitCode, Trouble> {
+fn status(solved: &Solved, folder: &Path, ended_early: bool) -> Result<ExitCode, CommandError> {
     if solved.outcome.stop == Stop::Interrupted {
         return Ok(ExitCode::from(4));
     }
@@ -258,13 +256,13 @@ fn status(solved: &Solved, folder: &Path, ended_early: bool) -> Result<ExitCode,
         let failed = solved.best.failures.first().map(|(_, failure)| format!(": {failure}"));
         let early = || if ended_early { " in time" } else { "" }.to_owned();
         let (why, folder) = (failed.unwrap_or_else(early), folder.display());
-        return Err(Trouble::Failure(format!("no point could be simulated{why}; the result is in {folder}")));
+        return Err(CommandError::Failure(format!("no point could be simulated{why}; the result is in {folder}")));
     }
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 /// The first thing that could not be printed: a run goes on all the same.
-struct Said(Result<(), Trouble>);
+struct Said(Result<(), CommandError>);
 
 impl Default for Said {
     fn default() -> Self {
@@ -273,7 +271,7 @@ impl Default for Said {
 }
 
 impl Said {
-    fn of(&mut self, printed: Result<(), Trouble>) {
+    fn of(&mut self, printed: Result<(), CommandError>) {
         if self.0.is_ok() {
             self.0 = printed;
         }
@@ -294,8 +292,8 @@ fn shown(solved: &Solved) -> String {
 }
 
 /// The live page of a run; its address is all that is said of it.
-fn watch(study: &Study, options: &Options) -> Result<Page, Trouble> {
-    let cannot = |error| Trouble::Failure(format!("no page can be served for --watch: {error}"));
+fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
+    let cannot = |error| CommandError::Failure(format!("no page can be served for --watch: {error}"));
     let page = Page::open(study, options.solver.kind, options.max_evaluations).map_err(cannot)?;
     say(&format!("watch the run at {}", page.address()));
     Ok(page)

@@ -8,13 +8,12 @@ use clap::Args;
 use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, suggestion};
 
 use super::families::{folded, runs, spelled};
-use super::limits::{Limit, within};
 use super::study::{StudyArguments, open};
-use super::tables::{criteria, number, table};
-use super::{Trouble, cannot_write, print};
+use super::tables::criteria;
 use crate::files;
 use crate::numbers::FileNames;
 use crate::report::{Curve, Ink, Plot, points};
+use crate::terminal::{CommandError, Limit, number, print, table, within};
 
 /// What is simulated.
 #[derive(Args)]
@@ -37,7 +36,7 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
 }
 
-pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, Trouble> {
+pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let mut study = open(catalogue, &arguments.study)?.study;
     study.cancelled_by(&within(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
@@ -96,14 +95,14 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&format!("\nCSV files and plots are in {}\n", folder.display()))?;
     }
     if failed {
-        Err(Trouble::Failure("a simulation, or a criterion that counts, has no value".into()))
+        Err(CommandError::Failure("a simulation, or a criterion that counts, has no value".into()))
     } else {
         Ok(ExitCode::SUCCESS)
     }
 }
 
 /// Values of all tuners: the start values, and what the command line puts over them.
-fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, Trouble> {
+fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, CommandError> {
     let mut values = study.start();
     for text in given {
         let (name, value) = text.split_once('=').ok_or_else(|| {
@@ -178,9 +177,9 @@ struct Simulated<'a> {
 
 impl Simulated<'_> {
     /// Writes samples and plots, under names that no other simulation has.
-    fn write(&self, folder: &Path, samples: u32, names: &mut FileNames) -> Result<(), Trouble> {
+    fn write(&self, folder: &Path, samples: u32, names: &mut FileNames) -> Result<(), CommandError> {
         let Self { name, study, model, response } = self;
-        std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+        std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
         let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
         let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
         let units = &study.models[*model].1.interface().signals;
@@ -194,7 +193,7 @@ impl Simulated<'_> {
             }
             Ok(())
         });
-        written.map_err(cannot_write(&path))?;
+        written.map_err(CommandError::cannot_write(&path))?;
         let signals: Vec<&str> = response.traces.iter().map(|(signal, _)| signal.as_str()).collect();
         for family in runs(&signals) {
             let (first, last) = (family.start, family.end - 1);
@@ -216,8 +215,8 @@ impl Simulated<'_> {
                 if first == last { signal } else { signals[first].split('[').next().unwrap_or_default().to_owned() };
             let file = names.unique(&format!("{name}-{file}"));
             let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
-            files::write(&svg, plot.svg()).map_err(cannot_write(&svg))?;
-            plot.write_png(&png).map_err(cannot_write(&png))?;
+            files::write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
+            plot.write_png(&png).map_err(CommandError::cannot_write(&png))?;
         }
         Ok(())
     }

@@ -1,18 +1,14 @@
-//! Opens studies, and shows what is wrong with them.
+//! Opens studies: files, folders, shipped ones.
 
-use std::borrow::Cow;
 use std::convert::Infallible;
-use std::io::{ErrorKind, IsTerminal, Read, Write};
-use std::ops::Range;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use mops_core::file::{Files, StudyFile};
 use mops_core::{Catalogue, Diagnostic, Shipped, Source, suggestion};
 
 use crate::files;
-use crate::plain::plain;
 use crate::toml_text::quoted;
 
 /// Which study, and what goes over it.
@@ -160,73 +156,4 @@ fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagn
     let names = catalogue.studies.iter().map(|s| s.name);
     Diagnostic::new(format!("there is no file `{study}`, nor a shipped study of that name"))
         .with_help(suggestion(study, names))
-}
-
-/// Characters of a line that are shown on either side of a mistake.
-const AROUND: usize = 200;
-
-/// A text as it is shown, with a place in it: without control characters, and of long lines what is near the place. The lines
-/// keep their numbers.
-fn shown(text: &str, place: Range<usize>) -> (String, Range<usize>) {
-    let (mut shown, mut start, mut end) = (String::new(), None, None);
-    let mut offset = 0;
-    for line in text.split_inclusive('\n') {
-        let after = offset + line.len();
-        let body = line.trim_end_matches('\n').trim_end_matches('\r');
-        let is_last = after == text.len() && body.len() == line.len();
-        // Of other lines the beginning is shown.
-        let is_here = (offset..after).contains(&place.start) || is_last && place.start == after;
-        let here = if is_here { (place.start - offset).min(body.len()) } else { 0 };
-        let from = body[..here].char_indices().rev().nth(AROUND - 1).map_or(0, |(i, _)| i);
-        let to = body[here..].char_indices().nth(AROUND).map_or(body.len(), |(i, _)| here + i);
-        shown.push_str(if from > 0 { "... " } else { "" });
-        for (i, c) in body[from..to].char_indices() {
-            let i = offset + from + i;
-            start = start.or((i >= place.start).then_some(shown.len()));
-            end = end.or((i >= place.end).then_some(shown.len()));
-            shown.push_str(&plain(c.encode_utf8(&mut [0; 4])));
-        }
-        start = start.or(is_here.then_some(shown.len()));
-        end = end.or((after > place.end || is_last).then_some(shown.len()));
-        shown.push_str(if to < body.len() { " ..." } else { "" });
-        shown.push_str(if is_last { "" } else { "\n" });
-        offset = after;
-    }
-    let start = start.unwrap_or(shown.len());
-    (shown, start..end.unwrap_or(start).max(start))
-}
-
-/// Shows a mistake on standard error: file, line and column, the fact, the source line, the way out.
-pub(super) fn show(diagnostic: &Diagnostic) {
-    let mut shown = MietteDiagnostic::new(plain(&diagnostic.message));
-    shown.help = diagnostic.help.as_deref().map(plain).map(Cow::into_owned);
-    let report = match &diagnostic.place {
-        Some((source, span)) if !source.text.is_empty() && *span != (0..0) => {
-            let label =
-                diagnostic.label.as_deref().map_or_else(|| "here".to_owned(), |label| plain(label).into_owned());
-            let (start, end) = (span.start.min(source.text.len()), span.end.min(source.text.len()));
-            let (start, end) = (source.text.floor_char_boundary(start), source.text.floor_char_boundary(end));
-            // A mistake spanning lines is pointed at by its first.
-            let end = source.text[start..end].find('\n').map_or(end, |first| start + first);
-            let (text, span) = self::shown(&source.text, start..end);
-            shown.labels = Some(vec![LabeledSpan::at(span, label)]);
-            // N.B.: the line and the column are ours, since miette counts columns in bytes.
-            let (line, column) = diagnostic.line_column().expect("it has a place");
-            let place = format!("{}:{line}:{column}", plain(&source.name));
-            Report::new(shown).with_source_code(NamedSource::new(place, text))
-        }
-        Some((source, _)) => {
-            shown.message = format!("{}: {}", plain(&source.name), shown.message);
-            Report::new(shown)
-        }
-        None => Report::new(shown),
-    };
-    let stderr = std::io::stderr();
-    let theme = if stderr.is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
-    let mut text = String::new();
-    let handler = GraphicalReportHandler::new_themed(theme).without_primary_span_start().with_wrap_lines(false);
-    if handler.render_report(&mut text, report.as_ref()).is_err() {
-        text = plain(&diagnostic.to_string()).into_owned();
-    }
-    let _ = writeln!(stderr.lock(), "{text}");
 }

@@ -1,28 +1,7 @@
 //! Tables on the terminal: aligned, with units.
 
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
+use crate::terminal::{number, table};
 use mops_core::{CriterionReport, Outcome, Task, Usage};
-
-/// A number to six significant digits.
-pub(super) fn number(value: f64) -> String {
-    crate::numbers::significant(value, 6)
-}
-
-/// A table with a header, columns of numbers to the right.
-pub(super) fn table(header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(header.iter().map(Cell::new));
-    for row in rows {
-        table.add_row(row);
-    }
-    for &column in numeric {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    table.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
-}
 
 /// The criteria at the start and at another point, side by side.
 pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best_name: &str) -> String {

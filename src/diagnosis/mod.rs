@@ -4,12 +4,18 @@ mod block;
 pub(crate) mod errors;
 #[cfg(test)]
 pub(crate) mod made_up;
+#[cfg(feature = "cli")]
 mod predictions;
+#[cfg(feature = "cli")]
 mod repaired;
+#[cfg(feature = "cli")]
 mod source;
 pub(crate) mod words;
 
 pub(crate) use block::block;
+#[cfg(feature = "cli")]
 pub(crate) use predictions::predictions;
+#[cfg(feature = "cli")]
 pub(crate) use repaired::{Original, repaired};
+#[cfg(feature = "cli")]
 pub(crate) use source::source;

@@ -47,7 +47,7 @@ use crate::files;
 use crate::numbers::FileNames;
 
 pub(crate) use bode::{Sweep, bode, frequencies};
-pub(crate) use page::document;
+pub use page::page;
 use pictures::Pictures;
 pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
 pub(crate) use sampling::points;
@@ -121,7 +121,7 @@ impl Report<'_> {
             plot.write_png(&plots.join(format!("{name}.png")))?;
         }
         earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
-        files::write(&folder.join("report.html"), page::page(self, &pictures).into_string())
+        files::write(&folder.join("report.html"), page::of(self, &pictures).into_string())
     }
 
     /// Whether a search stands behind the result, and nothing but it.

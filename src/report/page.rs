@@ -28,8 +28,14 @@ pub(super) struct Pictures {
 /// The script that makes tables sortable.
 const TABLES: &str = include_str!("tables.js");
 
+/// Wraps HTML as a page of its own in the style of the reports: one file, light and dark, its tables sortable.
+#[must_use]
+pub fn page(title: &str, body: &str) -> String {
+    document(title, PreEscaped(body.to_owned())).into_string()
+}
+
 /// The frame that all pages have: one file, light and dark, its tables sortable.
-pub(crate) fn document(title: &str, body: Markup) -> Markup {
+pub(super) fn document(title: &str, body: Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -47,7 +53,7 @@ pub(crate) fn document(title: &str, body: Markup) -> Markup {
 }
 
 /// The whole page.
-pub(super) fn page(report: &Report<'_>, pictures: &Pictures) -> Markup {
+pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
     let outcome = report.outcome;
     let warnings = verdict::warnings(report);
     let body = html! {

@@ -1,10 +1,6 @@
 //! The studies that mops ships.
 
-mod control;
-
 use mops_core::Shipped;
-
-pub use control::{Known, control};
 
 /// The files of a study, by their names in its folder under `studies/`.
 macro_rules! study {

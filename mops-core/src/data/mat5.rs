@@ -1,9 +1,5 @@
 //! Reads MATLAB level 5: elements with a tag of type and size, plain or compressed, arrays inside cell arrays.
 
-use std::io::Read;
-
-use flate2::read::ZlibDecoder;
-
 use super::Variable;
 use super::matlab::{Contents, Cursor, Kind, cut_off};
 use crate::diagnostic::Diagnostic;
@@ -75,10 +71,7 @@ impl Reader {
     }
 
     fn compressed(&mut self, data: Cursor<'_>, place: &str) -> Result<(), String> {
-        let mut inflated = Vec::new();
-        let limit = self.budget as u64;
-        let inflating = ZlibDecoder::new(data.rest).take(limit.saturating_add(1)).read_to_end(&mut inflated);
-        inflating.map_err(|error| format!("damaged, it cannot be decompressed ({error})"))?;
+        let inflated = inflated(data.rest, self.budget)?;
         self.charge(inflated.len())?;
         match element(&mut Cursor { rest: &inflated, ..data }) {
             Some((MATRIX, array)) => self.array(Cursor { rest: array, ..data }, place, 0),
@@ -228,4 +221,23 @@ fn what_is(class: u32) -> String {
         OPAQUE => "an object (table, string, datetime or the like)".to_owned(),
         other => format!("an array of the unknown class {other}"),
     }
+}
+
+/// The decompressed bytes, at most one more than `limit`; or why there are none.
+#[cfg(feature = "compressed-mat")]
+fn inflated(compressed: &[u8], limit: usize) -> Result<Vec<u8>, String> {
+    use std::io::Read;
+
+    let mut inflated = Vec::new();
+    let mut decoder = flate2::read::ZlibDecoder::new(compressed).take((limit as u64).saturating_add(1));
+    match decoder.read_to_end(&mut inflated) {
+        Ok(_) => Ok(inflated),
+        Err(error) => Err(format!("damaged, it cannot be decompressed ({error})")),
+    }
+}
+
+/// Refuses compressed variables: the decoder is not part of this build.
+#[cfg(not(feature = "compressed-mat"))]
+fn inflated(_: &[u8], _: usize) -> Result<Vec<u8>, String> {
+    Err("compressed, which this build cannot read (feature `compressed-mat`)".to_owned())
 }

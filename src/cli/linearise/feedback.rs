@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::text::{labels, named, poles_table, rounded_matrix};
 use super::{Arguments, complex, rows};
-use crate::cli::tables::number;
+use crate::terminal::number;
 
 /// A design that is asked for, as it was typed.
 pub(super) enum Wanted {

@@ -5,18 +5,19 @@ use std::path::Path;
 use mops_core::StateSpace;
 use serde_json::Value;
 
-use crate::cli::{Trouble, cannot_write, linear_plots};
+use crate::cli::linear_plots;
 use crate::numbers::FileNames;
+use crate::terminal::CommandError;
 
 /// Writes the files; returns a sentence on what is there, and notes on what is not.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<String, Trouble> {
-    std::fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<String, CommandError> {
+    std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
     let path = folder.join("linearised.json");
     let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
-    crate::files::write(&path, text).map_err(cannot_write(&path))?;
+    crate::files::write(&path, text).map_err(CommandError::cannot_write(&path))?;
     let (mut written, mut notes, mut names) = (0, String::new(), FileNames::default());
     for i in 0..system.inputs.len() {
         for o in 0..system.outputs.len() {
@@ -32,8 +33,8 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
                 };
                 let file = names.unique(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0]));
                 let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
-                crate::files::write(&svg, plot.svg()).map_err(cannot_write(&svg))?;
-                plot.write_png(&png).map_err(cannot_write(&png))?;
+                crate::files::write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
+                plot.write_png(&png).map_err(CommandError::cannot_write(&png))?;
                 written += 1;
             }
         }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::WHERE;
 use crate::cli::families::folded;
-use crate::cli::tables::{number, table};
+use crate::terminal::{number, table};
 
 /// From how many states and channels on the terminal does not show all.
 pub(super) const MANY: usize = 12;

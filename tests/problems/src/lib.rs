@@ -1,4 +1,4 @@
-//! Problems with known answers, to measure solvers with: for tests, for `mops bench`, and to read.
+//! Problems with known answers, to measure solvers with: for tests, for `mops-bench`, and to read.
 //!
 //! Every problem is written once, over [`mops_core::Scalar`]: values come from plain numbers, exact slopes from dual ones.
 //! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.

@@ -1,0 +1,63 @@
+//! The command line of `mops-bench`.
+
+mod diagnosis;
+mod folder;
+mod suite;
+mod tables;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use mops::Catalogue;
+use mops::terminal::{CommandError, print};
+
+/// Benchmarks of mops: solvers on problems with known solutions, the diagnosis on simulated experiments.
+#[derive(Parser)]
+#[command(
+    name = "mops-bench",
+    version,
+    max_term_width = 100,
+    after_help = "\
+Start with:
+  mops-bench minimax --solver sqp --solver auto --out bench    two solvers on a suite; open bench/index.html
+  mops-bench minimax --against bench/results.json              compared with stored results
+  mops-bench diagnosis --cases 20 --none 10                    the diagnosis on simulated experiments
+
+Exit status: 0 done; 2 the command line is wrong; 3 the benchmark failed; 4 interrupted, with the finished cases kept."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    benchmark: Benchmark,
+}
+
+#[derive(Subcommand)]
+enum Benchmark {
+    /// Find missing effects in simulated experiments: rates, reliability of probabilities, coverage of intervals, time.
+    ///
+    /// The experiments come from a simulator that shares no code with models and effects: plants with drawn parameters,
+    /// effects at drawn places, of a size at which the refitted nominal model has the requested error, in units of the
+    /// noise. Ctrl-C ends the benchmark and keeps the finished cases.
+    Diagnosis(diagnosis::Arguments),
+    /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
+    Schema,
+    #[command(flatten)]
+    Suite(suite::Chosen),
+}
+
+/// Parses the command line and runs the benchmark.
+pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
+    let done = match Arguments::parse().benchmark {
+        Benchmark::Diagnosis(arguments) => diagnosis::bench(catalogue, &arguments),
+        Benchmark::Schema => print(&crate::diagnosis::schema()).map(|()| ExitCode::SUCCESS),
+        Benchmark::Suite(chosen) => suite::bench(catalogue, &chosen),
+    };
+    done.unwrap_or_else(|error| error.report())
+}
+
+/// Writes a file of a benchmark; creates the folder if it does not exist.
+fn write(folder: &Path, name: &str, content: &str) -> Result<(), CommandError> {
+    std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
+    let path = folder.join(name);
+    std::fs::write(&path, content).map_err(CommandError::cannot_write(&path))
+}

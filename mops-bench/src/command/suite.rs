@@ -1,0 +1,377 @@
+//! `mops-bench SUITE`: solvers on problems with known solutions.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
+use mops::{Catalogue, Diagnostic, SolverChoice, suggestion};
+use mops_problems::{Answer, Slope};
+
+use mops::terminal::{CommandError, Progress, number, print, table};
+
+use super::write;
+use crate::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
+
+/// What can be said to the benchmark of a suite.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Solvers to measure, separated by commas or given one by one.
+    #[arg(long = "solver", value_name = "SOLVER", default_value = "auto", value_delimiter = ',')]
+    solvers: Vec<String>,
+    /// Give solvers exact slopes instead of differences.
+    #[arg(long)]
+    gradients: bool,
+    /// Runs of every problem, with seeds 1, 2, ...
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Evaluations a run may take, for every variable and one more; as is usual for the suite where absent.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
+    budget: Option<u32>,
+    /// Relative noise that is added to all values; what is reached is judged without it.
+    #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
+    noise: f64,
+    /// Problems by name; all where absent.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    problems: Vec<String>,
+    /// Problems solved at a time; all cores where absent. One gives the truest times.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Folder for results.json and a page with profiles.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Results of another time, to put beside these.
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// List the problems with their source, and run nothing.
+    #[arg(long)]
+    list: bool,
+    /// Show no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// One of the suites, each a command of its own.
+pub(super) struct Chosen {
+    suite: Suite,
+    arguments: Arguments,
+}
+
+impl Subcommand for Chosen {
+    fn augment_subcommands(command: Command) -> Command {
+        let one = |suite: &Suite| Arguments::augment_args(Command::new(suite.name)).about(suite.about);
+        command.subcommands(suites().iter().map(one))
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        suites().iter().any(|suite| suite.name == name)
+    }
+}
+
+impl FromArgMatches for Chosen {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, rest) = matches.subcommand().ok_or_else(missing)?;
+        let suite = suites().into_iter().find(|suite| suite.name == name).ok_or_else(missing)?;
+        Ok(Self { suite, arguments: Arguments::from_arg_matches(rest)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, CommandError> {
+    let Chosen { suite, arguments } = chosen;
+    if arguments.list {
+        let rows = suite
+            .subjects()
+            .into_iter()
+            .map(|subject| vec![subject.name().to_owned(), solution(&subject), subject.source().to_owned()]);
+        let of_suite = mops_problems::suites().into_iter().find(|known| known.name == suite.name);
+        let of_suite = of_suite.map_or_else(String::new, |known| format!("\nSource of the suite: {}\n", known.source));
+        print(&(table(&["problem", "known solution", "source"], &[], rows.collect()) + &of_suite))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let before = arguments.against.as_deref().map(|path| read(path, suite)).transpose()?;
+    posable(suite, arguments)?;
+    let plan = Plan {
+        suite: *suite,
+        solvers: arguments.solvers.iter().map(|name| solver(catalogue, name.trim())).collect::<Result<_, _>>()?,
+        slope: if arguments.gradients { Slope::Exact } else { Slope::Differences },
+        seeds: arguments.seeds,
+        budget: arguments.budget.map(|budget| usize::try_from(budget).unwrap_or(usize::MAX)),
+        noise: arguments.noise,
+        only: problems(suite, &arguments.problems)?,
+    };
+    if let Some(idle) = plan.idle(catalogue) {
+        let help = format!("`mops describe {}` says for what it is", idle.kind);
+        return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
+    }
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let progress = Progress::of_cases(!arguments.quiet);
+    let results = solvers::run(catalogue, &plan, arguments.jobs.map_or(cores, usize::from), &progress);
+    progress.finish();
+    let text = text(&results, before.as_ref());
+    print(&text)?;
+    if let Some(folder) = &arguments.out {
+        let json = serde_json::to_string_pretty(&results).expect("numbers and names can be written");
+        write(folder, "results.json", &(json + "\n"))?;
+        let mut all = vec![(String::new(), &results)];
+        all.extend(before.as_ref().map(|before| ("before".to_owned(), before)));
+        write(folder, "index.html", &solvers::page(&text, &all))?;
+    }
+    Ok(progress.status())
+}
+
+/// The known solution of a problem: minima, and the tuners at the optimum of a study; or the volume of a front.
+fn solution(subject: &solvers::Subject) -> String {
+    let list = |values: &[f64]| values.iter().copied().map(number).collect::<Vec<_>>().join(", ");
+    match subject.answer() {
+        Answer::Unknown => String::new(),
+        Answer::Front { hypervolume, .. } => format!("hypervolume {}", number(hypervolume)),
+        Answer::Minima(minima) => match subject.tuners() {
+            [] => list(&minima),
+            tuners => format!("{} at {}", list(&minima), list(tuners)),
+        },
+    }
+}
+
+fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic> {
+    let kind = catalogue.solvers.iter().find(|kind| kind.name == name);
+    let unknown = || {
+        let help = suggestion(name, catalogue.solvers.iter().map(|kind| kind.name));
+        Diagnostic::new(format!("there is no solver `{name}`")).with_help(help)
+    };
+    Ok(kind.ok_or_else(unknown)?.default_choice())
+}
+
+fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> {
+    let all: Vec<String> = suite.subjects().iter().map(|subject| subject.name().to_owned()).collect();
+    let asked: Vec<String> = asked.iter().map(|name| name.trim().to_owned()).collect();
+    match asked.iter().find(|name| !all.contains(name)) {
+        None => Ok(asked),
+        Some(unknown) => {
+            let help = suggestion(unknown, all.iter().map(String::as_str));
+            Err(Diagnostic::new(format!("`{}` has no problem `{unknown}`", suite.name)).with_help(help))
+        }
+    }
+}
+
+/// Studies are posed as they are, and a front has no true members where there is noise.
+fn posable(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
+    let is_noisy = arguments.noise != 0.0;
+    let subjects = suite.subjects();
+    let wrong = if is_noisy && !(arguments.noise > 0.0 && arguments.noise < 1.0) {
+        Diagnostic::new(format!("the noise is relative, between 0 and 1, not {}", arguments.noise))
+    } else if subjects.iter().any(solvers::Subject::is_study) && (arguments.gradients || is_noisy) {
+        Diagnostic::new(format!("`{}` has studies, whose slopes and noise are their own", suite.name))
+            .with_help("leave `--gradients` and `--noise` out")
+    } else if is_noisy && subjects.iter().any(solvers::Subject::has_front) {
+        Diagnostic::new(format!("`{}` has fronts, which are not measured under noise", suite.name))
+            .with_help("leave `--noise` out")
+    } else {
+        return Ok(());
+    };
+    Err(wrong)
+}
+
+fn read(path: &Path, suite: &Suite) -> Result<Results, Diagnostic> {
+    let mistake = |why: String| Diagnostic::new(format!("{}: {why}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| mistake(error.to_string()))?;
+    let unread = |error: serde_json::Error| mistake(format!("no results of a benchmark of solvers: {error}"));
+    let results: Results = serde_json::from_str(&text).map_err(unread)?;
+    if results.suite != suite.name {
+        return Err(mistake(format!("these are results of `{}`, not of `{}`", results.suite, suite.name)));
+    }
+    Ok(results)
+}
+
+fn text(results: &Results, before: Option<&Results>) -> String {
+    let has_fronts = results.rows.iter().any(|row| row.front.is_some());
+    let mut text = if has_fronts { fronts(results, before) } else { minima(results, before) };
+    for (results, which) in [(Some(results), "These results are"), (before, "Those of before are")] {
+        if results.is_some_and(|results| results.interrupted) {
+            text.push_str(&format!("{which} not whole: the benchmark was interrupted.\n"));
+        }
+    }
+    text
+}
+
+/// What is reached beside the known minima.
+fn minima(results: &Results, before: Option<&Results>) -> String {
+    let seeds = results.rows.iter().any(|row| row.seed > 1);
+    let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
+    header.extend(["all", "ms", "solved"]);
+    let earlier = before.map(|before| match before.solvers()[..] {
+        [only] => format!("before, {only}"),
+        _ => "before".to_owned(),
+    });
+    header.extend(earlier.as_deref());
+    let rows = results.rows.iter().map(|row| cells(row, seeds, before)).collect();
+    let mut text = table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 12], rows);
+    let fine = results.accuracy;
+    let suite = suites().into_iter().find(|suite| suite.name == results.suite);
+    let is_relative = suite.is_some_and(|suite| suite.relative);
+    let reached = if is_relative {
+        format!(
+            "a feasible point has all but 1e-3, and {fine:e}, of the way from the start to f*, the least of all solvers"
+        )
+    } else {
+        format!(
+            "a point that violates nothing by more than 1e-6, which may take it below f*, is at most 1e-3, and {fine:e} or \
+             what the problem's source allows, above f*, relative to the larger of 1 and |f*|"
+        )
+    };
+    let slopes = |results: &Results| match results.slopes.as_str() {
+        "exact" => "slopes by dual numbers, which count as no evaluation",
+        _ => "slopes by differences",
+    };
+    let noise = if results.noise > 0.0 {
+        format!("; a noise of {} on all values, judged without it", results.noise)
+    } else {
+        String::new()
+    };
+    let has_studies = suite.is_some_and(|suite| suite.subjects().iter().any(solvers::Subject::is_study));
+    let how = if has_studies { "slopes as the studies have them" } else { slopes(results) };
+    text.push_str(&format!("\nTo 1e-3, to the end: evaluations until {reached}; {how}{noise}.\n"));
+    if let Some(before) = before.filter(|before| before.slopes != results.slopes || before.noise != results.noise) {
+        text.push_str(&format!("Before: {}, a noise of {}.\n", slopes(before), before.noise));
+    }
+    for (name, results) in [(Some(results), ""), (before, "before: ")].into_iter().filter_map(|(r, n)| Some((n, r?))) {
+        for solver in results.solvers() {
+            text.push_str(&summary(name, results, solver));
+        }
+        if is_relative {
+            text.push_str(&shares(name, results));
+        }
+    }
+    text
+}
+
+/// Shares of problems solved within 10, 30 and 100 simplex gradients.
+fn shares(name: &str, results: &Results) -> String {
+    let mut text = String::new();
+    for solver in results.solvers() {
+        let of = |count: fn(&Row) -> Option<usize>| {
+            let profile = data_profile(&Score::of(results, solver, count));
+            let within =
+                |gradients: f64| profile.iter().rfind(|(x, _)| *x <= gradients).map_or(0.0, |(_, share)| *share);
+            [10.0, 30.0, 100.0].map(|gradients| format!("{:.2}", within(gradients))).join(" / ")
+        };
+        text.push_str(&format!(
+            "{name}{solver}: share solved within 10 / 30 / 100 simplex gradients: {} to 1e-3, {} to {:e} of what the best \
+             solver gains\n",
+            of(|row| row.to_rough),
+            of(|row| row.to_fine),
+            results.accuracy
+        ));
+    }
+    text
+}
+
+/// Fronts: one line for every problem, over all seeds.
+fn fronts(results: &Results, before: Option<&Results>) -> String {
+    let mut header = vec!["problem", "solver", "seeds", "evaluations", "volume", "sd", "of front", "all points"];
+    header.extend(["distance", "sd", "pymoo volume", "distance"]);
+    header.extend(before.map(|_| "before"));
+    let earlier = before.map(spreads).unwrap_or_default();
+    let row = |spread: solvers::Spread| {
+        let (volume, distance) = published(&spread.problem).unzip();
+        let figure = |value: Option<f64>, digits: usize| match value.filter(|value| value.is_finite()) {
+            Some(value) => format!("{value:.digits$}"),
+            None => "-".to_owned(),
+        };
+        let published = [figure(volume, 5), figure(distance.flatten(), 4)];
+        let mut cells = vec![
+            spread.problem.clone(),
+            spread.solver.clone(),
+            spread.seeds.to_string(),
+            spread.evaluations.to_string(),
+            format!("{:.5}", spread.hypervolume[0]),
+            format!("{:.5}", spread.hypervolume[1]),
+            format!("{:.5}", spread.known),
+            format!("{:.5}", spread.archive),
+            figure(Some(spread.distance[0]), 5),
+            figure(Some(spread.distance[1]), 5),
+        ];
+        cells.extend(published);
+        let same = earlier.iter().find(|e| e.problem == spread.problem && e.solver == spread.solver);
+        cells.extend(before.map(|_| same.map_or(String::new(), |e| format!("{:.5}", e.hypervolume[0]))));
+        cells
+    };
+    let mut text =
+        table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], spreads(results).into_iter().map(row).collect());
+    text.push_str(
+        "\nVolume, distance: hypervolume and inverted generational distance of the members of the last generation, mean and \
+         standard deviation over seeds; all points: hypervolume of everything evaluated. pymoo: NSGA-II with 100 members over \
+         250 generations, of three objectives NSGA-III with 92 (DTLZ1: over 400 generations).\n",
+    );
+    for solver in results.solvers() {
+        text.push_str(&summary("", results, solver));
+    }
+    text
+}
+
+fn cells(row: &Row, seeds: bool, before: Option<&Results>) -> Vec<String> {
+    let count = |count: Option<usize>| count.map_or("-".to_owned(), |count| count.to_string());
+    let name = if seeds { format!("{} ({})", row.problem, row.seed) } else { row.problem.clone() };
+    let mut cells = vec![
+        name,
+        row.solver.clone(),
+        row.variables.to_string(),
+        row.rows.to_string(),
+        row.known.map_or("-".to_owned(), number),
+        number(row.reached),
+        if row.violation > 0.0 { format!("{:.1e}", row.violation) } else { "0".to_owned() },
+        count(row.to_rough),
+        count(row.to_fine),
+        row.evaluations.to_string(),
+        format!("{:.2}", 1e3 * row.seconds),
+        match (row.known, row.solved) {
+            (None, _) => "-",
+            (_, true) => "yes",
+            (_, false) => "no",
+        }
+        .to_owned(),
+    ];
+    cells.extend(before.map(|before| before.same(row).map_or_else(String::new, |old| count(old.to_fine))));
+    cells
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn summary(name: &str, results: &Results, solver: &str) -> String {
+    let of = results.summary(solver);
+    let count = |count: Option<f64>| count.map_or("-".to_owned(), number);
+    let claims = if of.false_claims > 0 {
+        format!(", {} claim an optimum that violates a constraint", of.false_claims)
+    } else {
+        String::new()
+    };
+    if of.judged == 0 {
+        return format!(
+            "{name}{}: {} runs on problems without one known minimum: none is called solved; {:.2} s, {:.0} ns per \
+             evaluation of its own{claims}\n",
+            of.solver, of.runs, of.seconds, of.nanoseconds
+        );
+    }
+    format!(
+        "{name}{}: {} of {} solved ({:.1} %), median evaluations of those that got there {} to 1e-3 and {} to \
+         the end; {:.2} s in all, {:.0} ns per evaluation of the solver's own{claims}\n",
+        of.solver,
+        of.solved,
+        of.judged,
+        100.0 * of.solved as f64 / of.judged as f64,
+        count(of.median_rough),
+        count(of.median_fine),
+        of.seconds,
+        of.nanoseconds,
+    )
+}

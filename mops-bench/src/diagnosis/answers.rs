@@ -1,0 +1,45 @@
+//! Answers by hand, for tests of what is made of them.
+
+use mops::discrepancy::Verdict;
+
+use super::tool::{Answer, Named};
+
+/// The verdict `none`.
+pub(crate) fn nothing() -> Answer {
+    Answer {
+        verdict: Verdict::None,
+        probability: 0.93,
+        p_value: 0.43,
+        found: Vec::new(),
+        set: Vec::new(),
+        strengths: Vec::new(),
+        unexplained_at: None,
+        simulations: 731,
+        seconds: 1.0,
+    }
+}
+
+/// Coulomb friction at `joint:phi`, with two effects there that the data cannot distinguish from it.
+pub(crate) fn coulomb() -> Answer {
+    let there = |effect: &str| -> Named { (effect.into(), "joint:phi".into()) };
+    Answer {
+        verdict: Verdict::Effect,
+        probability: 0.9997,
+        p_value: 1e-9,
+        found: vec![(there("coulomb-friction"), 0.97)],
+        set: ["coulomb-friction", "quadratic-drag", "stribeck-friction"].map(there).to_vec(),
+        strengths: vec![(0, "c".into(), 0.0124, Some([0.0118, 0.013]))],
+        ..nothing()
+    }
+}
+
+/// The verdict `unexplained`, at `process:x`.
+pub(crate) fn unexplained() -> Answer {
+    Answer {
+        verdict: Verdict::Unexplained,
+        probability: 0.91,
+        p_value: 1e-9,
+        unexplained_at: Some("process:x".into()),
+        ..nothing()
+    }
+}

@@ -1,0 +1,32 @@
+//! The page of a benchmark: what the terminal says, and the reliability of stated probabilities as a picture.
+
+use super::statistics::{Bin, reliability};
+use mops::report::{Curve, CurveStyle, Ink, Plot};
+
+/// The page, from the tables as text, and stated probabilities beside what came true, by what they are of.
+pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String {
+    let told = stated.iter().filter(|(_, pairs)| !pairs.is_empty());
+    let pictures: Vec<String> = told.map(|(of, pairs)| plot(of, &reliability(pairs)).svg()).collect();
+    crate::page::page("Benchmark of the diagnosis", "Stated probabilities", &pictures, tables, "cases.csv")
+}
+
+/// What was stated, and what came true with its interval; where both agree, points lie on the diagonal.
+fn plot(of: &str, bins: &[Bin]) -> Plot {
+    let points: Vec<(f64, f64)> = bins.iter().map(|bin| (bin.stated, bin.observed.share())).collect();
+    let dots =
+        Curve { name: "observed".into(), points, style: CurveStyle::Dots, ink: Ink::Measured, ..Curve::default() };
+    let diagonal =
+        Curve { name: "calibrated".into(), points: vec![(0.0, 0.0), (1.0, 1.0)], ink: Ink::Demand, ..Curve::default() };
+    let interval = |bin: &Bin| {
+        let points = bin.observed.interval95().map(|share| (bin.stated, share)).to_vec();
+        Curve { name: String::new(), points, ink: Ink::Measured, ..Curve::default() }
+    };
+    Plot {
+        title: format!("Reliability of {of}"),
+        x_label: "stated".into(),
+        y_label: "observed".into(),
+        curves: [diagonal, dots].into_iter().chain(bins.iter().map(interval)).collect(),
+        x_range: Some([0.0, 1.0]),
+        ..Plot::default()
+    }
+}

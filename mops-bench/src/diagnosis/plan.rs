@@ -1,0 +1,186 @@
+//! Which simulated cases are asked for.
+
+use mops::math;
+use mops_testbed::{Draw, Effect, Missing, Plant, Trial, effects, generate, outside, plants};
+
+/// Attempts to make a case: not every effect reaches every size in every plant.
+const ATTEMPTS: u64 = 60;
+
+/// What is missing in the model of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Kind {
+    /// One effect of the catalogue.
+    One,
+    /// Two of them.
+    Two,
+    /// Nothing.
+    Nothing,
+    /// Something that no catalogue has.
+    Outside,
+}
+
+/// What a benchmark is asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    /// Names of the plants.
+    pub plants: Vec<String>,
+    /// Names of the effects.
+    pub effects: Vec<String>,
+    /// Errors of the refitted base model, in units of the noise.
+    pub sizes: Vec<f64>,
+    /// Number of cases of each kind.
+    pub counts: [(Kind, usize); 4],
+    /// Seed.
+    pub seed: u64,
+    /// Names of the cases that are wanted; all where there is none.
+    pub only: Vec<String>,
+}
+
+/// A case that is asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Wish {
+    /// Its kind.
+    pub kind: Kind,
+    /// Its number among those of its kind.
+    pub number: usize,
+}
+
+impl Plan {
+    /// All cases, the kinds mixed in proportion: a benchmark that is interrupted has seen something of each.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn wishes(&self) -> Vec<Wish> {
+        let of_kind = |&(kind, count): &(Kind, usize)| {
+            (0..count).map(move |number| ((number as f64 + 0.5) / count as f64, Wish { kind, number }))
+        };
+        let may_be = |name: &String, wish: &Wish| self.number_in(name) == Some(wish.number as u64);
+        let is_wanted = |wish: &Wish| self.only.is_empty() || self.only.iter().any(|name| may_be(name, wish));
+        let mut all: Vec<(f64, Wish)> = self.counts.iter().flat_map(of_kind).filter(|(_, w)| is_wanted(w)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.into_iter().map(|(_, wish)| wish).collect()
+    }
+
+    /// The cases that are wanted by name.
+    pub fn named(&self) -> Vec<Trial> {
+        if self.only.is_empty() {
+            return Vec::new();
+        }
+        self.wishes().iter().filter_map(|wish| self.make(wish)).filter(|trial| self.wants(&trial.name)).collect()
+    }
+
+    /// Whether a case of that name is wanted.
+    pub fn wants(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|wanted| wanted == name)
+    }
+
+    /// The seed of an attempt at a case.
+    fn seed_of(&self, number: u64, attempt: u64) -> u64 {
+        (self.seed << 32) + number * ATTEMPTS + attempt
+    }
+
+    /// The number of a case, from its name, which ends with its seed.
+    fn number_in(&self, name: &str) -> Option<u64> {
+        let seed: u64 = name.rsplit('-').next()?.parse().ok()?;
+        Some(seed.checked_sub(self.seed_of(0, 0))? / ATTEMPTS)
+    }
+
+    /// The size asked for that is nearest to one reached.
+    pub fn nearest(&self, reached: f64) -> f64 {
+        let off = |size: &f64| math::ln(size / reached).abs();
+        self.sizes.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(reached)
+    }
+
+    /// The case; `None` where no plant reaches the size with a sensible strength. Effects, then sizes take turns, so that
+    /// every effect comes at every size; the plant is drawn among those that the effect fits.
+    pub fn make(&self, wish: &Wish) -> Option<Trial> {
+        let Wish { kind, number } = *wish;
+        let mut draw = Draw::new(self.seed, &format!("{kind:?} {number}"));
+        let size = |among: usize| self.sizes[(number / among.max(1)) % self.sizes.len()];
+        let fitting = |effect: &Effect| -> Vec<&'static Plant> {
+            let all = plants().iter().copied().filter(|plant| self.plants.iter().any(|name| name == plant.name));
+            all.filter(|plant| !(effect.fits)(plant).is_empty()).collect()
+        };
+        let known: Vec<&'static Effect> = match kind {
+            Kind::Outside => outside(),
+            _ => effects().into_iter().filter(|e| self.effects.iter().any(|name| name == e.name)).collect(),
+        };
+        // Only the first of a name: some effects have a form for joints and one for actuators.
+        let mut names: Vec<&'static str> = known.iter().map(|e| e.name).collect();
+        names.dedup();
+        let places = |name: &str| -> Vec<&'static Plant> {
+            let of_name = known.iter().filter(|e| e.name == name);
+            let mut all: Vec<&'static Plant> = of_name.flat_map(|e| fitting(e)).collect();
+            all.dedup_by_key(|plant| plant.name);
+            all
+        };
+        (0..ATTEMPTS).find_map(|attempt| {
+            let seed = self.seed_of(number as u64, attempt);
+            if kind == Kind::Nothing {
+                let name = &self.plants[number % self.plants.len()];
+                return generate(name, Missing::Nothing, 0.0, seed);
+            }
+            let first = *names.get(number % names.len().max(1))?;
+            let possible = places(first);
+            let plant = *possible.get(draw.below(possible.len().max(1)))?;
+            match kind {
+                Kind::Two => {
+                    let others: Vec<&str> =
+                        names.iter().copied().filter(|n| places(n).iter().any(|p| p.name == plant.name)).collect();
+                    let second = others[draw.below(others.len())];
+                    generate(plant.name, Missing::Effects(&[first, second]), size(names.len()), seed)
+                }
+                Kind::Outside => generate(plant.name, Missing::Outside(first), size(names.len()), seed),
+                _ => generate(plant.name, Missing::Effects(&[first]), size(names.len()), seed),
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan() -> Plan {
+        Plan {
+            plants: vec!["pendulum".into(), "servo".into()],
+            effects: vec!["coulomb-friction".into(), "input-delay".into()],
+            sizes: vec![5.0, 2.0],
+            counts: [(Kind::One, 4), (Kind::Two, 1), (Kind::Nothing, 2), (Kind::Outside, 1)],
+            seed: 1,
+            only: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_effect_comes_at_every_size_and_kinds_are_mixed() {
+        let plan = plan();
+        let wishes = plan.wishes();
+        assert_eq!(wishes.len(), 8);
+        assert!(wishes[..4].iter().any(|wish| wish.kind != Kind::One));
+        let of_one = wishes.iter().filter(|wish| wish.kind == Kind::One);
+        let made: Vec<(String, f64)> = of_one
+            .map(|wish| plan.make(wish).expect("these can be made"))
+            .map(|trial| (trial.truth.effects[0].class.clone(), if trial.truth.size > 3.0 { 5.0 } else { 2.0 }))
+            .collect();
+        for effect in ["coulomb-friction", "input-delay"] {
+            for size in [5.0, 2.0] {
+                assert!(made.contains(&(effect.to_owned(), size)), "{effect} {size}: {made:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_case_is_made_again_by_its_name() {
+        let all = plan();
+        let third = all.make(&Wish { kind: Kind::One, number: 3 }).expect("it can be made");
+        let only = Plan { only: vec![third.name.clone(), "nothing-9".into()], ..all };
+        assert!(only.wants(&third.name) && !only.wants("nothing-9-1"));
+        assert_eq!(only.wishes().len(), 1, "no other kind has so many");
+        assert_eq!(only.named(), [third]);
+    }
+
+    #[test]
+    fn the_same_plan_makes_the_same_cases() {
+        let (plan, wish) = (plan(), Wish { kind: Kind::One, number: 3 });
+        assert_eq!(plan.make(&wish), plan.make(&wish));
+    }
+}

@@ -1,0 +1,151 @@
+//! How well solvers do on problems with known answers: how many they solve, with how many evaluations, in what time.
+
+mod control;
+mod fronts;
+mod page;
+mod profiles;
+mod relative;
+mod results;
+mod suite;
+mod timed;
+
+use std::time::Instant;
+
+use mops::{Catalogue, Evaluator, Merit, Shape, SolverChoice, Stop, Watch};
+use mops_problems::{Posed, Slope, Truth, measure};
+
+use crate::parallel::each;
+pub(crate) use fronts::{Spread, published, spreads};
+pub(crate) use page::page;
+pub(crate) use profiles::{Score, data_profile, performance_profile};
+pub(crate) use results::{Front, Results, Row};
+pub(crate) use suite::{Subject, Suite, suites};
+use timed::Timed;
+
+/// What is run.
+pub(crate) struct Plan {
+    pub suite: Suite,
+    pub solvers: Vec<SolverChoice>,
+    pub slope: Slope,
+    /// Seeds 1 to this.
+    pub seeds: u64,
+    /// Evaluations a run may take, for every variable and one more; as the suite has it where absent.
+    pub budget: Option<usize>,
+    /// Relative noise that is added to all values.
+    pub noise: f64,
+    /// Problems by name; all where empty.
+    pub only: Vec<String>,
+}
+
+impl Plan {
+    /// The problems asked for.
+    fn subjects(&self) -> Vec<Subject> {
+        let mut subjects = self.suite.subjects();
+        subjects.retain(|subject| self.only.is_empty() || self.only.iter().any(|name| name == subject.name()));
+        subjects
+    }
+
+    /// A solver that accepts none of the problems.
+    pub fn idle(&self, catalogue: &Catalogue) -> Option<&SolverChoice> {
+        let shapes: Vec<Shape> = self.subjects().iter().map(|subject| subject.shape(catalogue)).collect();
+        let accepts = |solver: &SolverChoice| shapes.iter().any(|shape| solver.make().accepts(shape).is_ok());
+        self.solvers.iter().find(|solver| !accepts(solver))
+    }
+
+    fn evaluations(&self, variables: usize) -> usize {
+        self.budget.map_or_else(|| (self.suite.budget)(variables), |budget| budget * (variables + 1))
+    }
+}
+
+/// Accuracy of the first count of evaluations.
+pub(crate) const ROUGH: f64 = 1e-3;
+
+/// A run, with what every point of it was worth.
+struct Done {
+    row: Row,
+    history: Vec<Merit>,
+}
+
+/// Runs a plan on so many threads; every run has one to itself, so that times are comparable.
+pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {
+    let subjects = plan.subjects();
+    let mut tasks: Vec<Task<'_>> = Vec::new();
+    for solver in &plan.solvers {
+        for subject in &subjects {
+            tasks.extend((1..=plan.seeds).map(|seed| Task { solver, subject, seed, slope: plan.slope }));
+        }
+    }
+    let done = |tasks: &[Task<'_>]| each(tasks, jobs, watch, |task| one(catalogue, plan, task));
+    let mut found = done(&tasks);
+    if plan.suite.relative {
+        let rivals = relative::rivals(catalogue);
+        let mut rivalling: Vec<Task<'_>> = Vec::new();
+        for subject in &subjects {
+            rivalling.extend(rivals.iter().map(|solver| Task { solver, subject, seed: 1, slope: Slope::Differences }));
+        }
+        let others = done(&rivalling);
+        relative::judge(&mut found, &others, plan.suite.accuracy);
+    }
+    Results::new(plan, found.into_iter().map(|done| done.row).collect(), watch.wants_stop())
+}
+
+/// A run to be done.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    solver: &'a SolverChoice,
+    subject: &'a Subject,
+    seed: u64,
+    slope: Slope,
+}
+
+fn one(catalogue: &Catalogue, plan: &Plan, task: &Task<'_>) -> Option<Done> {
+    match task.subject {
+        Subject::Formula(problem) => {
+            let posed = Posed::new(problem, task.slope).with_noise(plan.noise).with_seed(task.seed);
+            let clean = Posed::new(problem, task.slope);
+            let truth = |tuners: &[f64]| clean.evaluate(&clean.point_of(tuners)).merit;
+            go(plan, task, &posed, &posed.start(), if plan.noise > 0.0 { Some(&truth) } else { None })
+        }
+        Subject::Study(known) => {
+            let posed = suite::posing(catalogue, known, task.seed);
+            let start = posed.start();
+            go(plan, task, &posed, &start, None)
+        }
+    }
+}
+
+/// `None` where the solver does not accept the problem.
+fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64], truth: Option<Truth<'_>>) -> Option<Done> {
+    let Task { solver: choice, subject, seed, .. } = *task;
+    let mut solver = choice.make();
+    solver.accepts(posed.shape()).ok()?;
+    let timed = Timed::new(posed);
+    let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
+    let (budget, answer) = (plan.evaluations(start.len()), subject.answer());
+    let (measured, seconds) = thread.install(|| {
+        let begun = Instant::now();
+        let measured = measure(&answer, &timed, start, solver.as_mut(), budget, truth);
+        (measured, begun.elapsed().as_secs_f64())
+    });
+    let fine = measured.evaluations_to(subject.accuracy(&plan.suite));
+    let row = Row {
+        problem: subject.name().to_owned(),
+        solver: choice.kind.to_owned(),
+        seed,
+        variables: start.len(),
+        rows: posed.shape().rows.len(),
+        known: measured.target,
+        reached: measured.best.objective,
+        violation: measured.best.violation,
+        evaluations: measured.history.len(),
+        linearisations: measured.linearisations,
+        to_rough: measured.evaluations_to(ROUGH),
+        to_fine: fine,
+        solved: fine.is_some(),
+        converged: measured.stop == Stop::Converged,
+        seconds,
+        solver_seconds: (seconds - timed.seconds()).max(0.0),
+        front: measured.front.map(Front::from),
+    };
+    Some(Done { row, history: measured.history })
+}

@@ -1,0 +1,58 @@
+//! What programs on the terminal share: error messages, tables, progress, Ctrl-C.
+
+mod limits;
+mod mistake;
+mod progress;
+mod sparkline;
+mod table;
+mod write;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use mops_core::Diagnostic;
+
+pub(crate) use limits::{Limit, listen, or_end, within};
+pub use progress::Progress;
+pub use table::{number, table};
+pub use write::print;
+pub(crate) use write::{print_json, say};
+
+/// Reason why a command ends without its result.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum CommandError {
+    /// Mistake of the user, in a file or on the command line: exit status 2.
+    Mistake(Box<Diagnostic>),
+    /// Failure of the run or of the machine, as one sentence: exit status 3.
+    Failure(String),
+}
+
+impl From<Diagnostic> for CommandError {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Mistake(Box::new(diagnostic))
+    }
+}
+
+impl CommandError {
+    /// Returns a conversion of write errors at `path`, for `map_err`.
+    pub fn cannot_write(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
+        let path: PathBuf = path.to_owned();
+        move |error| Self::Failure(format!("{} cannot be written: {error}", path.display()))
+    }
+
+    /// Writes the error to standard error, a mistake with its source line, and returns the exit status.
+    #[must_use]
+    pub fn report(&self) -> ExitCode {
+        match self {
+            Self::Mistake(diagnostic) => {
+                mistake::show(diagnostic);
+                ExitCode::from(2)
+            }
+            Self::Failure(message) => {
+                say(&format!("error: {message}"));
+                ExitCode::from(3)
+            }
+        }
+    }
+}
