@@ -84,12 +84,12 @@ pub fn catalogue() -> Catalogue {
         solvers: mops_solvers::kinds(),
         effects: mops_effects::effects(),
         augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
-        studies: mops_studies::shipped(),
+        studies: mops_studies::shipped().into_iter().map(Into::into).collect(),
     }
 }
 
 #[cfg(feature = "cli")]
 /// The command line over a catalogue; a crate with kinds of its own calls it from its `main`.
 pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
-    cli::main(&catalogue)
+    cli::main(catalogue)
 }

@@ -9,6 +9,7 @@ use toml::de::ValueDeserializer;
 
 use crate::criterion::CriterionSpec;
 use crate::effect::{Effect, Placement};
+use crate::known_study::KnownStudy;
 use crate::mistake::Mistake;
 use crate::model::Model;
 use crate::solver::Solver;
@@ -133,22 +134,6 @@ impl SolverChoice {
     }
 }
 
-/// A study that comes with the program: its files, by their names in its folder.
-#[derive(Debug, Clone, Copy)]
-pub struct Shipped {
-    /// Name.
-    pub name: &'static str,
-    /// `study.toml`, `README.md` and data.
-    pub files: &'static [(&'static str, &'static [u8])],
-}
-
-impl Shipped {
-    /// One of its files.
-    pub fn file(&self, name: &str) -> Option<&'static [u8]> {
-        self.files.iter().find(|(path, _)| *path == name).map(|(_, bytes)| *bytes)
-    }
-}
-
 /// Everything a study file can name.
 #[derive(Clone, Default)]
 pub struct Catalogue {
@@ -162,8 +147,8 @@ pub struct Catalogue {
     pub effects: Vec<Arc<dyn Effect>>,
     /// What puts effects into a model; without it no study can name one.
     pub augment: Option<Augment>,
-    /// Shipped studies.
-    pub studies: Vec<Shipped>,
+    /// Studies known by name.
+    pub studies: Vec<KnownStudy>,
 }
 
 impl Catalogue {
@@ -193,6 +178,21 @@ impl Catalogue {
     pub fn with_solver(mut self, kind: SolverKind) -> Self {
         self.solvers.push(kind);
         self
+    }
+
+    /// Adds a study: files in the program ([`crate::Shipped`]), a folder ([`crate::StudyFolder`]), or one built in Rust
+    /// ([`crate::BuiltStudy`]). It replaces a study of the same name.
+    #[must_use]
+    pub fn with_study(mut self, study: impl Into<KnownStudy>) -> Self {
+        let study = study.into();
+        self.studies.retain(|known| known.name() != study.name());
+        self.studies.push(study);
+        self
+    }
+
+    /// Returns the study of this name.
+    pub fn study(&self, name: &str) -> Option<&KnownStudy> {
+        self.studies.iter().find(|study| study.name() == name)
     }
 }
 

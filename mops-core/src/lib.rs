@@ -23,6 +23,7 @@ pub mod file;
 pub mod front;
 pub mod identification;
 mod known;
+mod known_study;
 pub mod linear;
 mod linearised;
 mod mistake;
@@ -52,7 +53,7 @@ mod unit;
 pub use cancellation::{Cancellation, Halt};
 pub use case::Case;
 pub use catalogue::{
-    Augment, Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, Shipped, SolverChoice, SolverKind,
+    Augment, Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, SolverChoice, SolverKind,
     SolverOptions,
 };
 pub use conclude::{Ending, conclude};
@@ -69,6 +70,7 @@ pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use failure::Failure;
 pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
+pub use known_study::{BuiltStudy, KnownStudy, Shipped, StudyFolder};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
 pub use mistake::Mistake;

@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, ModelKind, suggestion};
+use mops_core::{Catalogue, Diagnostic, KnownStudy, ModelKind, suggestion};
 
 use super::effect;
 use super::places::places;
+use super::study::text_of;
 use crate::terminal::{CommandError, print};
 
 /// What is described.
@@ -38,9 +39,8 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&effect::page(effect.as_ref()))?;
         return Ok(ExitCode::SUCCESS);
     }
-    if let Some(study) = catalogue.studies.iter().find(|study| study.name == name) {
-        let file = |path| study.file(path).map(String::from_utf8_lossy).unwrap_or_default();
-        print(&format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml")))?;
+    if let Some(study) = catalogue.study(name) {
+        print(&page_of(study))?;
         return Ok(ExitCode::SUCCESS);
     }
     // A key of a table, such as `step` or `hold`: the page of the table tells of it.
@@ -57,10 +57,27 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .by_ref()
         .map(|(name, _)| name)
         .chain(catalogue.effects.iter().map(|effect| effect.name()))
-        .chain(catalogue.studies.iter().map(|s| s.name))
+        .chain(catalogue.studies.iter().map(KnownStudy::name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();
     Err(Diagnostic::new(format!("nothing is called `{name}`"))
         .with_help(suggestion(name, known.iter().copied()))
         .into())
+}
+
+/// The page of a study: its README and its file; of one built in Rust, the sentence that it brings.
+fn page_of(study: &KnownStudy) -> String {
+    match study {
+        KnownStudy::Built(built) => {
+            format!(
+                "{}: {}\n\nBuilt in Rust; `mops check {0}` shows its tuners and criteria.\n",
+                built.name(),
+                built.about()
+            )
+        }
+        _ => {
+            let file = |path| text_of(study, path).unwrap_or_default();
+            format!("{}\n--- study.toml\n{}", file("README.md"), file("study.toml"))
+        }
+    }
 }

@@ -79,6 +79,7 @@ pub(super) fn open(
     let identity = Identity::of(file, &file.study, options.solver.kind);
     let home = match home {
         Home::Shipped(shipped) => PathBuf::from(shipped.name),
+        Home::Built(built) => PathBuf::from(built.name()),
         Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
     };
     let task = serde_json::to_value(file.study.task).expect("a task is a word");

@@ -4,7 +4,9 @@ use std::process::ExitCode;
 
 use crate::terminal::{CommandError, print, table};
 use clap::{Args, ValueEnum};
-use mops_core::Catalogue;
+use mops_core::{Catalogue, KnownStudy};
+
+use super::study::text_of;
 
 /// What is listed.
 #[derive(Args)]
@@ -30,8 +32,14 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     };
     let row = |name: &str, about: String| vec![format!("  {name}"), about];
     let studies = catalogue.studies.iter().map(|study| {
-        let readme = study.file("README.md").map(String::from_utf8_lossy).unwrap_or_default();
-        row(study.name, readme.lines().next().unwrap_or_default().trim_start_matches('#').trim().to_owned())
+        let about = match study {
+            KnownStudy::Built(built) => built.about().to_owned(),
+            _ => {
+                let readme = text_of(study, "README.md").unwrap_or_default();
+                readme.lines().next().unwrap_or_default().trim_start_matches('#').trim().to_owned()
+            }
+        };
+        row(study.name(), about)
     });
     let models = catalogue.models.iter().map(|k| row(k.name, first_line((k.schema)())));
     let criteria = catalogue.criteria.iter().map(|k| row(k.name, first_line((k.schema)())));

@@ -28,12 +28,13 @@ mod simulate;
 mod study;
 mod tables;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use mops_core::Catalogue;
 
-use crate::terminal::print;
+use crate::terminal::{CommandError, print};
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
@@ -57,6 +58,9 @@ failed; 4 a signal ended it, with the best so far written."
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Folder of studies to know by name, each a folder with study.toml; beside those in the variable MOPS_STUDIES.
+    #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
+    studies: Vec<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -98,8 +102,19 @@ enum Command {
     },
 }
 
-pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
-    let outcome = match Arguments::parse().command {
+/// Parses the command line and does what it asks.
+pub(crate) fn main(catalogue: Catalogue) -> ExitCode {
+    let Arguments { command, studies } = Arguments::parse();
+    let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();
+    let folders = std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty()).chain(studies);
+    match study::with_folders(catalogue, &folders.collect::<Vec<_>>()) {
+        Ok(catalogue) => perform(&catalogue, command),
+        Err(mistake) => CommandError::from(mistake).report(),
+    }
+}
+
+fn perform(catalogue: &Catalogue, command: Command) -> ExitCode {
+    let outcome = match command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
         Command::Pick(arguments) => pick::pick(catalogue, &arguments),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, suggestion};
+use mops_core::{Catalogue, Diagnostic, KnownStudy, suggestion};
 
 use super::schema;
 use crate::files;
@@ -34,10 +34,13 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     let called = called.replace(['"', '\\'], "-");
     let files: Vec<(&str, Vec<u8>)> = match from {
         Some(name) => {
-            let names = catalogue.studies.iter().map(|study| study.name);
-            let study = catalogue.studies.iter().find(|study| study.name == name).ok_or_else(|| {
-                Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names))
-            })?;
+            let names = catalogue.studies.iter().map(KnownStudy::name);
+            let unknown = || Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names));
+            let KnownStudy::Shipped(study) = catalogue.study(name).ok_or_else(unknown)? else {
+                return Err(Diagnostic::new(format!("`{name}` is not a study of files in the program"))
+                    .with_help("copy its folder; a study built in Rust is copied in its crate")
+                    .into());
+            };
             let own = |bytes: &[u8]| match std::str::from_utf8(bytes) {
                 Ok(text) => text
                     .replacen(&format!("name = \"{}\"", study.name), &format!("name = \"{called}\""), 1)
@@ -62,7 +65,7 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     }
     let study = folder.join("study.toml");
     print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()))?;
-    if from.is_none() && catalogue.studies.iter().any(|study| study.name == called) {
+    if from.is_none() && catalogue.study(&called).is_some() {
         print(&format!("it is the commented template; `--from {called}` copies the shipped study of that name\n"))?;
     }
     Ok(ExitCode::SUCCESS)

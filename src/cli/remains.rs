@@ -134,6 +134,8 @@ fn leave(
             copy_data(folder, shipped)?;
             repaired(original, diagnosis, &str::to_owned)
         }
+        // No text of the study exists that could be repaired.
+        Home::Built(_) => return Ok(()),
     };
     write(&folder.join("repaired.toml"), text.as_bytes())?;
     if export {
@@ -150,6 +152,7 @@ fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> R
             copy_data(folder, shipped)?;
             settled(text, settings, &str::to_owned)
         }
+        Home::Built(_) => return Ok(()),
     };
     write(&folder.join("study.toml"), text.into_text().as_bytes())
 }

@@ -5,10 +5,9 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mops_core::file::{Files, StudyFile};
-use mops_core::{Catalogue, Diagnostic, Shipped, Source, suggestion};
+use mops_core::file::{Folder, StudyFile};
+use mops_core::{BuiltStudy, Catalogue, Diagnostic, KnownStudy, Shipped, Source, StudyFolder, suggestion};
 
-use crate::files;
 use crate::toml_text::quoted;
 
 /// Which study, and what goes over it.
@@ -21,47 +20,35 @@ pub(super) struct StudyArguments {
     pub settings: Vec<String>,
 }
 
-/// Data files in the folder of a study file.
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        files::read(&self.0.join(path))
-    }
-
-    fn show(&self, path: &str) -> String {
-        self.0.join(path).display().to_string()
-    }
-}
-
-/// Data files of a shipped study.
-struct Inside(Shipped);
-
-impl Files for Inside {
-    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| ErrorKind::NotFound.into())
-    }
-
-    fn show(&self, path: &str) -> String {
-        format!("{}/{path}", self.0.name)
-    }
-}
-
 /// Where a study and its data are.
 pub(super) enum Home {
     /// In a file; data are in its folder.
     File(PathBuf),
-    /// In the program.
+    /// Files in the program.
     Shipped(Shipped),
+    /// Built in Rust.
+    Built(BuiltStudy),
 }
 
 /// Where the study is; a folder stands for the study in it.
 pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
     let path = Path::new(&arguments.study);
-    match catalogue.studies.iter().find(|s| s.name == arguments.study) {
-        Some(shipped) if !path.is_file() => Home::Shipped(*shipped),
-        _ if path.is_dir() => Home::File(path.join("study.toml")),
-        _ => Home::File(path.to_owned()),
+    match catalogue.study(&arguments.study).filter(|_| !path.is_file()) {
+        Some(known) => Home::of(known),
+        None if path.is_dir() => Home::File(path.join("study.toml")),
+        None => Home::File(path.to_owned()),
+    }
+}
+
+impl Home {
+    /// Returns the place of a study of the catalogue.
+    fn of(known: &KnownStudy) -> Self {
+        match known {
+            KnownStudy::Shipped(shipped) => Self::Shipped(*shipped),
+            KnownStudy::Folder(folder) => Self::File(folder.file()),
+            KnownStudy::Built(built) => Self::Built(built.clone()),
+            other => unreachable!("`{}` is of a sort that this program does not know", other.name()),
+        }
     }
 }
 
@@ -97,13 +84,51 @@ pub(super) fn open_as(
         Home::Shipped(shipped) => {
             let text = shipped.file("study.toml").expect("every shipped study has one");
             let text = std::str::from_utf8(text).expect("shipped studies are text");
-            return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &Inside(shipped));
+            return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &shipped);
         }
+        Home::Built(built) => return mops_core::file::built(catalogue, &built, settings, &program()),
     };
     let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
+}
+
+/// Text of a file of a study: of one in the program or in a folder.
+pub(super) fn text_of(study: &KnownStudy, name: &str) -> Option<String> {
+    match study {
+        KnownStudy::Shipped(shipped) => shipped.file(name).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
+        KnownStudy::Folder(folder) => std::fs::read_to_string(folder.path().join(name)).ok(),
+        _ => None,
+    }
+}
+
+/// Digest of this program, which builds studies in Rust: another build may give other values.
+fn program() -> String {
+    let bytes = std::env::current_exe().and_then(std::fs::read);
+    bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes))
+}
+
+/// Adds the studies in `folders` to the catalogue: every folder in them that has a `study.toml`, by its name.
+///
+/// # Errors
+/// A folder cannot be read.
+pub(super) fn with_folders(mut catalogue: Catalogue, folders: &[PathBuf]) -> Result<Catalogue, Diagnostic> {
+    for folder in folders {
+        let cannot = |error: std::io::Error| {
+            Diagnostic::new(format!("the folder of studies {} cannot be read: {error}", folder.display()))
+                .with_help("name a folder of study folders, in --studies or in the variable MOPS_STUDIES")
+        };
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(cannot)? {
+            paths.push(entry.map_err(cannot)?.path());
+        }
+        paths.sort();
+        for study in paths.iter().filter_map(|path| StudyFolder::open(path)) {
+            catalogue = catalogue.with_study(study);
+        }
+    }
+    Ok(catalogue)
 }
 
 /// Bytes of a study, at most: what has no end, such as a device, ends there.
@@ -127,8 +152,12 @@ pub(super) fn read_at(
     settings: &[String],
 ) -> Result<StudyFile, Diagnostic> {
     let name = home.display().to_string();
-    if let Some(shipped) = catalogue.studies.iter().find(|shipped| home == Path::new(shipped.name)) {
-        return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, &Inside(*shipped));
+    match catalogue.study(&name) {
+        Some(KnownStudy::Shipped(shipped)) => {
+            return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
+        }
+        Some(KnownStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings, &program()),
+        _ => {}
     }
     let folder = home.parent().unwrap_or(Path::new("")).to_owned();
     mops_core::file::read(catalogue, &name, text, settings, &Folder(folder))
@@ -153,7 +182,7 @@ fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagn
         return Diagnostic::new(format!("there is no file `{study}`"))
             .with_help("`mops new` writes a study to start from; `mops list` names the shipped ones");
     }
-    let names = catalogue.studies.iter().map(|s| s.name);
+    let names = catalogue.studies.iter().map(KnownStudy::name);
     Diagnostic::new(format!("there is no file `{study}`, nor a shipped study of that name"))
         .with_help(suggestion(study, names))
 }

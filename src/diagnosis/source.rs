@@ -200,33 +200,21 @@ fn tuner(tuner: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::file::Files;
+    use mops_core::KnownStudy;
     use mops_discrepancy::Removed;
 
     use super::super::made_up;
     use super::super::repaired::{Original, repaired};
     use super::*;
 
-    struct Shipped(mops_core::Shipped);
-
-    impl Files for Shipped {
-        fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-            Ok(self.0.file(path).unwrap().to_vec())
-        }
-
-        fn show(&self, path: &str) -> String {
-            path.to_owned()
-        }
-    }
-
     /// N.B.: the example is compiled with the others, and run by `tests/examples.rs`.
     #[test]
     fn the_example_is_what_is_written_for_the_swinging_pendulum() {
         let catalogue = crate::catalogue();
-        let shipped = *catalogue.studies.iter().find(|study| study.name == "furuta-swing").unwrap();
+        let Some(KnownStudy::Shipped(shipped)) = catalogue.study("furuta-swing") else { panic!("it is shipped") };
         let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
         let settings = ["tuners.ca.max=6e-3".to_owned()];
-        let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, &Shipped(shipped)).unwrap().study;
+        let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, shipped).unwrap().study;
         // The pendulum has the effect already, as a term of its own.
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
         let diagnosis = Diagnosis { found: Vec::new(), removed, ..made_up::coulomb() };

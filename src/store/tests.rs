@@ -3,37 +3,25 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use mops_core::file::{Files, StudyFile};
-use mops_core::{Failure, Known, Missed, Problem, RowSlopes, RowValue, Shipped, Study, Value};
+use mops_core::file::StudyFile;
+use mops_core::{Failure, Known, KnownStudy, Missed, Problem, RowSlopes, RowValue, Study, Value};
 
 use super::database::{Database, PointRow};
 use super::{FILE, Identity, Keeper, Refusal, RunState, Start, bytes, row};
 
-/// Files of a shipped study.
-struct Own<'s>(&'s Shipped);
-
-impl Files for Own<'_> {
-    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        self.0.file(path).map(<[u8]>::to_vec).ok_or(std::io::ErrorKind::NotFound.into())
-    }
-
-    fn show(&self, path: &str) -> String {
-        path.to_owned()
-    }
-}
-
 /// A shipped study with settings.
 fn file(name: &str, settings: &[&str]) -> StudyFile {
     let catalogue = crate::catalogue();
-    let shipped = catalogue.studies.iter().find(|study| study.name == name).unwrap();
+    let Some(KnownStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
     let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    mops_core::file::read(&catalogue, name, text, &settings, &Own(shipped)).unwrap()
+    mops_core::file::read(&catalogue, name, text, &settings, shipped).unwrap()
 }
 
 #[test]
 fn every_shipped_study_measures_as_itself_so_that_its_points_are_kept() {
-    for Shipped { name, .. } in crate::catalogue().studies {
+    for known in crate::catalogue().studies {
+        let name = known.name();
         let study = file(name, &[]).study;
         assert!(study.measures_as(&study.clone()), "{name}");
     }

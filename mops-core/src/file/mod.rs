@@ -1,6 +1,7 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
 //! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
 
+mod built;
 mod content;
 mod effects;
 mod entries;
@@ -16,8 +17,10 @@ mod tasks;
 mod tree;
 
 use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
 pub use parts::{case, criterion, experiment, model};
@@ -25,9 +28,11 @@ pub use schema::{describe, study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::criterion::Usage;
+use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::experiment::Input;
 use crate::expression::Expression;
+use crate::known_study::Shipped;
 use crate::linearised::Linearised;
 use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Interface};
@@ -46,6 +51,53 @@ pub trait Files {
 
     /// The path as it is shown to the user.
     fn show(&self, path: &str) -> String;
+}
+
+/// Data files in a folder, usually that of the study file. Devices and pipes are refused: they may have no end.
+#[derive(Debug, Clone)]
+pub struct Folder(pub PathBuf);
+
+impl Files for Folder {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        read_regular(&self.0.join(path))
+    }
+
+    fn show(&self, path: &str) -> String {
+        self.0.join(path).display().to_string()
+    }
+}
+
+impl Files for Shipped {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        self.file(path).map(<[u8]>::to_vec).ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+
+    fn show(&self, path: &str) -> String {
+        format!("{}/{path}", self.name)
+    }
+}
+
+impl Study {
+    /// Reads the study file at `path`; data files are relative to its folder.
+    ///
+    /// # Errors
+    /// The file cannot be read, or its first mistake with line and column.
+    pub fn from_file(catalogue: &Catalogue, path: impl AsRef<Path>) -> Result<Self, Diagnostic> {
+        let path = path.as_ref();
+        let name = path.display().to_string();
+        let bytes = read_regular(path).map_err(|error| Diagnostic::new(format!("{name} cannot be read: {error}")))?;
+        let source = Source::from_bytes(&name, bytes)?;
+        let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+        Ok(read(catalogue, &name, &source.text, &[], &folder)?.study)
+    }
+
+    /// Reads a study from the text of a study file; data files are relative to the working directory.
+    ///
+    /// # Errors
+    /// The first mistake with line and column.
+    pub fn from_str(catalogue: &Catalogue, text: &str) -> Result<Self, Diagnostic> {
+        Ok(read(catalogue, "study", text, &[], &Folder(PathBuf::new()))?.study)
+    }
 }
 
 /// A study file, read and checked.

@@ -1,0 +1,123 @@
+//! Studies built in Rust, read as if they were files: settings of the command line replace values of the draft.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde_json::{Value, json};
+
+use super::tree::{Node, Text};
+use super::{StudyFile, read_solver, tasks};
+use crate::catalogue::Catalogue;
+use crate::diagnostic::{Diagnostic, suggestion};
+use crate::evaluation::Objective;
+use crate::known_study::BuiltStudy;
+use crate::study::{Draft, Study, Task};
+use crate::unit::Quantity;
+
+/// What settings may replace in `[study]`.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct StudySettings {
+    /// Task.
+    task: Option<Task>,
+    /// Combination of the scaled values: `max` or `sum`.
+    objective: Option<Objective>,
+    /// Seed of all random numbers.
+    seed: Option<u64>,
+}
+
+/// What settings may replace in a tuner.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct TunerSettings {
+    /// Initial value.
+    start: Option<Quantity>,
+    /// Lower bound.
+    min: Option<Quantity>,
+    /// Upper bound.
+    max: Option<Quantity>,
+}
+
+/// Builds a study and applies `settings`, which are `key=value` pairs: `study.task`, `study.objective`, `study.seed`, `start`, `min`
+/// and `max` of tuners, `solver`, and the tables of tasks. `program` identifies the program that builds the study: stored
+/// evaluations of another program are not reused.
+///
+/// # Errors
+/// The first mistake, in the settings or in the study.
+pub fn built(
+    catalogue: &Catalogue,
+    study: &BuiltStudy,
+    settings: &[String],
+    program: &str,
+) -> Result<StudyFile, Diagnostic> {
+    let text = Arc::new(Text::new(study.name(), "", settings));
+    read(catalogue, study, &text, program).map_err(|mistake| text.settle(mistake))
+}
+
+fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &str) -> Result<StudyFile, Diagnostic> {
+    let root = text.parse()?;
+    root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::TABLES[..]].concat())
+        .map_err(|mistake| mistake.with_help("a study built in Rust is changed there"))?;
+    let mut draft = built.draft();
+    draft.name = built.name().to_owned();
+    if let Some(node) = root.child("study") {
+        let settings: StudySettings = node.read()?;
+        draft.task = settings.task.unwrap_or(draft.task);
+        draft.objective = settings.objective.or(draft.objective);
+        draft.seed = settings.seed.unwrap_or(draft.seed);
+    }
+    for (name, node) in root.table("tuners")? {
+        set_tuner(&mut draft, &name, &node)?;
+    }
+    if tasks::TABLES.iter().any(|table| root.child(table).is_some()) {
+        draft.tasks = tasks::read(&root, catalogue)?;
+    }
+    let (solver, max_evaluations) = read_solver(catalogue, &root)?;
+    let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
+    Ok(StudyFile {
+        content: content(&study),
+        study,
+        solver,
+        max_evaluations,
+        source: Arc::clone(text.source()),
+        data: vec![("program".to_owned(), program.to_owned())],
+        text: Arc::clone(text),
+    })
+}
+
+fn set_tuner(draft: &mut Draft, name: &str, node: &Node<'_>) -> Result<(), Diagnostic> {
+    let names: Vec<String> = draft.tuners.iter().map(|(name, _)| name.clone()).collect();
+    let tuner = draft.tuners.iter_mut().find(|(known, _)| known == name).map(|(_, tuner)| tuner).ok_or_else(|| {
+        node.key_diagnostic(format!("the study has no tuner `{name}`"))
+            .with_help(suggestion(name, names.iter().map(String::as_str)))
+    })?;
+    let settings: TunerSettings = node.read()?;
+    for (value, new) in
+        [(&mut tuner.start, settings.start), (&mut tuner.min, settings.min), (&mut tuner.max, settings.max)]
+    {
+        if new.is_some() {
+            *value = new;
+        }
+    }
+    Ok(())
+}
+
+/// Content of the study as far as it is data, in the layout of a study file.
+fn content(study: &Study) -> Value {
+    let tuners = study.tuners.iter().map(|tuner| {
+        let [min, max] = tuner.bounds;
+        (
+            tuner.name.clone(),
+            json!({ "start": tuner.start, "min": min, "max": max, "scale": format!("{:?}", tuner.scale) }),
+        )
+    });
+    let criteria = study.rows.iter().map(|row| {
+        let demand = format!("{:?}", row.demand);
+        (study.key(row), json!({ "usage": format!("{:?}", row.usage), "demand": demand, "weight": row.weight }))
+    });
+    json!({
+        "study": { "name": study.name, "task": study.task, "seed": study.seed },
+        "tuners": tuners.collect::<serde_json::Map<_, _>>(),
+        "criteria": criteria.collect::<serde_json::Map<_, _>>(),
+    })
+}

@@ -1,0 +1,123 @@
+//! Studies that a catalogue knows by name: files in the program, a folder, or built in Rust.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::study::Draft;
+
+/// Study that a catalogue knows by name: `mops list` shows it, and every command that takes a study file takes the name.
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum KnownStudy {
+    /// Files in the program.
+    Shipped(Shipped),
+    /// Folder with `study.toml`, data, and `README.md`.
+    Folder(StudyFolder),
+    /// Built in Rust.
+    Built(BuiltStudy),
+}
+
+/// A study that comes with the program: its files, by their names in its folder.
+#[derive(Debug, Clone, Copy)]
+pub struct Shipped {
+    /// Name.
+    pub name: &'static str,
+    /// `study.toml`, `README.md` and data.
+    pub files: &'static [(&'static str, &'static [u8])],
+}
+
+impl Shipped {
+    /// One of its files.
+    pub fn file(&self, name: &str) -> Option<&'static [u8]> {
+        self.files.iter().find(|(path, _)| *path == name).map(|(_, bytes)| *bytes)
+    }
+}
+
+/// Folder with `study.toml`, data, and `README.md`; the study is known by the folder's name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudyFolder {
+    name: String,
+    path: PathBuf,
+}
+
+/// Study built in Rust.
+#[derive(Clone)]
+pub struct BuiltStudy {
+    name: String,
+    about: String,
+    draft: Arc<dyn Fn() -> Draft + Send + Sync>,
+}
+
+impl KnownStudy {
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Shipped(shipped) => shipped.name,
+            Self::Folder(folder) => &folder.name,
+            Self::Built(built) => &built.name,
+        }
+    }
+}
+
+impl StudyFolder {
+    /// Returns the study in a folder that has a `study.toml`; `None` for other folders.
+    pub fn open(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_str()?.to_owned();
+        path.join("study.toml").is_file().then(|| Self { name, path: path.to_owned() })
+    }
+
+    /// Returns the path of `study.toml`.
+    pub fn file(&self) -> PathBuf {
+        self.path.join("study.toml")
+    }
+
+    /// Returns the path of the folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl BuiltStudy {
+    /// Creates a study of this name. `about` is one sentence for `mops list`; `draft` describes the study each time it is
+    /// opened, and its errors are reported then.
+    pub fn new(
+        name: impl Into<String>,
+        about: impl Into<String>,
+        draft: impl Fn() -> Draft + Send + Sync + 'static,
+    ) -> Self {
+        Self { name: name.into(), about: about.into(), draft: Arc::new(draft) }
+    }
+
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the sentence for `mops list`.
+    pub fn about(&self) -> &str {
+        &self.about
+    }
+
+    /// Describes the study.
+    pub fn draft(&self) -> Draft {
+        (self.draft)()
+    }
+}
+
+impl From<Shipped> for KnownStudy {
+    fn from(shipped: Shipped) -> Self {
+        Self::Shipped(shipped)
+    }
+}
+
+impl From<StudyFolder> for KnownStudy {
+    fn from(folder: StudyFolder) -> Self {
+        Self::Folder(folder)
+    }
+}
+
+impl From<BuiltStudy> for KnownStudy {
+    fn from(built: BuiltStudy) -> Self {
+        Self::Built(built)
+    }
+}
