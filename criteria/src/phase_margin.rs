@@ -74,6 +74,6 @@ mod tests {
     #[test]
     fn what_no_turn_makes_stable_has_no_value() {
         let slow = undefined(&PhaseMargin::default(), &linear(&[0.5], &[1.0, -1.0]));
-        assert_eq!(slow, "the closed loop is unstable, and no turn of the phase makes it stable");
+        assert_eq!(slow, "the closed loop is unstable, and no phase shift stabilises it");
     }
 }
