@@ -102,7 +102,7 @@ pub struct Interface {
     pub states: Vec<State>,
     /// Inputs that experiments and cases can drive; 0 if undriven.
     pub inputs: Vec<Variable>,
-    /// Locations where a missing effect may act.
+    /// Places where a missing effect may act.
     pub ports: Vec<Port>,
     /// Default end of the simulation, s, if no experiment gives one.
     pub horizon: Option<f64>,
