@@ -137,13 +137,13 @@ fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
     assert_eq!((&result["solver"], &result["evaluations"]), (&"none".into(), &1.into()));
     assert_eq!((found["rank"].as_u64().unwrap() as usize, tuners), (11, 12));
     let direction = &found["directions"][0];
-    let expected = "a common factor of `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp` and `a` changes nothing: only their ratios can \
+    let expected = "a common factor of `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp` and `a` has no effect: only their ratios can \
                     be estimated";
     assert_eq!(direction["words"], expected);
     // Along it the residuals stay what they are, also far away.
     assert!(direction["remaining"].as_f64().unwrap() < 1e-6, "{direction}");
     assert_eq!(found["tuners"][0]["std_error"], Value::Null);
-    assert!(page(folder.path()).contains("changes nothing: only their ratios can be estimated"));
+    assert!(page(folder.path()).contains("has no effect: only their ratios can be estimated"));
 }
 
 /// The arm's inertia about its axis is that about its centre of mass and its mass times 0.1225 m squared.
