@@ -194,7 +194,7 @@ fn ties_are_computed_and_checked_in_coherent_units() {
     for (tie, fact) in [
         ("2*v", "expected a quantity in s, found one in m/s"),
         ("a + v", "expected a quantity in s, found one in m/s"),
-        ("a + 5", "a number without a unit beside `a`, which is in ms"),
+        ("a + 5", "a number without a unit next to `a`, which is in ms"),
         ("exp(a)", "`exp` takes a pure number, found a quantity in s"),
     ] {
         let folder = study(&text(tie), "");
@@ -266,10 +266,10 @@ fn a_temperature_that_nothing_drives_is_named() {
     let folder = study(text, "");
     let (code, output) = mops(folder.path(), &["check", "study.toml"]);
     assert!(
-        code == 0 && output.contains("warning: nothing drives `Ta`, which is 0 degC throughout, in cold\n"),
+        code == 0 && output.contains("warning: input `Ta` is not driven and stays at 0 degC, in cold\n"),
         "{output}"
     );
-    assert_eq!(output.matches("nothing drives").count(), 1, "{output}");
+    assert_eq!(output.matches("is not driven").count(), 1, "{output}");
 }
 
 #[test]
