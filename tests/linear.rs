@@ -203,7 +203,7 @@ response = { frequency-fit = { signal = 'ph', input = 'u' }, demand = 1 }
         assert!(measured(unit, size).unwrap() < 1e-12, "{unit}");
     }
     let wrong = measured("rad/V", 1.0).unwrap_err();
-    assert!(wrong.contains("the response is measured in `rad/V`, that of the model is in `rad/(N m)`"), "{wrong}");
+    assert!(wrong.contains("expected a response in `rad/(N m)`, found `rad/V`"), "{wrong}");
     assert!(wrong.contains("study.toml:12:15"), "{wrong}");
 }
 
