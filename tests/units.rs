@@ -306,8 +306,8 @@ fn units_are_read_as_engineers_type_them() {
         mops(folder.path(), &["check", "study.toml"])
     };
     for (demand, message) in [
-        ("0,8 kJ", "`0,8 kJ` has a comma for its decimal point; write \"0.8 kJ\""),
-        (&format!("1 {}m{}", "(".repeat(30_000), ")".repeat(30_000)), "a unit of 60001 characters"),
+        ("0,8 kJ", "`0,8 kJ` has a decimal comma; write \"0.8 kJ\""),
+        (&format!("1 {}m{}", "(".repeat(30_000), ")".repeat(30_000)), "the unit has 60001 characters"),
     ] {
         let (code, output) = refused(demand);
         assert!(code == 2 && output.contains(message), "{}", &output[..output.len().min(2000)]);

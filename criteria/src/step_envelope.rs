@@ -167,7 +167,7 @@ mod tests {
         let reversed = mistake(&envelope(&[], &[[2.0, 0.0], [1.0, 0.0]]));
         assert_eq!(reversed, "lower: the point at 1 s stands after 2 s; give the points by increasing time");
         let metres = StepEnvelope { upper: vec![[quantity("1 m"), quantity("1 m")]], ..envelope(&[], &[]) };
-        assert_eq!(mistake(&metres), "upper: a quantity in `m` stands where one in `s` is expected");
+        assert_eq!(mistake(&metres), "upper: expected a quantity in `s`, found `m`");
         assert_eq!(
             undefined(&envelope(&[[9.0, 1.0]], &[]), &simulated(4.0, |t| t)),
             "the envelope begins after the end of the simulation at 4 s"

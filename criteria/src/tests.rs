@@ -117,7 +117,7 @@ fn a_mistake_in_an_option_is_led_back_to_its_place() {
     let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, model = 'lag', demand = 1 }")
         .err()
         .expect("the unit is wrong");
-    assert!(wrong.to_string().contains(":14:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
+    assert!(wrong.to_string().contains(":14:50: expected a quantity in `m`, found `s`"), "{wrong}");
 }
 
 fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {

@@ -213,7 +213,7 @@ mod tests {
         unknown.signal = "phii".into();
         assert_eq!(mistake(&unknown), "signal: the model has no signal `phii`; did you mean `phi`?");
         let seconds = Overshoot { target: Some(quantity("3 s")), ..overshoot() };
-        assert_eq!(mistake(&seconds), "target: a quantity in `s` stands where one in `m` is expected");
+        assert_eq!(mistake(&seconds), "target: expected a quantity in `m`, found `s`");
         let infinite = Overshoot { target: Some(f64::INFINITY.into()), ..overshoot() };
         assert_eq!(mistake(&infinite), "target: `target` must be finite, not inf");
         let none = Overshoot { target: Some(2.0.into()), from: Some(2.0.into()), ..overshoot() };
