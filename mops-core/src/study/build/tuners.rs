@@ -77,7 +77,7 @@ pub(super) fn build_tuner(
     if let (Some(_), Some(key)) =
         (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
     {
-        return Err(Mistake::new(key.0, format!("a tied tuner cannot have `{}`", key.0))
+        return Err(Mistake::new(key.0, format!("`{}` is not allowed for a tied tuner", key.0))
             .with_help(format!("remove `{}`, or remove `tie`", key.0)));
     }
     let fixed = draft.inactive || draft.tie.is_some();
@@ -283,7 +283,7 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
                     "the first sample of `{}` is at {} s and does not determine its value at 0 s",
                     channel.signal, channel.times[0]
                 ),
-                None => format!("no measurement determines the initial value of `{}`", free.state),
+                None => format!("the initial value of `{}` is not determined by any measurement", free.state),
             };
             return Err(Mistake::new(&free.state, fact)
                 .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
