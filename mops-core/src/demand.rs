@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_missed_is_never_met_whatever_the_demand_and_the_horizon() {
+    fn a_missed_criterion_meets_no_demand_whatever_the_horizon() {
         let settling = |distance| Value::missed(Some(5.0), distance, 0.02, "not settled at the end");
         for (demand, least) in [(1.0, 5.0), (5.0, 1.0), (10.0, 1.0)] {
             let scaled = |distance| Demand::AtMost(demand).scaled(&settling(distance)).value;

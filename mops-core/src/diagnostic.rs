@@ -53,7 +53,7 @@ pub struct Diagnostic {
     pub label: Option<String>,
     /// Suggested fix.
     pub help: Option<String>,
-    /// Location: the text and a byte range in it; `0..0` stands for the file as a whole.
+    /// Location: the text and a byte range in it; `0..0` denotes the complete file.
     pub place: Option<(Arc<Source>, Range<usize>)>,
 }
 

@@ -9,7 +9,7 @@ use crate::solver::{Linearisation, Oracle};
 ///
 /// A one-sided difference is best with a step near the square root of the noise and retains half of the digits. A central
 /// difference is best near the cube root and retains two thirds, at twice the cost. One-sided differences are used if half
-/// of the digits are sufficient: for values exact to 1e-14 and a `reach` of at least a hundred times the step.
+/// of the digits are sufficient. This holds for values exact to 1e-14 and a `reach` of at least a hundred times the step.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
 #[derive(Debug, Clone, Copy)]
@@ -24,8 +24,7 @@ impl Differences {
     }
 
     /// Returns the step of a central difference for derivatives that describe the problem within `reach`. The step is a
-    /// tenth of `reach`, at most a fifth of the cube root of the noise, and large enough to limit the influence of the
-    /// noise.
+    /// tenth of `reach`, at most a fifth of the cube root of the noise. A lower bound limits the influence of the noise.
     pub fn step(self, reach: f64) -> f64 {
         (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * math::cbrt(self.noise))
     }

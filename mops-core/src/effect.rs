@@ -94,7 +94,7 @@ impl Port {
 
 /// Unit of an effect parameter, as powers of the units at its place.
 ///
-/// `output` is the unit of the term that the effect adds. The term is a force, torque or flow in an equation; at an actuator
+/// `output` is the unit of the term that the effect adds. The term is a force, torque or flow in an equation. At an actuator
 /// it has the unit of the input, at a sensor that of the signal. `position` and `speed` are the units of the joint; at a
 /// process, of the state and its rate. `value` is the unit of the input or signal, `time` is s. The second port provides
 /// `position` and `speed` at an actuator or sensor, and `value` at a joint or process.
@@ -180,8 +180,8 @@ pub enum Trials {
     Jumps(&'static [f64]),
     /// Listed values, then multiples of the typical size: periods per turn, and along a rail.
     PlainAndScaled(&'static [f64], &'static [f64]),
-    /// Frequencies in rad/s that the record can resolve: from two thirds of a period in the record up to 160 periods, or
-    /// four samples per period.
+    /// Frequencies in rad/s that the record can resolve: at least two thirds of a period in the record, at most 160 periods
+    /// or four samples per period.
     Frequencies,
     /// Quantisation steps: the largest value divided by the number of steps, from one step on. Neighbouring candidates
     /// differ by one step in about every eighth sample.

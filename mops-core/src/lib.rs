@@ -1,7 +1,7 @@
 //! Core types and algorithms of mops: tuners, criteria, demands, usages, cases, experiments, studies, the min-max problem
 //! and runs.
 //!
-//! This crate contains no concrete criterion, model or solver; a [`Catalogue`] provides them.
+//! Concrete criteria, models and solvers are not part of this crate; a [`Catalogue`] provides them.
 
 pub mod band_limited;
 mod cancellation;

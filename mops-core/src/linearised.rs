@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn the_operating_point_is_what_is_given_else_the_start_value() {
+    fn the_operating_point_is_given_or_else_the_initial_value() {
         let by_start = Linearised::new(pendulum(), &Linearise::default()).unwrap();
         let resting = by_start.at(&Case::default(), &[9.0, 0.5]).unwrap();
         assert_eq!((resting.states[0], resting.system.a[(1, 0)]), (0.5, 9.0 * math::cos(0.5)));
@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equilibrium_holds_what_is_given_and_moves_an_input_only_if_it_may() {
+    fn an_equilibrium_keeps_given_values_and_moves_only_free_inputs() {
         let at = vec![("angle".into(), quantity("0.4"))];
         let trim = Linearise { at: at.clone(), equilibrium: true, free: vec!["u".into()], ..Linearise::default() };
         let resting = Linearised::new(pendulum(), &trim).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap();
@@ -371,7 +371,7 @@ mod tests {
         let held = Linearise { at, equilibrium: true, ..Linearise::default() };
         let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
         assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");
-        // Newton's method ends where the speed is 0 and only the torque of gravity is left.
+        // Newton's method stops at zero speed, with the gravity torque unbalanced.
         assert!(failure.to_string().contains("`speed` still changes by 3.505e0"), "{failure}");
         assert!(failure.to_string().ends_with("the input `u` is fixed, --free lets the search vary it"), "{failure}");
     }
@@ -385,7 +385,8 @@ mod tests {
             "at.angel: the model has no state or input `angel`; did you mean `angle`?"
         );
         assert!(
-            wrong(Linearise { at: at("angle", "1 s"), ..Linearise::default() }).starts_with("at.angle: a quantity in")
+            wrong(Linearise { at: at("angle", "1 s"), ..Linearise::default() })
+                .starts_with("at.angle: expected a quantity in")
         );
         assert!(wrong(Linearise { inputs: Some(vec!["v".into()]), ..Linearise::default() }).starts_with("inputs.v: "));
         assert!(wrong(Linearise { free: vec!["u".into()], ..Linearise::default() }).starts_with("free: "));

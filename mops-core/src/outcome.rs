@@ -201,10 +201,10 @@ pub struct CriterionReport {
     /// scaled value `c/d`. It is the lower limit `c >= d` if more is better, with the scaled value `1 + (d - c)/|d|`. A pair
     /// scales to `(c - good)/(bad - good)`.
     ///
-    /// A condition that was never reached scales to `max(1, h/d) (1 + e/(e + b))`; under a pair, and for a criterion that is
-    /// not a time, to `1 + e/(e + b)`. `h` is the time available to reach the condition. `e` is the mean distance of the
-    /// signal from its target over the last tenth of that time. `b` is the half-width of the band (for levels 1 % of the
-    /// step).
+    /// A condition that was never reached scales to `max(1, h/d) (1 + e/(e + b))`. Under a pair, and for a criterion that is
+    /// not a time, it scales to `1 + e/(e + b)`. `h` is the time available to reach the condition. `e` is the mean distance
+    /// of the signal from its target over the last tenth of that time. `b` is the half-width of the band (for levels 1 % of
+    /// the step).
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,

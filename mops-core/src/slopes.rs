@@ -20,9 +20,9 @@ pub struct SlopesReport {
 pub struct CriterionSlopes {
     /// Key, `case/criterion`.
     pub key: String,
-    /// Derivative of the scaled value with respect to each tuner's position within its bounds (0 at the lower, 1 at the
-    /// upper; logarithmic for logarithmic tuners). A hundredth of it is the first-order change for a step of 1 % of the
-    /// range.
+    /// Derivative of the scaled value with respect to the position of each tuner within its bounds. The position is 0 at the
+    /// lower and 1 at the upper bound, logarithmic for logarithmic tuners. A hundredth of the derivative is the first-order
+    /// change for a step of 1 % of the range.
     pub slopes: Vec<f64>,
 }
 

@@ -62,8 +62,7 @@ impl Tolerance {
     /// Checks the tolerance.
     ///
     /// # Errors
-    /// Returns an error for a tolerance outside (0, 1), a maximum step size that is not positive, or a maximum number of
-    /// steps of 0.
+    /// Returns an error for a tolerance outside (0, 1), a maximum step size that is not positive, or no steps at all.
     pub fn check(&self) -> Result<(), Mistake> {
         let wrong = |key: &str, fact: String| Mistake::new(key, fact).within("tolerance");
         for (key, value) in [("relative", Some(self.relative)), ("absolute", self.absolute)] {

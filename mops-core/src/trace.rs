@@ -406,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_late_was_on_its_way_before_the_start() {
+    fn a_delayed_trace_is_extrapolated_before_its_start() {
         let parabola = |t: f64| 1.0 - 2.0 * t + 3.0 * t * t;
         let mut trace = Trace::starting_at(0.0, 2);
         trace.push_polynomial(0.4, [1.0, -0.8, 3.0 * 0.16, 0.0, 0.0]);

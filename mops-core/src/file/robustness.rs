@@ -74,7 +74,7 @@ pub(super) struct WorstCaseSection {
     /// Design to be examined: `optimum` (default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
-    /// Criteria whose worst case is searched; default all that count.
+    /// Criteria for the worst-case search; default is every criterion that counts.
     pub criteria: Option<Vec<String>>,
     /// Number of initial sample points per criterion, in addition to the corners of the box; default 128.
     pub samples: Option<usize>,

@@ -18,7 +18,7 @@ const MOST_SAMPLES: usize = 10_000_000;
 pub struct WorstCaseTask {
     /// Design to be examined.
     pub at: Place,
-    /// Criteria whose worst case is sought. `None` for all that count, or for all criteria if none counts.
+    /// Criteria for the worst-case search. `None` for every criterion that counts, or for all criteria if none counts.
     pub criteria: Option<Vec<String>>,
     /// Number of initial sample points per criterion, in addition to the corners of the box.
     pub samples: usize,

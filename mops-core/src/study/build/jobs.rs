@@ -60,8 +60,8 @@ fn apart(name: &str, unit: &Unit, other: &Unit) -> Mistake {
         .with_help("give them different names, or one unit")
 }
 
-/// Returns the source of each parameter. In order of precedence: a tuner of the case, a value in the case, a tuner of the
-/// study, the table of the model, the default.
+/// Returns the source of each parameter. The first existing one is used: a tuner of the case, a value in the case, a tuner
+/// of the study, the table of the model, the default.
 fn sources(
     study: &Study,
     interface: &Interface,
