@@ -40,8 +40,8 @@ impl Enclosure {
         Self { value: Interval::between(from, to), rate: Interval::point(1.0) }
     }
 
-    /// Returns the enclosure of the polynomial `sum_k c_k d^k` in the distance `d` from the interval centre, `|d| <=
-    /// radius` in s.
+    /// Returns the enclosure of the polynomial `sum_k c_k d^k` in the distance `d` from the interval centre,
+    /// `|d| <= radius` in s.
     #[must_use]
     pub fn of_polynomial(coefficients: &[f64], radius: f64) -> Self {
         // Centres and radii: even powers of `d` range from 0 to the power of the radius, odd ones between plus and

@@ -45,8 +45,8 @@ pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
     Some(Whiteness { lag1: correlation(1), ljung_box, lags, probability: tail(ljung_box, lags) })
 }
 
-/// Returns the probability that chi-squared with an even number of degrees of freedom exceeds `q`: `exp(-q/2) sum_{k <
-/// freedom/2} (q/2)^k / k!`.
+/// Returns the probability that chi-squared with an even number of degrees of freedom exceeds `q`:
+/// `exp(-q/2) sum_{k < freedom/2} (q/2)^k / k!`.
 fn tail(q: f64, freedom: usize) -> f64 {
     let (mut term, mut sum) = (1.0, 0.0);
     for k in 1..=freedom / 2 {

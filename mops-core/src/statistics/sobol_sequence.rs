@@ -56,8 +56,8 @@ pub fn sobol_sequence(count: usize, dimensions: usize) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// Returns the direction numbers `v_k = m_k 2^-k`, with `m_k = 2 a_1 m_(k-1) ^ 4 a_2 m_(k-2) ^ ... ^ 2^(s-1) a_(s-1)
-/// m_(k-s+1) ^ 2^s m_(k-s) ^ m_(k-s)`.
+/// Returns the direction numbers `v_k = m_k 2^-k`, with
+/// `m_k = 2 a_1 m_(k-1) ^ 4 a_2 m_(k-2) ^ ... ^ 2^(s-1) a_(s-1) m_(k-s+1) ^ 2^s m_(k-s) ^ m_(k-s)`.
 fn directions(dimension: usize) -> [u32; BITS] {
     assert!(dimension < MOST_DIMENSIONS, "a Sobol sequence has at most {MOST_DIMENSIONS} dimensions here");
     let mut m = [1u32; BITS];

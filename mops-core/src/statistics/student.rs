@@ -5,8 +5,8 @@ use super::distributions::{beta_quantile, normal_quantile};
 /// Degrees of freedom from which on normal quantiles are used. The relative difference is below 1e-6 up to the 0.9999
 /// quantile.
 ///
-/// Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.5: `t = z + (z^3 + z)/(4
-/// freedom) + ..`.
+/// Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.5:
+/// `t = z + (z^3 + z)/(4 freedom) + ..`.
 const NORMAL: f64 = 1e7;
 
 /// Returns the `p` quantile of Student's t distribution with `freedom` degrees of freedom; of the normal distribution

@@ -81,8 +81,8 @@ pub(super) fn most_independent(space: &DMatrix<Complex>, complement: &DMatrix<f6
     eigen.eigenvectors.column(eigen.eigenvalues.iamax()).into_owned()
 }
 
-/// Stores a unit eigenvector in column `j`; for a complex pole, its real and imaginary parts in columns `j` and `j +
-/// 1`. Returns `None` for a zero vector.
+/// Stores a unit eigenvector in column `j`; for a complex pole, its real and imaginary parts in columns `j` and
+/// `j + 1`. Returns `None` for a zero vector.
 fn set(x: &mut DMatrix<f64>, j: usize, pole: Complex, vector: &DVector<Complex>) -> Option<()> {
     let length = vector.norm();
     if !(length > 0.0 && length.is_finite()) {
