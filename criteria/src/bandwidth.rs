@@ -12,7 +12,7 @@ use crate::common::{Channel, LinearCriterion, Of, Values, feedback};
 /// With `of = "closed-loop"` the model is the loop transfer function L, and `G = L/(1 + L)`.
 ///
 /// Range: above 0. More is better: `demand = "2 Hz"` requires at least 2 Hz (12.6 rad/s). There is no value if the gain
-/// at frequency 0 is 0 or infinite or never falls by 3 dB, or if the closed loop is unstable.
+/// at frequency 0 is 0 or infinite, or never falls by 3 dB. There is none either if the closed loop is unstable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 11.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

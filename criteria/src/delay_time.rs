@@ -8,8 +8,7 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 
-/// Delay time: first time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5
-/// by default.
+/// First time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5 by default.
 ///
 /// Less is better. Range: from 0 to the length of the simulation. A response that never reaches the level has no delay
 /// time and meets no demand, noted `level not reached`.

@@ -9,7 +9,7 @@ use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 /// Gain margin: the smallest factor `g > 1` at which `g L` meets -1, `20 log10 g` in dB. The model is the loop transfer
 /// function L, with unity negative feedback.
 ///
-/// Crossings of the negative real axis are located by bounds of L over all frequencies, not on a grid; a delay of the
+/// Crossings of the negative real axis are located by bounds of L over all frequencies, not on a grid. A delay of the
 /// model is treated exactly. For a loop that would also become unstable with less gain, `either-way = true` gives the
 /// smallest gain change of either sign.
 ///

@@ -16,8 +16,8 @@ use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
 /// `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that least-squares solvers use.
 ///
 /// The criterion is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up. A value
-/// well below 1 means that the noise level is too high or the model fits the noise; well above 1, that the model lacks
-/// an effect. The default demand is 1.
+/// well below 1 means that the noise level is too high or that the model fits the noise. A value well above 1 means
+/// that the model lacks an effect. The default demand is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
 /// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters).

@@ -114,7 +114,7 @@ fn a_criterion_refuses_a_model_of_the_other_sort_and_names_one_that_fits() {
 }
 
 #[test]
-fn a_mistake_in_an_option_is_led_back_to_its_place() {
+fn a_mistake_in_an_option_is_reported_at_its_place() {
     let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, model = 'lag', demand = 1 }")
         .err()
         .expect("the unit is wrong");

@@ -167,9 +167,10 @@ impl Answer<'_> {
 
     /// Returns true if the response, within `band` of the target since `time` (s), appears to stay there after the end.
     ///
-    /// This is the case if the response has reversed since then. It also is if at its final rate it would not leave the
-    /// band within the simulated time, or if it slows down to a value within. With the final rate and curvature, an
-    /// exponential approach ends at `y - y'^2/y''`. Otherwise the response crosses the band when the simulation ends.
+    /// This is the case if the response has reversed since `time`. The response also stays if at its final rate it
+    /// would not leave the band within the simulated time. The third case is a response that slows down to a value
+    /// within the band. With the final rate and curvature, an exponential approach ends at `y - y'^2/y''`. Otherwise
+    /// the response crosses the band when the simulation ends.
     pub fn stays_within(&self, band: f64, time: f64) -> bool {
         let [value, rate, curvature] = self.trace.motion_at_end();
         let is_within = |y: f64| (y - self.target).abs() <= band;

@@ -35,7 +35,7 @@ impl Layout {
 /// positions.
 ///
 /// # Errors
-/// If there is no header, no row or no column of numbers, if a name is repeated, or if a row has a different number of
+/// If there is no header, no row or no column of numbers, or if a name is repeated. If a row has a different number of
 /// cells than the header. If a column mixes numbers and text, or contains an infinite number.
 pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, Layout), Diagnostic> {
     let header = Header::read(source)?;

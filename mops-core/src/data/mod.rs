@@ -88,8 +88,8 @@ impl DataFile {
     /// Reads the file at `path`; the format is detected from the content, not from the extension.
     ///
     /// # Errors
-    /// If the file cannot be read, has another format, is damaged, or contains no numbers. For CSV also if a cell in a
-    /// column of numbers is neither a finite number nor a gap, if rows differ in length, or if names repeat.
+    /// If the file cannot be read, has another format, is damaged, or contains no numbers. For CSV also if rows differ
+    /// in length, if names repeat, or if a cell in a numeric column is neither a finite number nor a gap.
     pub fn read(path: &Path) -> Result<Self, Diagnostic> {
         let name = path.display().to_string();
         match read_regular(path) {

@@ -1,13 +1,13 @@
 //! Dimensional analysis of expressions, and inference of the units of quantities declared without one.
 //!
-//! The terms of a sum, the sides of a comparison or of an equation, the limits of a `clip` and the branches of an `if`
-//! have the same dimension. Arguments of `sin`, `exp` and similar functions are pure numbers. `sqrt` and powers with a
-//! constant exponent raise the dimension to a power. The dimension of a quantity declared without a unit is unknown and
-//! solved for: every rule is a linear equation between exponents.
+//! The terms of a sum and the sides of a comparison or of an equation have the same dimension. So do the limits of a
+//! `clip` and the branches of an `if`. Arguments of `sin`, `exp` and similar functions are pure numbers. `sqrt` and
+//! powers with a constant exponent raise the dimension to a power. The dimension of a quantity declared without a unit
+//! is unknown and solved for: every rule is a linear equation between exponents.
 //!
 //! A number without a unit is a pure number in a product. As a whole term of a sum it counts in the coherent SI unit of
-//! the other terms. This is refused if these are declared in other units, because it is ambiguous: 20 added to a
-//! temperature in degC may be in degC or in K.
+//! the other terms. This is refused if these are declared in other units. For example, 20 added to a temperature in
+//! degC may be in degC or in K.
 //!
 //! Source: A. Kennedy, Programming Languages and Dimensions, University of Cambridge Technical Report 391 (1996),
 //! chapter 3 (inference of dimensions by linear equations).

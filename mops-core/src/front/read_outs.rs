@@ -17,8 +17,8 @@ pub fn normalised(objectives: &[f64], ranges: &[[f64; 2]]) -> Vec<f64> {
 
 /// Returns the knee of the front, or `None` if no point lies on the side of the ideal point.
 ///
-/// The knee is the point farthest from the plane through the points that are best in one objective and worst in all
-/// others, towards the ideal point. Each objective is normalised by its range.
+/// The knee is the point farthest from a plane, towards the ideal point. The plane passes through the points that are
+/// best in one objective and worst in all others. Each objective is normalised by its range.
 ///
 /// Source: I. Das, Structural Optimization 18 (1999) 107-115.
 pub fn knee(objectives: &[f64], m: usize) -> Option<usize> {

@@ -155,9 +155,9 @@ impl Sensitivity {
 
     /// Compares directions with the noise of the residuals, given the covariance of the estimates.
     ///
-    /// A direction is not determined if one standard error along it moves a tuner through its whole range: the change
-    /// of the residuals is below the noise. An unresolved direction is unknown if its computed change would be above
-    /// the noise.
+    /// A direction is not determined if one standard error along it moves a tuner through its whole range. The change
+    /// of the residuals is then below the noise. An unresolved direction is unknown if its computed change would be
+    /// above the noise.
     pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, covariance: &Covariance) {
         let n = self.coordinates.len();
         let spans: Vec<f64> = self.coordinates.iter().map(|coordinate| coordinate.span).collect();

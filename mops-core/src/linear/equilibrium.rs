@@ -111,7 +111,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         self.looked += 1;
         let here = (self.rates)(x)?;
         let finite = here.rates.iter().chain(here.slopes.iter()).all(|x| x.is_finite());
-        if finite { Ok(here) } else { Err("the rates and their slopes are not finite".to_owned()) }
+        if finite { Ok(here) } else { Err("the rates or their derivatives are not finite".to_owned()) }
     }
 
     /// Returns the distance of a point from the initial guess, relative to the magnitudes of the coordinates.

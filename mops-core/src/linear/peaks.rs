@@ -33,8 +33,8 @@ impl Loop {
         Ok(peak.max(what.gain(Complex::new(end, 0.0))))
     }
 
-    /// Returns the closed-loop bandwidth, rad/s: the lowest angular frequency at which the gain of `T = L/(1 + L)` is 3
-    /// dB (a factor of `sqrt 2`) below its value at frequency 0.
+    /// Returns the closed-loop bandwidth, rad/s: the lowest angular frequency at which `|T|` is 3 dB (a factor of
+    /// `sqrt 2`) below its value at 0, with `T = L/(1 + L)`.
     ///
     /// # Errors
     /// If the closed loop is not stable, or if the gain is 0 at frequency 0 or never falls by 3 dB.
@@ -48,8 +48,8 @@ impl Loop {
     }
 }
 
-/// Returns the bandwidth, rad/s, of a system with one input and one output: the lowest angular frequency at which its
-/// gain is 3 dB (a factor of `sqrt 2`) below its value at frequency 0.
+/// Returns the bandwidth, rad/s, of a system with one input and one output. The bandwidth is the lowest angular
+/// frequency at which the gain is 3 dB (a factor of `sqrt 2`) below its value at frequency 0.
 ///
 /// # Errors
 /// If the gain at frequency 0 is 0 or infinite, or never falls by 3 dB.

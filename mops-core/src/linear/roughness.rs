@@ -157,7 +157,7 @@ mod tests {
         assert!(!is_rough(math::exp, math::exp(20.0), 20.0) && !is_rough(|_| 7.0, 0.0, 0.0));
         // Defined on one side only, with a derivative there.
         assert!(!is_rough(|x| math::powf(x, 1.5), 0.0, 0.0));
-        // Smooth beside a kink, even close to it.
+        // Smooth near a kink, even very close to it.
         assert!(!is_rough(f64::abs, 1.0, 1e-9) && !is_rough(|x| (x - 1.0).abs(), 1.0, 1.001));
     }
 

@@ -22,8 +22,8 @@ pub struct VarianceShares {
 
 /// Returns the points of the unit cube at which a function is evaluated.
 ///
-/// For each of `count` samples these are a point of `A`, a point of `B`, and for every input the point of `A` with this
-/// input from `B`.
+/// Each of `count` samples has a point of `A` and a point of `B`. For every input it also has the point of `A` with
+/// this input from `B`.
 pub fn radial(count: usize, inputs: usize, random: &mut Stream) -> Vec<Vec<Vec<f64>>> {
     let of_sample = |both: Vec<f64>| {
         let (a, b) = both.split_at(inputs);
