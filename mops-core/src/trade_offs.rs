@@ -32,7 +32,7 @@ pub struct TradeOffs {
     pub neighbours: Vec<Exchange>,
     /// Knee: index of the point farthest from the plane through the ends of the front; null if the front is concave.
     pub knee: Option<usize>,
-    /// Index of the point with the smallest largest weighted scaled value, nearest to the demands.
+    /// Index of the point with the smallest worst weighted scaled value, nearest to the demands.
     pub nearest: usize,
     /// Hypervolume dominated by the front, each criterion normalised by its range over the front.
     pub hypervolume: f64,
