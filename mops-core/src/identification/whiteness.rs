@@ -81,9 +81,9 @@ impl Whiteness {
             format!("{place} are consistent with white noise ({numbers}), as the standard errors assume.")
         } else {
             format!(
-                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but intervals still \
-                 cover the truth less often than stated: look for an effect that the model lacks, a delay, or an input with the \
-                 wrong `hold`."
+                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but \
+                 intervals still cover the truth less often than stated: look for an effect that the model lacks, a \
+                 delay, or an input with the wrong `hold`."
             )
         }
     }
