@@ -108,7 +108,7 @@ fn a_start_value_is_not_read_off_samples_that_come_later() {
     };
     let (code, [_, refused]) = run("['x']");
     assert!(
-        code == 2 && refused.contains("the first sample of `x` comes at 3 s and does not tell where it starts at 0 s"),
+        code == 2 && refused.contains("the first sample of `x` is at 3 s and does not determine its value at 0 s"),
         "{refused}"
     );
     let (code, [json, errors]) = run("{ x = { start = 0, min = -5, max = 5 } }");

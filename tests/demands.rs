@@ -97,16 +97,16 @@ fn a_margin_below_its_demand_is_missed() {
 #[test]
 fn demands_against_the_sense_or_out_of_range_are_refused_with_the_right_lines() {
     let swapped = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, good = '45 deg', bad = '90 deg' }}"));
-    assert!(swapped.contains("more is better here"), "{swapped}");
+    assert!(swapped.contains("more is better for this criterion"), "{swapped}");
     for kind in ["gain-margin", "delay-margin", "bandwidth", "damping-ratio"] {
         let swapped = refusal(&format!("{LOOP} c = {{ {kind} = {{}}, good = 0.2, bad = 0.4 }}"));
         assert!(swapped.contains("good = \"0.4") && swapped.contains("bad = \"0.2"), "{kind}: {swapped}");
     }
     let less = refusal(&format!("{LOOP} s = {{ maximum-sensitivity = {{}}, good = 2, bad = 1.2 }}"));
-    assert!(less.contains("less is better here"), "{less}");
+    assert!(less.contains("less is better for this criterion"), "{less}");
     for (key, text) in [("bad", "good = 1.5, bad = -4"), ("good", "good = 90, bad = 0.7"), ("demand", "demand = 45")] {
         let beyond = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, {text} }}"));
-        assert!(beyond.contains("is outside of the range") && beyond.contains(key), "{beyond}");
+        assert!(beyond.contains("is outside the range") && beyond.contains(key), "{beyond}");
     }
     let degrees = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, demand = 45 }}"));
     assert!(degrees.contains("demand = \"45 deg\""), "{degrees}");
@@ -163,13 +163,10 @@ fn a_solver_leads_a_response_to_where_it_settles() {
 #[test]
 fn what_may_be_meant_either_way_and_what_an_unstable_system_meets_is_refused() {
     for (criterion, fact) in [
-        ("c = { phase-margin = {}, demand = '60 %' }", "the values of this kind are angles, not shares in %"),
-        (
-            "c = { damping-ratio = {}, demand = '45 deg' }",
-            "the values of this kind are pure numbers, not angles in deg",
-        ),
-        ("c = { maximum-sensitivity = {}, demand = '100 rad' }", "the values of this kind are pure numbers"),
-        ("c = { slowest-pole = { of = 'closed-loop' }, demand = 5 }", "5 1/s is outside of the range of this kind"),
+        ("c = { phase-margin = {}, demand = '60 %' }", "expected an angle, found a share in %"),
+        ("c = { damping-ratio = {}, demand = '45 deg' }", "expected a pure number, found an angle in deg"),
+        ("c = { maximum-sensitivity = {}, demand = '100 rad' }", "expected a pure number"),
+        ("c = { slowest-pole = { of = 'closed-loop' }, demand = 5 }", "5 1/s is outside the range of this criterion"),
         ("c = { slowest-pole = { of = 'closed-loop' }, demand = -5 }", "a demand must be positive, not -5"),
     ] {
         let message = refusal(&format!("{LOOP}{criterion}"));

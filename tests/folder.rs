@@ -386,7 +386,7 @@ fn a_folder_whose_name_is_no_text_works_as_any_other() {
     // A study that lies in such a folder, with its data.
     let study = odd.join("study");
     fs::create_dir(&study).unwrap();
-    for (name, bytes) in mops::catalogue().studies.iter().find(|s| s.name == "step-identification").unwrap().files {
+    for (name, bytes) in mops::studies::shipped().iter().find(|s| s.name == "step-identification").unwrap().files {
         fs::create_dir_all(study.join(name).parent().unwrap()).unwrap();
         fs::write(study.join(name), bytes).unwrap();
     }

@@ -137,13 +137,13 @@ fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
     assert_eq!((&result["solver"], &result["evaluations"]), (&"none".into(), &1.into()));
     assert_eq!((found["rank"].as_u64().unwrap() as usize, tuners), (11, 12));
     let direction = &found["directions"][0];
-    let expected = "a common factor of `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp` and `a` changes nothing: only their ratios can \
+    let expected = "a common factor of `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp` and `a` has no effect: only their ratios can \
                     be estimated";
     assert_eq!(direction["words"], expected);
     // Along it the residuals stay what they are, also far away.
     assert!(direction["remaining"].as_f64().unwrap() < 1e-6, "{direction}");
     assert_eq!(found["tuners"][0]["std_error"], Value::Null);
-    assert!(page(folder.path()).contains("changes nothing: only their ratios can be estimated"));
+    assert!(page(folder.path()).contains("has no effect: only their ratios can be estimated"));
 }
 
 /// The arm's inertia about its axis is that about its centre of mass and its mass times 0.1225 m squared.
@@ -218,17 +218,17 @@ fn mistakes_in_the_tables_of_tasks_have_a_place_and_a_way_out() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("sweep={x='q'}", "the study has no tuner `q`", "known: b, c"),
-        ("sweep={x='b',y='b'}", "x and y are the same tuner `b`", "leave `y` out"),
-        ("sweep={x={tuner='b',max=9}}", "9 lies outside the bounds of `b`", "widen"),
-        ("sweep={x={tuner='b',points=1}}", "takes 2 to 1000 values, not 1", "41"),
-        ("sensitivity.zero=2.0", "lies between 0 and 1", "leave `zero` out"),
+        ("sweep={x='b',y='b'}", "x and y are the same tuner `b`", "omit `y`"),
+        ("sweep={x={tuner='b',max=9}}", "9 is outside the bounds of `b`", "widen"),
+        ("sweep={x={tuner='b',points=1}}", "expected 2 to 1000 points, found 1", "41"),
+        ("sensitivity.zero=2.0", "between 0 and 1, found 2", "omit `zero`"),
         ("excitation.inputs=['v']", "no case and no experiment has an input `v`", "known: u"),
-        ("excitation.noise.u='3 kg'", "kg", "counts in `N m`"),
-        ("excitation.sample-time=0", "must be positive", "leave it out"),
+        ("excitation.noise.u='3 kg'", "kg", "is in `N m`"),
+        ("excitation.sample-time=0", "must be positive", "omit it"),
         ("excitation.regressions.arx.output='theta'", "`bits` does not measure `theta`", "known: phi"),
         ("excitation.regressions.arx.experiment='bit'", "no experiment `bit`", "did you mean `bits`?"),
-        ("excitation.regressions.arx.forgetting=2", "lies between 0 and 1", "0.98"),
-        ("excitation.regressions.arx.b=0", "without past inputs", "at least 1"),
+        ("excitation.regressions.arx.forgetting=2", "above 0 and at most 1, found 2", "0.98"),
+        ("excitation.regressions.arx.b=0", "at least 1 coefficient of the input", "`b` is"),
         ("excitation.regresions.arx.b=0", "unknown key `regresions`", "did you mean `regressions`?"),
     ];
     let study = inputs(folder.path(), INPUTS);
@@ -239,8 +239,8 @@ fn mistakes_in_the_tables_of_tasks_have_a_place_and_a_way_out() {
         assert!(text.contains(fact) && text.contains(way_out) && text.contains("--set:1:"), "{setting}: {text}");
     }
     for (setting, fact) in [
-        ("study.task='sweep'", "nothing says which tuners are swept"),
-        ("study.task='excitation'", "nothing drives the model: no case and no experiment has an input"),
+        ("study.task='sweep'", "the study has no table [sweep]"),
+        ("study.task='excitation'", "no case and no experiment has an input signal"),
     ] {
         let output = mops(&["check", &swing(), "--set", setting]).output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr).into_owned();

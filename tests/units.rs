@@ -194,7 +194,7 @@ fn ties_are_computed_and_checked_in_coherent_units() {
     for (tie, fact) in [
         ("2*v", "expected a quantity in s, found one in m/s"),
         ("a + v", "expected a quantity in s, found one in m/s"),
-        ("a + 5", "a number without a unit beside `a`, which is in ms"),
+        ("a + 5", "a number without a unit next to `a`, which is in ms"),
         ("exp(a)", "`exp` takes a pure number, found a quantity in s"),
     ] {
         let folder = study(&text(tie), "");
@@ -266,10 +266,10 @@ fn a_temperature_that_nothing_drives_is_named() {
     let folder = study(text, "");
     let (code, output) = mops(folder.path(), &["check", "study.toml"]);
     assert!(
-        code == 0 && output.contains("warning: nothing drives `Ta`, which is 0 degC throughout, in cold\n"),
+        code == 0 && output.contains("warning: input `Ta` is not driven and stays at 0 degC, in cold\n"),
         "{output}"
     );
-    assert_eq!(output.matches("nothing drives").count(), 1, "{output}");
+    assert_eq!(output.matches("is not driven").count(), 1, "{output}");
 }
 
 #[test]
@@ -306,8 +306,8 @@ fn units_are_read_as_engineers_type_them() {
         mops(folder.path(), &["check", "study.toml"])
     };
     for (demand, message) in [
-        ("0,8 kJ", "`0,8 kJ` has a comma for its decimal point; write \"0.8 kJ\""),
-        (&format!("1 {}m{}", "(".repeat(30_000), ")".repeat(30_000)), "a unit of 60001 characters"),
+        ("0,8 kJ", "`0,8 kJ` has a decimal comma; write \"0.8 kJ\""),
+        (&format!("1 {}m{}", "(".repeat(30_000), ")".repeat(30_000)), "the unit has 60001 characters"),
     ] {
         let (code, output) = refused(demand);
         assert!(code == 2 && output.contains(message), "{}", &output[..output.len().min(2000)]);

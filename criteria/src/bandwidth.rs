@@ -7,21 +7,22 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Of, Values, feedback};
 
-/// The bandwidth: the lowest `w` with `|G(j w)| = |G(0)|/sqrt 2` (3 dB below), in rad/s, found exactly. With `of =
-/// "closed-loop"` the model is the loop transfer function L, and `G = L/(1 + L)`.
+/// Bandwidth: the lowest `w` with `|G(j w)| = |G(0)|/sqrt 2` (3 dB below), in rad/s, located exactly.
 ///
-/// Range: above 0. More is better: `demand = "2 Hz"` asks for at least 2 Hz (12.6 rad/s). It has no value where the gain at frequency 0 is 0 or infinite or never falls so far, or where
-/// the closed loop is unstable.
+/// With `of = "closed-loop"` the model is the loop transfer function L, and `G = L/(1 + L)`.
+///
+/// Range: above 0. More is better: `demand = "2 Hz"` requires at least 2 Hz (12.6 rad/s). There is no value if the gain
+/// at frequency 0 is 0 or infinite, or never falls by 3 dB. There is none either if the closed loop is unstable.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 11.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Bandwidth {
-    /// Input of the system; the only one where absent.
+    /// Input of the system; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the system; the only one where absent.
+    /// Output of the system; may be omitted if there is only one.
     pub output: Option<String>,
-    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    /// System that is evaluated: `system` (the default), or `closed-loop` if the model is a loop transfer function.
     pub of: Of,
 }
 

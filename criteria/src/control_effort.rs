@@ -9,11 +9,12 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, optional, signal, trace};
 
-/// `integral (u - offset)^2 dt` over the whole simulation, in signal^2 s; with `of = "absolute"`
+/// Control effort `integral (u - offset)^2 dt` over the whole simulation, in signal^2 s; with `of = "absolute"`
 /// `integral |u - offset| dt`, in signal s.
 ///
-/// The square is the energy of a signal, the absolute value its fuel. `offset` is the value at which the actuator
-/// rests, 0 where absent. Less is better. Range: from 0 up. The integral is that of the curve, exact up to rounding.
+/// The square corresponds to the energy of a signal, the absolute value to its fuel. `offset` is the value at which the
+/// actuator is at rest, 0 by default. Less is better. Range: from 0 up. The integral is that of the curve, exact up to
+/// rounding.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (norms of signals).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -21,21 +22,21 @@ use crate::common::{NOT_NEGATIVE, optional, signal, trace};
 pub struct ControlEffort {
     /// Signal that is measured, usually a control signal.
     pub signal: String,
-    /// What is integrated: the `square`, which holds where absent, or the `absolute` value.
+    /// Integrand: `square` (the default) or `absolute` value.
     #[serde(default)]
     pub of: Effort,
-    /// Value at which the actuator rests, in the unit of the signal; 0 where absent.
+    /// Value at which the actuator is at rest, in the unit of the signal; 0 by default.
     pub offset: Option<Quantity>,
 }
 
-/// What is integrated.
+/// Integrand of the control effort.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Effort {
-    /// The square: energy.
+    /// Square: energy.
     #[default]
     Square,
-    /// The absolute value: fuel.
+    /// Absolute value: fuel.
     Absolute,
 }
 

@@ -9,23 +9,23 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, feedback};
 
-/// The gain crossover frequency: the highest `w` with `|L(j w)| = 1`, in rad/s, found exactly. The model is the loop transfer
-/// function L; a delay does not matter.
+/// Gain crossover frequency: the highest `w` with `|L(j w)| = 1`, in rad/s, located exactly. The model is the loop
+/// transfer function L; a delay has no influence.
 ///
-/// Range: above 0. Neither less nor more is better: demand it with usage = "equality", or by the pair `good` and `bad`. Where
-/// `|L|` never is 1 there is no value, and no demand is met.
+/// Range: above 0. Neither less nor more is better: demand it with usage = "equality", or by the pair `good` and `bad`.
+/// If `|L|` is never 1, there is no value and no demand is met.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CrossoverFrequency {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
 }
 
-/// What counts as near a gain of 1.
+/// Distance from a gain of 1 that counts as near.
 const NEAR: f64 = 0.01;
 
 impl CriterionOptions for CrossoverFrequency {
@@ -43,7 +43,7 @@ impl CriterionSpec for CrossoverFrequency {
             let still = complex::norm(system.response()?.scalar(0.0));
             match feedback(system)?.gain_crossovers.last() {
                 Some(crossing) => Ok(crossing.frequency.into()),
-                None => Ok(Value::missed(None, (still - 1.0).abs(), NEAR, "the gain of the loop never is 1")),
+                None => Ok(Value::missed(None, (still - 1.0).abs(), NEAR, "the loop gain is never 1")),
             }
         };
         Ok(LinearCriterion::boxed(
@@ -67,10 +67,7 @@ mod tests {
         let found = value(&CrossoverFrequency::default(), &linear(&[4.0], &[1.0, 3.0, 3.0, 1.0])).number;
         assert_near(found, (math::powf(4.0, 2.0 / 3.0) - 1.0).sqrt(), 1e-12);
         let never = value(&CrossoverFrequency::default(), &linear(&[0.5], &[1.0, 1.0]));
-        assert_eq!(
-            (never.missed, never.note),
-            (Some(Missed { horizon: None }), Some("the gain of the loop never is 1"))
-        );
+        assert_eq!((never.missed, never.note), (Some(Missed { horizon: None }), Some("the loop gain is never 1")));
         assert_near(never.number, 1.0 + 0.5 / 0.51, 1e-12);
     }
 }

@@ -8,22 +8,23 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 
-/// The damping ratio of the least damped pole, `min -Re p/|p|`, dimensionless. With `of = "closed-loop"` the model is the loop
-/// transfer function L, and the poles are those of `L/(1 + L)`. Poles that neither input nor output touches count too.
+/// Damping ratio of the least damped pole, `min -Re p/|p|`, dimensionless.
+///
+/// With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
+/// Uncontrollable and unobservable poles count too.
 ///
 /// Range: -1 to 1; 1 for real stable poles, negative for unstable ones, 0 for a pole at the origin. More is better:
-/// `demand = 0.5` asks for at least 0.5. A closed loop with a delay has no finite number of
-/// poles, and no value.
+/// `demand = 0.5` requires at least 0.5. A closed loop with a delay has infinitely many poles, and no value.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct DampingRatio {
-    /// Input of the system; the only one where absent.
+    /// Input of the system; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the system; the only one where absent.
+    /// Output of the system; may be omitted if there is only one.
     pub output: Option<String>,
-    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    /// System that is evaluated: `system` (the default), or `closed-loop` if the model is a loop transfer function.
     pub of: Of,
 }
 

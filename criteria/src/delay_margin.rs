@@ -6,24 +6,25 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, capped, feedback, second};
 
-/// The delay margin: the smallest further delay with which the closed loop becomes unstable, `min (pi + arg L(j w))/w` over
-/// the frequencies at which `|L(j w)| = 1` (the turn counted from 0 to 2 pi), in s. The model is the loop transfer function L,
-/// with unity negative feedback around it.
+/// Delay margin: the smallest additional delay that makes the closed loop unstable, `min (pi + arg L(j w))/w` over the
+/// frequencies at which `|L(j w)| = 1`, in s.
 ///
-/// Crossings are found by bounds of L over all frequencies, not on a grid; a delay that the model has already enters exactly.
+/// The angle `pi + arg L` counts from 0 to 2 pi. The model is the loop transfer function L, with unity negative
+/// feedback. Crossings are located by bounds of L over all frequencies, not on a grid; an existing delay of the model
+/// is treated exactly.
 ///
-/// Range: up to 1e6 s, which stands for an infinite margin. More is better: `demand =
-/// "0.1 s"` asks for at least 0.1 s. Where the closed loop is unstable the margin is negative: minus the smallest change of
-/// the delay, less or more, that makes it stable; less may be more than the delay there is. It has no value where no change of
-/// the delay makes an unstable loop stable.
+/// Range: up to 1e6 s, which represents an infinite margin. More is better: `demand = "0.1 s"` requires at least 0.1 s.
+/// For an unstable closed loop the margin is negative: minus the smallest change of the delay, of either sign, that
+/// stabilises it. A reduction may exceed the existing delay. There is no value if no change of the delay stabilises an
+/// unstable loop.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct DelayMargin {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
 }
 

@@ -8,10 +8,10 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 
-/// First time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5 where absent.
+/// First time at which `(y - from)/(target - from) >= level`, counted from the step, in s; `level` is 0.5 by default.
 ///
-/// Less is better. Range: from 0 to the length of the simulation. A response that never gets there has no delay time and meets
-/// no demand, noted `level not reached`.
+/// Less is better. Range: from 0 to the length of the simulation. A response that never reaches the level has no delay
+/// time and meets no demand, noted `level not reached`.
 ///
 /// Source: K. Ogata, Modern Control Engineering (5th ed., 2010), section 5-3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -19,13 +19,13 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 pub struct DelayTime {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    /// Value at which the signal should settle; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Value before the step; the signal's first value where absent.
+    /// Value before the step; by default the signal's first value.
     pub from: Option<Quantity>,
-    /// Time of the step, from which the delay counts; 0 s where absent.
+    /// Time of the step, from which the delay counts; 0 s by default.
     pub step_time: Option<Quantity>,
-    /// Fraction of the step, above 0 and at most 1: 0.5 where absent; "50 %" is the same.
+    /// Fraction of the step, above 0 and at most 1, such as 0.5 (the default) or "50 %".
     pub level: Option<Quantity>,
 }
 
@@ -44,7 +44,7 @@ impl CriterionSpec for DelayTime {
         let step = options.bind(signals)?;
         let level = number("level", self.level.as_ref().unwrap_or(&0.5.into()), &Unit::one())?;
         if !(0.0 < level && level <= 1.0) {
-            return Err(Mistake::new("level", format!("a level lies above 0 and up to 1 of the step, not at {level}")));
+            return Err(Mistake::new("level", format!("`level` must be above 0 and at most 1, not {level}")));
         }
         Ok(Box::new(Bound { step, level }))
     }
@@ -109,7 +109,7 @@ mod tests {
     fn a_response_that_does_not_get_there_is_noted() {
         let low = simulated(7.0, |t| 0.4 * (1.0 - math::exp(-t)));
         let missed = value(&delay(), &low);
-        // 0.1 below the level, and a little more as it has not arrived.
+        // The distance is 0.1 below the level, and slightly more because the response still approaches its final value.
         let rest = 0.4 * (math::exp(-6.3) - math::exp(-7.0)) / 0.7;
         assert_near(missed.number, 7.0 * (1.0 + (0.1 + rest) / (0.11 + rest)), 1e-9);
         assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(7.0) }), Some("level not reached")));
@@ -118,6 +118,6 @@ mod tests {
     #[test]
     fn a_level_outside_the_step_is_a_mistake() {
         let beyond = DelayTime { level: Some(1.5.into()), ..delay() };
-        assert_eq!(mistake(&beyond), "level: a level lies above 0 and up to 1 of the step, not at 1.5");
+        assert_eq!(mistake(&beyond), "level: `level` must be above 0 and at most 1, not 1.5");
     }
 }

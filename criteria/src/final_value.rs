@@ -8,17 +8,17 @@ use serde::Deserialize;
 
 use crate::common::{signal, trace};
 
-/// `y(t_end)`, in the unit of the signal.
+/// Final value `y(t_end)`, in the unit of the signal.
 ///
-/// Which values are better depends on the signal: `demand` asks for at most that value, the pair `good` and `bad` for either
-/// side. Range: any number. It reads what a model computes along its simulation, such as a cost or an energy that it
-/// integrates. A value that may be zero or negative is demanded by the pair `good` and `bad` rather than by `demand`.
+/// Which values are better depends on the signal: `demand` is an upper limit, the pair `good` and `bad` works in either
+/// direction. Range: any number. The criterion serves quantities that a model integrates along its simulation, such as
+/// a cost or an energy. For a limit that is zero or negative, use the pair `good` and `bad` instead of `demand`.
 ///
 /// Source: the Mayer form of a cost; A. E. Bryson, Y.-C. Ho, Applied Optimal Control (1975), chapter 2.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FinalValue {
-    /// Signal that is read.
+    /// Signal that is evaluated.
     pub signal: String,
 }
 

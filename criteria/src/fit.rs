@@ -9,17 +9,18 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, compare, compared_slopes, signal};
 
-/// `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
+/// Fit `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
 ///
-/// By the trapezoid rule on the times t_i of the samples: `J = sum_i r_i^2` with the residuals
-/// `r_i = sqrt(weight w_i) (y_simulated - y_measured)(t_i)` that least-squares solvers use, and
-/// `w_i = (t_(i+1) - t_(i-1))/2`, half an interval at both ends. The simulation is read from its curve at these times.
-/// Samples that are missing are left out, so that a gap is one long interval.
+/// The trapezoid rule on the sample times t_i gives `J = sum_i r_i^2`. The residuals
+/// `r_i = sqrt(weight w_i) (y_simulated - y_measured)(t_i)` are those that least-squares solvers use.
+/// `w_i = (t_(i+1) - t_(i-1))/2`, half an interval at both ends. The simulated curve is evaluated at these times.
+/// Missing samples are omitted, so that a gap is one long interval.
 ///
-/// Several signals are fitted together by one such criterion each; `weight` balances them. It is evaluated in the
-/// experiments that measure the signal.
+/// Use one such criterion per signal to fit several signals together; `weight` balances them. The criterion is
+/// evaluated in the experiments that measure the signal.
 ///
-/// Less is better. Range: from 0 up; noise of standard deviation s leaves about weight s^2 times the measured time.
+/// Less is better. Range: from 0 up; noise of standard deviation s contributes about weight s^2 times the measured
+/// time.
 ///
 /// Source: Greybox Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section
 /// 4.5.1: there J is the sum over the arm's angle, with weight 2.5, and the pendulum's, with weight 1.
@@ -51,7 +52,7 @@ impl CriterionSpec for Fit {
     fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         if !(self.weight.is_finite() && self.weight > 0.0) {
-            return Err(Mistake::new("weight", format!("a weight must be positive, not {}", self.weight)));
+            return Err(Mistake::new("weight", format!("`weight` must be positive, not {}", self.weight)));
         }
         Ok(Box::new(Bound { signal, weight: self.weight }))
     }
@@ -88,7 +89,7 @@ impl Criterion for Bound {
         let times = &comparison.channel.times;
         if times.len() == 1 {
             return Err(format!(
-                "the measurement of `{}` is a single sample: no time to integrate over",
+                "the measurement of `{}` has a single sample, so that the integral is undefined",
                 self.signal.name
             ));
         }
@@ -110,7 +111,7 @@ impl Criterion for Bound {
 }
 
 impl Bound {
-    /// `sqrt(weight w_i)`.
+    /// Returns `sqrt(weight w_i)`.
     fn root_weight(&self, times: &[f64], i: usize) -> f64 {
         let interval = 0.5 * (times[(i + 1).min(times.len() - 1)] - times[i.saturating_sub(1)]);
         (self.weight * interval).sqrt()
@@ -164,7 +165,7 @@ mod tests {
     fn a_single_sample_and_a_weight_of_zero_are_refused() {
         let fit = Fit { signal: "y".into(), weight: 1.0 };
         let alone = undefined_in(&measured(&[1.0], &[1.0], None), &fit, &simulated(2.0, |t| t));
-        assert_eq!(alone, "the measurement of `y` is a single sample: no time to integrate over");
-        assert_eq!(mistake(&Fit { weight: 0.0, ..fit }), "weight: a weight must be positive, not 0");
+        assert_eq!(alone, "the measurement of `y` has a single sample, so that the integral is undefined");
+        assert_eq!(mistake(&Fit { weight: 0.0, ..fit }), "weight: `weight` must be positive, not 0");
     }
 }

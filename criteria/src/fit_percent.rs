@@ -6,12 +6,12 @@ use serde::Deserialize;
 
 use crate::common::{compare, signal};
 
-/// `100 (1 - |y_measured - y_simulated| / |y_measured - mean(y_measured)|)`, in percent, `|.|` the Euclidean norm over
-/// the samples.
+/// Fit `100 (1 - |y_measured - y_simulated| / |y_measured - mean(y_measured)|)`, in percent, with the Euclidean norm
+/// over the samples.
 ///
-/// Range: any number up to 100; 100 % is a perfect fit, 0 % no better than the measurement's mean. It is evaluated in
-/// the experiments that measure the signal; a measurement that is constant has no fit. More is better:
-/// `demand = 80` asks for at least 80 %.
+/// Range: any number up to 100; 100 % is a perfect fit, 0 % no better than the measurement's mean. The criterion is
+/// evaluated in the experiments that measure the signal; a constant measurement has no fit. More is better:
+/// `demand = 80` requires at least 80 %.
 ///
 /// Source: L. Ljung, System Identification (2nd ed., 1999), chapter 16; the formula is that of `compare` in his System
 /// Identification Toolbox.
@@ -61,7 +61,7 @@ impl Criterion for Bound {
         let comparison = compare(case, analysis, &self.signal)?;
         let measured = &comparison.channel.values;
         if measured.iter().all(|m| *m == measured[0]) {
-            return Err(format!("the measurement of `{}` is constant: there is nothing to explain", self.signal));
+            return Err(format!("the measurement of `{}` is constant, so that the fit is undefined", self.signal));
         }
         let mean = measured.iter().sum::<f64>() / comparison.count();
         let variation: f64 = measured.iter().map(|m| (m - mean) * (m - mean)).sum();
@@ -91,6 +91,6 @@ mod tests {
     #[test]
     fn a_constant_measurement_has_no_fit() {
         let why = undefined_in(&measured(&[0.0, 1.0], &[0.1, 0.1], None), &fit(), &simulated(1.0, |t| t));
-        assert_eq!(why, "the measurement of `y` is constant: there is nothing to explain");
+        assert_eq!(why, "the measurement of `y` is constant, so that the fit is undefined");
     }
 }

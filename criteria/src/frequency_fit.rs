@@ -9,26 +9,29 @@ use serde::Deserialize;
 
 use crate::common::{Channel, NOT_NEGATIVE};
 
-/// `J = 1/N sum_i |G(j w_i)/G_i - 1|^2`, dimensionless: the mean square of the relative deviation from a measured frequency
-/// response `G_i` at the angular frequencies `w_i`. With `absolute = true`: `1/N sum_i |G(j w_i) - G_i|^2`, in the square of
-/// the unit of the output over that of the input.
+/// Frequency-response fit `J = 1/N sum_i |G(j w_i)/G_i - 1|^2`, dimensionless: the mean square of the relative
+/// deviation from a measured frequency response `G_i` at the angular frequencies `w_i`.
 ///
-/// Deviations are complex, so that magnitude and phase count together: 1 % and 0.01 rad alike. Their real and imaginary
-/// parts, over `sqrt N`, are the residuals that least-squares solvers use. A relative deviation gives a resonance and the
-/// response far below it the same weight, as a Bode plot does.
+/// With `absolute = true`: `1/N sum_i |G(j w_i) - G_i|^2`, in the square of the unit of the output divided by that of
+/// the input.
 ///
-/// The response is measured in an experiment with `frequency` and `responses`. Less is better. Range: from 0 up; a relative noise of
-/// standard deviation s in magnitude and phase leaves about 2 s^2.
+/// Deviations are complex, so that magnitude and phase both count: 1 % is equivalent to 0.01 rad. Their real and
+/// imaginary parts, divided by `sqrt N`, are the residuals that least-squares solvers use. A relative deviation gives a
+/// resonance and the response far below it the same weight, as a Bode plot does.
 ///
-/// Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition (2012), section 9.
+/// The response is measured in an experiment with `frequency` and `responses`. Less is better. Range: from 0 up;
+/// relative noise of standard deviation s in magnitude and phase contributes about 2 s^2.
+///
+/// Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition (2012), section
+/// 9.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FrequencyFit {
     /// Output that is compared with its measurement.
     pub signal: String,
-    /// Input of the response; the only one where absent.
+    /// Input of the response; may be omitted if there is only one.
     pub input: Option<String>,
-    /// `true` compares the responses themselves instead of their ratio.
+    /// If `true`, the responses themselves are compared instead of their ratio.
     #[serde(default)]
     pub absolute: bool,
 }

@@ -6,27 +6,27 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 
-/// The gain margin: the smallest factor `g > 1` with which `g L` meets -1, `20 log10 g` in dB. The model is the loop transfer
-/// function L, with unity negative feedback around it.
+/// Gain margin: the smallest factor `g > 1` at which `g L` meets -1, `20 log10 g` in dB. The model is the loop transfer
+/// function L, with unity negative feedback.
 ///
-/// Crossings of the negative real axis are found by bounds of L over all frequencies, not on a grid; a delay of the model
-/// enters exactly. For a loop that would become unstable with less gain too, `either-way = true` takes the smallest change of
-/// the gain, up or down.
+/// Crossings of the negative real axis are located by bounds of L over all frequencies, not on a grid. A delay of the
+/// model is treated exactly. For a loop that would also become unstable with less gain, `either-way = true` gives the
+/// smallest gain change of either sign.
 ///
-/// Range: -200 to 200 dB. More is better: `demand = "6 dB"` asks for at least 6 dB. Where the closed loop is unstable the margin is negative: minus the smallest change of the gain, up or down, that
-/// makes it stable. A crossing that only leads to other unstable poles does not count, so that the value rises to 0 towards
-/// stability and touches 0 nowhere else. A margin above 200 dB counts as 200 dB. It has no value where no change of the gain
-/// by up to 200 dB makes an unstable loop stable.
+/// Range: -200 to 200 dB. More is better: `demand = "6 dB"` requires at least 6 dB. For an unstable closed loop the
+/// margin is negative: minus the smallest gain change of either sign that stabilises it. A crossing that only leads to
+/// other unstable poles does not count. Hence the value rises to 0 towards stability, and is 0 nowhere else. A margin
+/// above 200 dB counts as 200 dB. There is no value if no gain change of up to 200 dB stabilises an unstable loop.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct GainMargin {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
-    /// `true` counts a smaller gain too, for loops that need a least gain to be stable.
+    /// If `true`, a reduction of the gain counts too, for loops that need a minimum gain to be stable.
     pub either_way: bool,
 }
 
@@ -68,7 +68,7 @@ mod tests {
         let late = value(&GainMargin::default(), &linear_delayed(&[1.0], &[1.0, 0.0], 0.2)).number;
         assert_near(late, 20.0 * math::log10(std::f64::consts::PI / 0.4), 1e-9);
         let never = value(&GainMargin::default(), &linear(&[1.0], &[1.0, 1.0]));
-        assert_eq!((never.number, never.note), (200.0, Some("infinite, or as good as")));
+        assert_eq!((never.number, never.note), (200.0, Some("infinite or above the limit")));
     }
 
     #[test]
@@ -83,14 +83,12 @@ mod tests {
 
     #[test]
     fn an_unstable_loop_has_the_change_that_makes_it_stable_or_no_value() {
-        // k/(s + 1)^3 is stable up to 8; k/(s - 1) from 1 on; k/(s (s - 1)) never.
+        // k/(s + 1)^3 is stable up to k = 8; k/(s - 1) from 1 on; k/(s (s - 1)) never.
         let margin = |numerator: &[f64], denominator: &[f64]| {
             value(&GainMargin::default(), &linear(numerator, denominator)).number
         };
         assert_near(margin(&[800.0], &[1.0, 3.0, 3.0, 1.0]), -40.0, 1e-9);
         assert_near(margin(&[0.01], &[1.0, -1.0]), -40.0, 1e-9);
-        assert!(
-            undefined(&GainMargin::default(), &linear(&[1.0], &[1.0, -1.0, 0.0])).contains("no change of the gain")
-        );
+        assert!(undefined(&GainMargin::default(), &linear(&[1.0], &[1.0, -1.0, 0.0])).contains("no gain change"));
     }
 }

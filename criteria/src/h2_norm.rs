@@ -7,20 +7,23 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values};
 
-/// The H2 norm `sqrt(1/(2 pi) integral |G(j w)|^2 dw)`: the root mean square of the output for white noise of unit intensity at
-/// the input, and the root of the integrated square of the impulse response. In the unit of the output over that of the input,
-/// times s^(-1/2), which is left out.
+/// H2 norm `sqrt(1/(2 pi) integral |G(j w)|^2 dw)`: root mean square of the output for white noise of unit intensity at
+/// the input.
 ///
-/// From both Gramians, which must agree, not from an integral. Less is better. Range: from 0 up. It has no value where the system is unstable, or
-/// rounding decides whether it is, where it passes its input on directly, or where the Gramians do not agree to a millionth.
+/// It also is the square root of the integrated square of the impulse response. The unit is that of the output divided
+/// by that of the input, times s^(-1/2), which is omitted.
+///
+/// The norm is computed from both Gramians, which must agree. Less is better. Range: from 0 up. There is no value if
+/// the system is unstable or its stability is undecided within rounding. There is none either if the system has direct
+/// feedthrough, or if the Gramians differ by more than 1e-6 (relative).
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct H2Norm {
-    /// Input of the system; the only one where absent.
+    /// Input of the system; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the system; the only one where absent.
+    /// Output of the system; may be omitted if there is only one.
     pub output: Option<String>,
 }
 

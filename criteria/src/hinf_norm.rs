@@ -7,19 +7,21 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values};
 
-/// The Hinf norm `max_w |G(j w)|`: the largest amplification of any sine, in the unit of the output over that of the input. Of
-/// the linearised closed loop from setpoint to actuator it is the largest effort of the controller.
+/// Hinf norm `max_w |G(j w)|`: the largest amplification of any sine, in the unit of the output divided by that of the
+/// input.
 ///
-/// The peak is found between a gain that is reached and bounds over all frequencies, not on a grid. Less is better. Range: from 0 up. It has no
-/// value where the system is unstable, or rounding decides whether it is.
+/// For the linearised closed loop from setpoint to actuator it is the largest control effort.
+///
+/// The peak is located by bounds over all frequencies, not on a grid. Less is better. Range: from 0 up. There is no
+/// value if the system is unstable or its stability is undecided within rounding.
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct HinfNorm {
-    /// Input of the system; the only one where absent.
+    /// Input of the system; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the system; the only one where absent.
+    /// Output of the system; may be omitted if there is only one.
     pub output: Option<String>,
 }
 

@@ -6,11 +6,12 @@ use serde::Deserialize;
 
 use crate::common::{ErrorIntegral, StepOptions};
 
-/// `integral |y - target| dt` from the step to the end, in signal s.
+/// Integral of the absolute error, `integral |y - target| dt` from the step to the end, in signal s.
 ///
-/// It weighs all errors alike, large or small, early or late.
+/// All errors have equal weight, large or small, early or late.
 ///
-/// Less is better. Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to rounding.
+/// Less is better. Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to
+/// rounding.
 ///
 /// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
 /// Transactions of the AIEE 72 (1953), part II, 273-288.
@@ -19,9 +20,9 @@ use crate::common::{ErrorIntegral, StepOptions};
 pub struct Iae {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should have; its value at the end of the simulation where absent.
+    /// Value that the signal should have; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Time of the step, from which the integral is taken; 0 s where absent.
+    /// Time of the step, from which the integral is taken; 0 s by default.
     pub step_time: Option<Quantity>,
 }
 

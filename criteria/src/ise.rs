@@ -6,9 +6,9 @@ use serde::Deserialize;
 
 use crate::common::{ErrorIntegral, StepOptions};
 
-/// `integral (y - target)^2 dt` from the step to the end, in signal^2 s.
+/// Integral of the squared error, `integral (y - target)^2 dt` from the step to the end, in signal^2 s.
 ///
-/// It weighs large errors, hence the beginning of a response: fast, but little damped.
+/// Large errors, hence the initial part of a response, have a high weight: the result is fast, but lightly damped.
 ///
 /// Less is better. Range: from 0 up. The integral is that of the curve, exact up to rounding.
 ///
@@ -19,9 +19,9 @@ use crate::common::{ErrorIntegral, StepOptions};
 pub struct Ise {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should have; its value at the end of the simulation where absent.
+    /// Value that the signal should have; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Time of the step, from which the integral is taken; 0 s where absent.
+    /// Time of the step, from which the integral is taken; 0 s by default.
     pub step_time: Option<Quantity>,
 }
 

@@ -6,11 +6,13 @@ use serde::Deserialize;
 
 use crate::common::{ErrorIntegral, StepOptions};
 
-/// `integral t |y - target| dt` from the step to the end, `t` counted from the step, in signal s^2.
+/// Integral of time and absolute error, `integral t |y - target| dt` from the step to the end, `t` counted from the
+/// step, in signal s^2.
 ///
-/// It forgives the error that no response can avoid at its beginning and weighs what lasts: well damped responses.
+/// The unavoidable initial error has a low weight, persistent errors a high one: the result is well damped.
 ///
-/// Less is better. Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to rounding.
+/// Less is better. Range: from 0 up. The integral is that of the curve, split where `y` crosses its target, exact up to
+/// rounding.
 ///
 /// Source: D. Graham, R. C. Lathrop, The synthesis of "optimum" transient response: criteria and standard forms,
 /// Transactions of the AIEE 72 (1953), part II, 273-288.
@@ -19,9 +21,9 @@ use crate::common::{ErrorIntegral, StepOptions};
 pub struct Itae {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should have; its value at the end of the simulation where absent.
+    /// Value that the signal should have; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Time of the step, from which `t` counts and the integral is taken; 0 s where absent.
+    /// Time of the step, from which `t` counts and the integral is taken; 0 s by default.
     pub step_time: Option<Quantity>,
 }
 

@@ -6,9 +6,10 @@ use serde::Deserialize;
 
 use crate::common::{ErrorIntegral, StepOptions};
 
-/// `integral t (y - target)^2 dt` from the step to the end, `t` counted from the step, in signal^2 s^2.
+/// Integral of time and squared error, `integral t (y - target)^2 dt` from the step to the end, `t` counted from the
+/// step, in signal^2 s^2.
 ///
-/// Between ISE and ITAE: it forgives the beginning, and small errors.
+/// A compromise between ISE and ITAE: the initial error and small errors have a low weight.
 ///
 /// Less is better. Range: from 0 up. The integral is that of the curve, exact up to rounding.
 ///
@@ -19,9 +20,9 @@ use crate::common::{ErrorIntegral, StepOptions};
 pub struct Itse {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should have; its value at the end of the simulation where absent.
+    /// Value that the signal should have; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Time of the step, from which `t` counts and the integral is taken; 0 s where absent.
+    /// Time of the step, from which `t` counts and the integral is taken; 0 s by default.
     pub step_time: Option<Quantity>,
 }
 

@@ -1,6 +1,6 @@
 //! Criteria of mops, one file each.
 //!
-//! A study file names them by kind; a study written in Rust gives their options:
+//! A study file refers to them by kind; a study written in Rust sets their options:
 //!
 //! ```
 //! use mops_core::CriterionDraft;
@@ -49,7 +49,7 @@ mod tests;
 
 use mops_core::CriterionKind;
 
-/// Every kind of criterion. A new one is a file, and a line here.
+/// Returns all kinds of criteria. A new kind needs a file and a line here.
 pub fn kinds() -> Vec<CriterionKind> {
     vec![
         CriterionKind::of::<overshoot::Overshoot>(),

@@ -1,4 +1,4 @@
-//! Largest complementary sensitivity of a feedback loop.
+//! Maximum complementary sensitivity of a feedback loop.
 
 use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
@@ -6,21 +6,21 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, feedback};
 
-/// `Mt = max_w |L(j w)/(1 + L(j w))|`, dimensionless: the resonance peak of the closed loop. The model is the loop transfer
-/// function L, with unity negative feedback around it.
+/// Maximum complementary sensitivity `Mt = max_w |L(j w)/(1 + L(j w))|`, dimensionless: the resonance peak of the
+/// closed loop.
 ///
-/// The peak is found between a value that is reached and bounds of L over all frequencies from 0 to infinity, with a delay or
-/// without, never on a grid.
+/// The model is the loop transfer function L, with unity negative feedback. The peak is located by bounds of L over all
+/// frequencies from 0 to infinity, with or without delay, not on a grid.
 ///
-/// Less is better. Range: from 0 up; 1 to 1.5 is usual. It has no value where the closed loop is unstable.
+/// Less is better. Range: from 0 up; 1 to 1.5 is usual. There is no value if the closed loop is unstable.
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), section 4.5.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct MaximumComplementarySensitivity {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
 }
 

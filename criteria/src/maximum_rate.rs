@@ -8,11 +8,12 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, signal, trace};
 
-/// `max_t |dy/dt|` over the whole simulation, in the unit of the signal per second.
+/// Maximum rate `max_t |dy/dt|` over the whole simulation, in the unit of the signal per second.
 ///
-/// Less is better. Range: from 0 up. The derivative is that of the curve on each step of the simulation. Where the signal jumps, as a
-/// controller's output does on a step of its reference, the rate is infinite and the criterion has no value; read a
-/// signal that is continuous, or filter this one in the model. The value at the very start is no jump.
+/// Less is better. Range: from 0 up. The derivative is that of the curve on each step of the simulation. If the signal
+/// jumps, as a controller's output does on a step of its reference, the rate is infinite and the criterion has no
+/// value. In that case use a continuous signal, or filter this one in the model. The initial value does not count as a
+/// jump.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 8 (slew-rate limits).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -36,7 +37,7 @@ struct Bound {
     signal: Variable,
 }
 
-/// Largest jump between steps, as a fraction of the signal's largest value, that is taken for rounding.
+/// Largest jump between steps, as a fraction of the signal's largest value, that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 impl Criterion for Bound {
@@ -61,7 +62,7 @@ impl Criterion for Bound {
         let jump = trace.largest_jump();
         if jump > ROUNDING * trace.maximum().0.max(-trace.minimum().0) {
             return Err(format!(
-                "`{}` jumps by {}, where its rate is infinite: read a continuous signal, or filter this one",
+                "`{}` jumps by {}, so that its rate is infinite: use a continuous signal, or filter this one",
                 self.signal.name,
                 self.signal.unit.amount(jump)
             ));
@@ -105,7 +106,7 @@ mod tests {
         step.push(2.0, [3.0; 5]);
         assert_eq!(
             undefined(&rate(), &analysis(&step)),
-            "`y` jumps by 3 m, where its rate is infinite: read a continuous signal, or filter this one"
+            "`y` jumps by 3 m, so that its rate is infinite: use a continuous signal, or filter this one"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! Largest sensitivity of a feedback loop.
+//! Maximum sensitivity of a feedback loop.
 
 use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
 use schemars::JsonSchema;
@@ -6,22 +6,23 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, feedback};
 
-/// `Ms = max_w |1/(1 + L(j w))|`, dimensionless: one over the smallest distance of L from -1. The model is the loop transfer
-/// function L, with unity negative feedback around it.
+/// Maximum sensitivity `Ms = max_w |1/(1 + L(j w))|`, dimensionless: the reciprocal of the smallest distance of L from
+/// -1.
 ///
-/// The peak is found between a value that is reached and bounds of L over all frequencies from 0 to infinity, with a delay or
-/// without, never on a grid.
+/// The model is the loop transfer function L, with unity negative feedback. The peak is located by bounds of L over all
+/// frequencies from 0 to infinity, with or without delay, not on a grid.
 ///
-/// Less is better. Range: from 1 up (nearly always); 1.2 to 2 is usual. It has no value where the closed loop is unstable.
+/// Less is better. Range: from 1 up (nearly always); 1.2 to 2 is usual. There is no value if the closed loop is
+/// unstable.
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), section 4.5; S. Skogestad, I. Postlethwaite,
 /// Multivariable Feedback Control, 2nd edition (2005), section 2.4.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct MaximumSensitivity {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
 }
 

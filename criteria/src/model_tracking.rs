@@ -1,4 +1,4 @@
-//! Distance of a step response from that of a reference model.
+//! Deviation of a step response from that of a reference model.
 
 use mops_core::math;
 use mops_core::{
@@ -9,14 +9,14 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions, part, positive, second};
 
-/// `sqrt(mean_t (y - y_ref)^2)` from the step to the end, in the unit of the signal, with
-/// `y_ref = from + (target - from) h(t)`.
+/// Deviation from a reference model, `sqrt(mean_t (y - y_ref)^2)` from the step to the end, in the unit of the signal,
+/// with `y_ref = from + (target - from) h(t)`.
 ///
-/// `h` is the unit step response of a reference model, `t` counted from the step: with `time-constant` T that of
-/// `1/(T s + 1)`; with `frequency` w and `damping` z that of `w^2/(s^2 + 2 z w s + w^2)`, z at least 0.05. It is
-/// evaluated in closed form and integrated along the curve.
+/// `h` is the unit step response of a reference model, with `t` counted from the step. The model is `1/(T s + 1)` for a
+/// `time-constant` T. It is `w^2/(s^2 + 2 z w s + w^2)` for `frequency` w and `damping` z, z at least 0.05. The
+/// response is evaluated in closed form, and the deviation is integrated along the curve.
 ///
-/// Less is better. Range: from 0 up; 0 where the response is that of the reference model.
+/// Less is better. Range: from 0 up; 0 if the response equals that of the reference model.
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Adaptive Control (2nd ed., 1995), chapter 5 (model-reference systems); step
 /// responses: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 7.3.
@@ -25,21 +25,21 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions, part, positive, second};
 pub struct ModelTracking {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the reference model settles at.
+    /// Value at which the reference model settles.
     pub target: Quantity,
-    /// Value before the step; the signal's first value where absent.
+    /// Value before the step; by default the signal's first value.
     pub from: Option<Quantity>,
-    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    /// Time of the step, 0 s by default; earlier values are ignored.
     pub step_time: Option<Quantity>,
-    /// Time constant of a reference model of first order.
+    /// Time constant of a first-order reference model.
     pub time_constant: Option<Quantity>,
-    /// Undamped angular frequency of a reference model of second order, in rad/s; goes with `damping`.
+    /// Undamped angular frequency of a second-order reference model, in rad/s; requires `damping`.
     pub frequency: Option<Quantity>,
-    /// Damping ratio of a reference model of second order, at least 0.05; goes with `frequency`.
+    /// Damping ratio of a second-order reference model, at least 0.05; requires `frequency`.
     pub damping: Option<Quantity>,
 }
 
-/// A step to 1 without a reference model, to be completed.
+/// Step to 1 without a reference model, to be completed.
 impl Default for ModelTracking {
     fn default() -> Self {
         Self {
@@ -74,11 +74,11 @@ impl CriterionSpec for ModelTracking {
             (Some(time_constant), None, None) => Reference::First { time_constant },
             (None, Some(_), Some(damping)) if damping < LEAST_DAMPING => {
                 return Err(Mistake::new("damping", format!("a damping of {damping} is below {LEAST_DAMPING}"))
-                    .with_help("a reference model should not ring for many periods"));
+                    .with_help("choose a reference model with more damping"));
             }
             (None, Some(frequency), Some(damping)) => Reference::Second { frequency, damping },
             _ => {
-                return Err(Mistake::here("the reference model is not given, or twice").with_help(
+                return Err(Mistake::here("the reference model is missing or ambiguous").with_help(
                     "give either `time-constant` (first order) or `frequency` and `damping` (second order)",
                 ));
             }
@@ -92,17 +92,18 @@ impl CriterionSpec for ModelTracking {
     }
 }
 
-/// Below it the reference rings for over a hundred periods, and the quadrature has to follow them all.
+/// Smallest damping ratio. Below it the reference model rings for over a hundred periods, which the quadrature must
+/// resolve.
 const LEAST_DAMPING: f64 = 0.05;
 
-/// A reference model of gain 1.
+/// Reference model of gain 1.
 enum Reference {
     First { time_constant: f64 },
     Second { frequency: f64, damping: f64 },
 }
 
 impl Reference {
-    /// The unit step response.
+    /// Returns the unit step response.
     fn response(&self, t: f64) -> f64 {
         match *self {
             Self::First { time_constant } => -math::exp_m1(-t / time_constant),
@@ -112,8 +113,8 @@ impl Reference {
                 1.0 - math::exp(-damping * frequency * t) * (cos + damping * frequency / damped * sin)
             }
             Self::Second { frequency, damping } => {
-                // exp(-z w t) (cosh(b t) + z w sinh(b t)/b) with b = w sqrt(z^2 - 1), in a form that neither overflows
-                // nor cancels where b is 0.
+                // exp(-z w t) (cosh(b t) + z w sinh(b t)/b) with b = w sqrt(z^2 - 1), in a form without overflow, and
+                // without cancellation at b = 0.
                 let b = frequency * (damping * damping - 1.0).sqrt();
                 let slow = frequency / (damping + (damping * damping - 1.0).sqrt());
                 let sinh_over_b = if b > 0.0 { -math::exp_m1(-2.0 * b * t) / (2.0 * b) } else { t };
@@ -123,7 +124,7 @@ impl Reference {
         }
     }
 
-    /// Magnitudes of the fastest and of the slowest mode (of the real part, where it oscillates), 1/s.
+    /// Returns the magnitudes of the fastest and the slowest mode (of the real part, if oscillating), 1/s.
     fn rates(&self) -> [f64; 2] {
         match *self {
             Self::First { time_constant } => [1.0 / time_constant; 2],
@@ -135,10 +136,11 @@ impl Reference {
         }
     }
 
-    /// Times from the step to `length` between which the response is smooth enough for the quadrature of a trace.
+    /// Returns times from the step to `length` between which the response is smooth enough for the quadrature of a
+    /// trace.
     ///
-    /// Steps of half a radian or half a time constant leave an error below 1e-12 of it. Without oscillation they may
-    /// grow with the time, because what has not decayed by then is slow. After 40 slow time constants nothing moves.
+    /// Steps of half a radian or half a time constant cause a relative error below 1e-12. Without oscillation the steps
+    /// may grow with time, because only slow modes remain. After 40 slow time constants the response is at rest.
     fn knots(&self, length: f64) -> Vec<f64> {
         let [fast, slow] = self.rates();
         let growth = if matches!(self, Self::Second { damping, .. } if *damping < 1.0) { 0.0 } else { 0.2 };
@@ -158,7 +160,7 @@ impl Reference {
 struct Bound {
     step: Step,
     reference: Reference,
-    /// What a frequency in Hz is in rad/s.
+    /// Note on a frequency in Hz and its value in rad/s.
     note: Option<String>,
 }
 
@@ -245,7 +247,7 @@ mod tests {
         let apart = second_order_reference("1 rad/s", 0.5 * (a + b));
         let integral = (a * a / (2.0 * b) - 2.0 * a * b / (a + b) + b * b / (2.0 * a)) / math::powi(a - b, 2);
         assert_near(value(&apart, &still).number, (integral / length).sqrt(), 1e-11);
-        // (1 - y_ref)^2 of damping z integrates to (1 + 4 z^2)/(4 z w).
+        // (1 - y_ref)^2 with damping z integrates to (1 + 4 z^2)/(4 z w).
         let ringing = second_order_reference("20 rad/s", 0.1);
         assert_near(value(&ringing, &one).number, f64::sqrt(1.04 / (0.4 * 20.0) / 60.0), 1e-11);
     }
@@ -253,7 +255,7 @@ mod tests {
     #[test]
     fn a_reference_is_of_one_order_and_well_damped() {
         assert!(
-            mistake(&ModelTracking { signal: "y".into(), ..ModelTracking::default() }).contains("not given, or twice")
+            mistake(&ModelTracking { signal: "y".into(), ..ModelTracking::default() }).contains("missing or ambiguous")
         );
         let both = ModelTracking { time_constant: Some(1.0.into()), ..second_order_reference("1 rad/s", 0.7) };
         assert!(mistake(&both).contains("give either `time-constant`"));

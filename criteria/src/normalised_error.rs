@@ -1,4 +1,4 @@
-//! Fit to a measurement, in units of its noise.
+//! Fit to a measurement, in units of its noise level.
 
 use mops_core::{
     Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Samples, Sense,
@@ -9,14 +9,15 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
 
-/// `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 where nothing but the noise is left.
+/// Normalised error `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 if the residual is pure noise.
 ///
-/// `noise` is the standard deviation of the measurement's noise: the option, or else what the channel of the experiment
-/// says. The sum has the residuals `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that
-/// least-squares solvers use.
+/// `noise` is the noise level (standard deviation) of the measurement: the option, or else that of the channel in the
+/// experiment. The value is the sum of squares of the residuals
+/// `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that least-squares solvers use.
 ///
-/// It is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up; well below 1 the noise is overrated or
-/// the model fits the noise, well above 1 the model lacks something. Without a demand, it is 1.
+/// The criterion is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up. A value
+/// well below 1 means that the noise level is too high or that the model fits the noise. A value well above 1 means
+/// that the model lacks an effect. The default demand is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
 /// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters).
@@ -25,7 +26,7 @@ use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
 pub struct NormalisedError {
     /// Signal that is compared with its measurement.
     pub signal: String,
-    /// Standard deviation of the noise, in the unit of the signal; the channel's where absent.
+    /// Noise level (standard deviation), in the unit of the signal; by default that of the channel.
     pub noise: Option<Quantity>,
 }
 
@@ -45,8 +46,9 @@ impl CriterionSpec for NormalisedError {
     }
 }
 
-/// A mean square below which noise is not what is left: a tenth of its standard deviation. Of 20 samples or more it comes by
-/// chance in less than one of 1e9 records, ten estimated parameters included.
+/// Mean square below which the residual is not plausible noise: a tenth of the noise level.
+///
+/// With 20 samples or more it occurs by chance in less than one of 1e9 records, including ten estimated parameters.
 const FAR_BELOW: f64 = 0.01;
 const SAMPLES: usize = 20;
 
@@ -60,7 +62,7 @@ impl Criterion for Bound {
         Unit::one()
     }
 
-    /// Where nothing but the noise is left.
+    /// Returns 1: the residual is pure noise.
     fn natural_demand(&self) -> Option<f64> {
         Some(1.0)
     }
@@ -81,11 +83,11 @@ impl Criterion for Bound {
         let channel = case.experiment.as_ref().and_then(|experiment| experiment.channel(&self.signal));
         match channel {
             Some(channel) if self.noise.or(channel.noise).is_none() => Err(Mistake::here(format!(
-                "the noise of `{}` in `{}` is not known",
+                "the noise level of `{}` in `{}` is unknown",
                 self.signal, case.name
             ))
             .with_help(
-                "give `noise` here or with the channel of the experiment; `mops data` estimates it, `fit` needs none",
+                "set `noise` here or in the channel of the experiment; `mops data` estimates it, `fit` does not need it",
             )),
             _ => Ok(()),
         }
@@ -96,7 +98,7 @@ impl Criterion for Bound {
         let scale = self.scale(comparison.channel)?;
         let value = Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect());
         let is_far_below = value.number < FAR_BELOW && value.residuals.len() >= SAMPLES;
-        let note = is_far_below.then_some("far below the noise: is the noise in the unit of the signal?");
+        let note = is_far_below.then_some("far below the noise: check the unit of `noise`");
         Ok(Value { note, ..value })
     }
 
@@ -114,11 +116,11 @@ impl Criterion for Bound {
 }
 
 impl Bound {
-    /// `1/(noise sqrt(N))`.
+    /// Returns `1/(noise sqrt(N))`.
     #[allow(clippy::cast_precision_loss)]
     fn scale(&self, channel: &Channel) -> Result<f64, String> {
         let noise =
-            self.noise.or(channel.noise).ok_or_else(|| format!("the noise of `{}` is not known", self.signal))?;
+            self.noise.or(channel.noise).ok_or_else(|| format!("the noise level of `{}` is unknown", self.signal))?;
         Ok(1.0 / (noise * (channel.times.len() as f64).sqrt()))
     }
 }
@@ -147,6 +149,6 @@ mod tests {
     #[test]
     fn without_a_noise_there_is_no_value() {
         let why = undefined_in(&measured(&[0.0, 1.0], &[0.0, 1.0], None), &error(None), &simulated(1.0, |t| t));
-        assert_eq!(why, "the noise of `y` is not known");
+        assert_eq!(why, "the noise level of `y` is unknown");
     }
 }

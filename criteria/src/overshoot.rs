@@ -8,14 +8,15 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 
-/// `max(0, max_t (y - target)/(target - from))`, dimensionless: 0.05 is 5 % of the step.
+/// Overshoot `max(0, max_t (y - target)/(target - from))`, dimensionless: 0.05 is 5 % of the step.
 ///
-/// With `absolute = true` the excursion itself, in the unit of the signal: `max(0, max_t y - target)` for a step
-/// upwards, `max(0, target - min_t y)` for one downwards. It is taken as upwards where `target` and `from` are equal,
-/// so that it also serves a signal that should stay where it is; the relative overshoot of such a signal is not
-/// defined.
+/// With `absolute = true` the value is the excursion itself, in the unit of the signal. It is
+/// `max(0, max_t y - target)` for a step upwards, `max(0, target - min_t y)` for one downwards. If `target` and `from`
+/// are equal, the step counts as upwards, so that the option also serves a signal that should stay constant. The
+/// relative overshoot of such a signal is undefined.
 ///
-/// Less is better. Range: from 0 up. The maximum is that of the curve, not of samples. Simulate long enough for it to come.
+/// Less is better. Range: from 0 up. The maximum is that of the curve, not of samples. Simulate long enough to include
+/// it.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -23,13 +24,13 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 pub struct Overshoot {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    /// Value at which the signal should settle; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Value before the step; the signal's first value where absent.
+    /// Value before the step; by default the signal's first value.
     pub from: Option<Quantity>,
-    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    /// Time of the step, 0 s by default; earlier values are ignored.
     pub step_time: Option<Quantity>,
-    /// `true` gives the excursion in the unit of the signal instead of a fraction of the step.
+    /// If `true`, the excursion in the unit of the signal instead of a fraction of the step.
     #[serde(default)]
     pub absolute: bool,
 }
@@ -131,7 +132,7 @@ mod tests {
     fn a_signal_that_should_stay_has_an_absolute_overshoot_only() {
         let swing = simulated(10.0, |t| t * math::exp(-t));
         let mut options = Overshoot { target: Some(0.0.into()), ..overshoot() };
-        assert_eq!(undefined(&options, &swing), "the step from 0 to 0 has no height to compare with");
+        assert_eq!(undefined(&options, &swing), "the step from 0 to 0 has no height");
         options.absolute = true;
         assert_near(value(&options, &swing).number, math::exp(-1.0), 1e-12);
     }

@@ -8,12 +8,12 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, signal, trace};
 
-/// `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
+/// Peak `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
 ///
-/// Which values are better depends on the signal: `demand` asks for a maximum or an absolute peak of at most that value, the
-/// pair `good` and `bad` for either side. A minimum takes no `demand`, as it may be meant either way: it takes the pair, or
-/// `usage = "equality"`. Range: any number; never negative for `absolute`. The extremum is that of the curve, not of samples. A
-/// value that may be zero or negative is demanded by the pair.
+/// Which values are better depends on the signal. `demand` limits a maximum or an absolute peak from above; the pair
+/// `good` and `bad` works in either direction. A minimum takes no `demand`, because its direction would be ambiguous:
+/// use the pair, or `usage = "equality"`. Range: any number; never negative for `absolute`. The extremum is that of the
+/// curve, not of samples. For a limit that is zero or negative, use the pair.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), chapter 4 (the peak norm of a signal).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -21,21 +21,21 @@ use crate::common::{NOT_NEGATIVE, signal, trace};
 pub struct Peak {
     /// Signal that is measured.
     pub signal: String,
-    /// Which peak: `maximum` where absent, `minimum`, or `absolute` for the largest distance from zero.
+    /// Kind of peak: `maximum` (the default), `minimum`, or `absolute` for the largest distance from zero.
     #[serde(default)]
     pub of: Extremum,
 }
 
-/// Which extremum of a signal.
+/// Kind of extremum of a signal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extremum {
-    /// The largest value.
+    /// Largest value.
     #[default]
     Maximum,
-    /// The smallest value.
+    /// Smallest value.
     Minimum,
-    /// The largest distance from zero.
+    /// Largest distance from zero.
     Absolute,
 }
 
@@ -67,7 +67,7 @@ impl Criterion for Bound {
         match self.of {
             Extremum::Absolute => Sense::Less,
             Extremum::Maximum => Sense::Open,
-            // A demand of 5 degC on the least temperature may be meant either way.
+            // A demand of 5 degC on the lowest temperature is ambiguous.
             Extremum::Minimum => Sense::Target,
         }
     }
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_peak_between_the_knots_is_found() {
-        // One segment, its knots at 0 and 2: the peak at 0.9 is on no node.
+        // One segment, with knots at 0 and 2: the peak at 0.9 is at no node.
         let arch = analysis(&sampled(2.0, 1, |t| 4.0 - (t - 0.9) * (t - 0.9)));
         assert_near(value(&Peak { signal: "y".into(), of: Extremum::Maximum }, &arch).number, 4.0, 1e-14);
     }

@@ -8,25 +8,24 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Values, capped, feedback};
 
-/// The phase margin: `min |pi + arg L(j w)|` over the frequencies at which `|L(j w)| = 1`, in rad. The model is the loop
-/// transfer function L, with unity negative feedback around it.
+/// Phase margin `min |pi + arg L(j w)|` over the frequencies at which `|L(j w)| = 1`, in rad. The model is the loop
+/// transfer function L, with unity negative feedback.
 ///
-/// Crossings are found by bounds of L over all frequencies, not on a grid; a delay of the model enters exactly. Of several
-/// crossings the one with the smallest turn to -1, either way, counts.
+/// Crossings are located by bounds of L over all frequencies, not on a grid; a delay of the model is treated exactly.
+/// Of several crossings, the one with the smallest phase shift to -1, of either sign, counts.
 ///
-/// Range: up to pi; a stable loop in which `|L|` never is 1 has pi. More is better: `demand = "45 deg"` asks
-/// for at least 45 deg. Where the closed loop is unstable the margin is negative: minus the
-/// smallest lead or lag, the same at all frequencies above 0, that makes it stable. With a long delay that may be more than a
-/// half turn, and the value below -pi. It has no value where no lead or lag makes an unstable loop stable, as where a real
-/// pole is unstable.
+/// Range: up to pi; a stable loop in which `|L|` is never 1 has pi. More is better: `demand = "45 deg"` requires at
+/// least 45 deg. For an unstable closed loop the margin is negative: minus the smallest lead or lag, equal at all
+/// frequencies above 0, that stabilises it. With a long delay that may exceed half a turn, so that the value is below
+/// -pi. There is no value if no lead or lag stabilises an unstable loop, for example with an unstable real pole.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PhaseMargin {
-    /// Input of the loop transfer function; the only one where absent.
+    /// Input of the loop transfer function; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the loop transfer function; the only one where absent.
+    /// Output of the loop transfer function; may be omitted if there is only one.
     pub output: Option<String>,
 }
 
@@ -67,13 +66,13 @@ mod tests {
         let margin = |delay| value(&PhaseMargin::default(), &linear_delayed(&[1.0], &[1.0, 0.0], delay)).number;
         assert_near(margin(0.3), std::f64::consts::FRAC_PI_2 - 0.3, 1e-12);
         assert_near(margin(1.7), std::f64::consts::FRAC_PI_2 - 1.7, 1e-12);
-        // As far as it takes to stability, more than a half turn too.
+        // Phase shift to the stability limit, also beyond half a turn.
         assert_near(margin(20.0), std::f64::consts::FRAC_PI_2 - 20.0, 1e-11);
     }
 
     #[test]
-    fn what_no_turn_makes_stable_has_no_value() {
+    fn a_loop_that_no_phase_shift_stabilises_has_no_value() {
         let slow = undefined(&PhaseMargin::default(), &linear(&[0.5], &[1.0, -1.0]));
-        assert_eq!(slow, "the closed loop is unstable, and no turn of the phase makes it stable");
+        assert_eq!(slow, "the closed loop is unstable, and no phase shift stabilises it");
     }
 }

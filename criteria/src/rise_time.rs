@@ -8,12 +8,12 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 
-/// `t_high - t_low`, in s, where `t_f` is the first time at which `(y - from)/(target - from) >= f`.
+/// Rise time `t_high - t_low`, in s, where `t_f` is the first time at which `(y - from)/(target - from) >= f`.
 ///
-/// `low` and `high` are 0.1 and 0.9 where absent: the rise time from 10 % to 90 % of the step.
+/// By default `low` is 0.1 and `high` is 0.9: the rise time from 10 % to 90 % of the step.
 ///
-/// Less is better. Range: from 0 to the length of the simulation. A response that never gets to `high` has no rise time and
-/// meets no demand, noted `not risen at the end`.
+/// Less is better. Range: from 0 to the length of the simulation. A response that never reaches `high` has no rise time
+/// and meets no demand, noted `not risen at the end`.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -21,15 +21,15 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions, number, second};
 pub struct RiseTime {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    /// Value at which the signal should settle; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Value before the step; the signal's first value where absent.
+    /// Value before the step; by default the signal's first value.
     pub from: Option<Quantity>,
-    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    /// Time of the step, 0 s by default; earlier values are ignored.
     pub step_time: Option<Quantity>,
-    /// Fraction of the step at which the time begins: 0.1 where absent; "10 %" is the same.
+    /// Fraction of the step at which the rise time starts, such as 0.1 (the default) or "10 %".
     pub low: Option<Quantity>,
-    /// Fraction of the step at which it ends, at most 1: 0.9 where absent.
+    /// Fraction of the step at which the rise time ends, at most 1; 0.9 by default.
     pub high: Option<Quantity>,
 }
 
@@ -50,8 +50,8 @@ impl CriterionSpec for RiseTime {
         let high = number("high", self.high.as_ref().unwrap_or(&0.9.into()), &Unit::one())?;
         if !(0.0 <= low && low < high && high <= 1.0) {
             let key = if self.high.is_some() { "high" } else { "low" };
-            return Err(Mistake::new(key, format!("no rise leads from {low} to {high} of the step"))
-                .with_help("0 <= low < high <= 1 must hold, such as low = 0.1 and high = 0.9"));
+            return Err(Mistake::new(key, format!("a rise from {low} to {high} of the step is impossible"))
+                .with_help("choose 0 <= low < high <= 1, such as low = 0.1 and high = 0.9"));
         }
         Ok(Box::new(Bound { step, low, high }))
     }
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn fractions_out_of_order_are_a_mistake() {
         let reversed = RiseTime { low: Some(0.9.into()), high: Some(0.1.into()), ..rise() };
-        assert!(mistake(&reversed).starts_with("high: no rise leads from 0.9 to 0.1 of the step"));
+        assert!(mistake(&reversed).starts_with("high: a rise from 0.9 to 0.1 of the step is impossible"));
         assert!(mistake(&RiseTime { low: Some((-0.1).into()), ..rise() }).starts_with("low: "));
     }
 }

@@ -8,11 +8,12 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, compare, signal};
 
-/// `sqrt(mean_i (y_simulated - y_measured)(t_i)^2)`, in the unit of the signal.
+/// Root mean square error `sqrt(mean_i (y_simulated - y_measured)(t_i)^2)`, in the unit of the signal.
 ///
-/// All samples count alike; the simulation is read from its curve at their times. It is evaluated in the experiments
-/// that measure the signal. Less is better. Range: from 0 up; a model that lacks nothing leaves the standard deviation of the noise. To
-/// calibrate, minimise `fit` or `normalised-error`, whose residuals least-squares solvers use, and monitor this one.
+/// All samples have equal weight; the simulated curve is evaluated at their times. The criterion is evaluated in the
+/// experiments that measure the signal. Less is better. Range: from 0 up; a perfect model gives the noise level. For
+/// calibration, minimise `fit` or `normalised-error`, whose residuals least-squares solvers use, and monitor this
+/// criterion.
 ///
 /// Source: L. Ljung, System Identification (2nd ed., 1999), chapter 16.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

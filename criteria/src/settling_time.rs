@@ -8,16 +8,18 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions, positive, second};
 
-/// `sup { t : |y - target| > band }`, counted from the step, in s: from then on the signal stays within the band.
+/// Settling time `sup { t : |y - target| > band }`, counted from the step, in s: from then on the signal stays within
+/// the band.
 ///
-/// The band is `band` in the unit of the signal, or `relative-band` as a fraction of `|target - from|`; 2 % of the step
-/// where neither is given. Touching the edge of the band does not leave it. The time is where the curve crosses the
-/// edge, not where a sample lies outside; it jumps where an extremum comes to touch the edge.
+/// The band is `band` in the unit of the signal, or `relative-band` as a fraction of `|target - from|`; by default 2 %
+/// of the step. Touching the edge of the band does not count as leaving it. The time is that of the curve's last
+/// crossing of the edge, not that of a sample. It jumps when an extremum comes to touch the edge.
 ///
-/// Less is better. Range: from 0 to the length of the simulation. A signal that is outside at the end has no settling time
-/// and meets no demand, noted `not settled at the end`; neither has one whose motion at the end leads out of the band again, noted
-/// `it crosses the band at the end`: simulate longer. Without a `target` the signal settles at its own last value, and not at
-/// all where that still moves: give a target wherever it is known. A signal that never leaves the band has a settling time of 0 with a note.
+/// Less is better. Range: from 0 to the length of the simulation. A signal outside of the band at the end has no
+/// settling time and meets no demand, noted `not settled at the end`. The same applies if the final motion leads out of
+/// the band, noted `crosses the band at the end`: simulate longer. Without a `target`, the last value of the signal is
+/// the target; a signal that still moves at the end then has no settling time. Give a target if it is known. A signal
+/// that never leaves the band has a settling time of 0, with a note.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 6.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -25,15 +27,15 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions, positive, second};
 pub struct SettlingTime {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    /// Value at which the signal should settle; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Value before the step; the signal's first value where absent. Only `relative-band` reads it.
+    /// Value before the step; by default the signal's first value. Used by `relative-band` only.
     pub from: Option<Quantity>,
-    /// Time of the step, from which the settling time counts; 0 s where absent.
+    /// Time of the step, from which the settling time counts; 0 s by default.
     pub step_time: Option<Quantity>,
     /// Largest distance from the target that counts as settled, in the unit of the signal.
     pub band: Option<Quantity>,
-    /// The same as a fraction of the step, instead of `band`: 0.02 or "2 %", which also holds where neither is given.
+    /// Band as a fraction of the step, instead of `band`, such as 0.02 or "2 %" (the default).
     pub relative_band: Option<Quantity>,
 }
 
@@ -53,11 +55,9 @@ impl CriterionSpec for SettlingTime {
         let absolute = positive("band", self.band.as_ref(), &step.unit)?;
         let relative = positive("relative-band", self.relative_band.as_ref(), &Unit::one())?;
         if let Some(relative) = relative.filter(|relative| *relative >= 1.0) {
-            let fact =
-                format!("a band of {relative} times the step holds its start: what never moves would be settled");
-            return Err(Mistake::new("relative-band", fact).with_help(format!(
-                "a fraction of the step is expected; if these are percent, write \"{relative} %\""
-            )));
+            let fact = format!("a band of {relative} times the step contains the initial value");
+            return Err(Mistake::new("relative-band", fact)
+                .with_help(format!("write a fraction of the step below 1; for percent write \"{relative} %\"")));
         }
         let band = match (absolute, relative) {
             (Some(_), Some(_)) => {
@@ -77,9 +77,9 @@ struct Bound {
 }
 
 enum Band {
-    /// In the unit of the signal.
+    /// Band in the unit of the signal.
     Absolute(f64),
-    /// As a fraction of the step.
+    /// Band as a fraction of the step.
     Relative(f64),
 }
 
@@ -112,13 +112,13 @@ impl Criterion for Bound {
         };
         let missed = |note| Ok(answer.missed(answer.length(), answer.target, band, note));
         let Some(left) = answer.last_outside(band) else {
-            return Ok(Value::noted(0.0, "it never leaves the band"));
+            return Ok(Value::noted(0.0, "never leaves the band"));
         };
         if left >= answer.trace.end() {
             return missed("not settled at the end");
         }
         if !answer.stays_within(band, left) {
-            let note = if answer.is_assumed { "still moving at the end" } else { "it crosses the band at the end" };
+            let note = if answer.is_assumed { "still moving at the end" } else { "crosses the band at the end" };
             return missed(note);
         }
         Ok((left - answer.time).into())
@@ -202,18 +202,18 @@ mod tests {
         assert_eq!((missed.missed, missed.note), (Some(Missed { horizon: Some(4.0) }), Some("not settled at the end")));
         let later = SettlingTime { step_time: Some(1.0.into()), ..settling(0.01) };
         assert_near(value(&later, &lag).number, exact(3.0), 1e-9);
-        assert_eq!(value(&settling(2.0), &lag), Value::noted(0.0, "it never leaves the band"));
+        assert_eq!(value(&settling(2.0), &lag), Value::noted(0.0, "never leaves the band"));
     }
 
     #[test]
     fn a_response_that_crosses_the_band_at_the_end_has_not_settled() {
         let noted = |end: f64, damping: f64| value(&settling(0.05), &simulated(end, second_order(damping))).note;
-        // The first crossing of the target is at 1.9 s and 3.2 s, the peaks at 3.2 s and 3.6 s are 1.53 and 1.16.
+        // The first crossing of the target is at 1.9 s and 3.2 s; the peaks at 3.2 s and 3.6 s are 1.53 and 1.16.
         for (end, damping) in [(1.75, 0.2), (1.8, 0.2), (1.85, 0.2), (2.4, 0.5), (2.45, 0.5)] {
-            assert_eq!(noted(end, damping), Some("it crosses the band at the end"), "{end} {damping}");
+            assert_eq!(noted(end, damping), Some("crosses the band at the end"), "{end} {damping}");
         }
         assert_eq!(noted(1.6, 0.2), Some("not settled at the end"));
-        // Motions that end within: an approach, a decay with turns, a peak that stays inside, a slow ramp.
+        // Motions that end within the band: an approach, a decay with turns, a peak that stays inside, a slow ramp.
         let approach = simulated(3.1, |t| 1.0 - math::exp(-t));
         assert_near(value(&settling(0.05), &approach).number, math::ln(20.0), 1e-9);
         for damping in [0.05, 0.2, 0.7, 0.9] {

@@ -6,23 +6,25 @@ use serde::Deserialize;
 
 use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 
-/// The largest real part of all poles, `max Re p`, in 1/s: negative for a stable system, and the more so the faster its slowest
-/// mode dies out. With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
-/// Poles that neither input nor output touches count too.
+/// Largest real part of all poles, `max Re p`, in 1/s; for a stable system it is negative, and the lower the faster the
+/// slowest mode decays.
 ///
-/// Less is better. Range: up to 0 for a demand, as an unstable system meets any above; an unstable system has a positive value. It
-/// is demanded by the pair `good` and `bad`, such as `good = -2`, `bad = 0`. A closed loop with a delay has no finite number of
-/// poles, and no value.
+/// With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
+/// Uncontrollable and unobservable poles count too.
+///
+/// Less is better. Range: up to 0 for a demand, since an unstable system would meet any positive one; an unstable
+/// system has a positive value. Use the pair `good` and `bad` as demand, such as `good = -2`, `bad = 0`. A closed loop
+/// with a delay has infinitely many poles, and no value.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 7.4 (stability degree).
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SlowestPole {
-    /// Input of the system; the only one where absent.
+    /// Input of the system; may be omitted if there is only one.
     pub input: Option<String>,
-    /// Output of the system; the only one where absent.
+    /// Output of the system; may be omitted if there is only one.
     pub output: Option<String>,
-    /// `system` (the default), or `closed-loop` where the model is a loop transfer function.
+    /// System that is evaluated: `system` (the default), or `closed-loop` if the model is a loop transfer function.
     pub of: Of,
 }
 

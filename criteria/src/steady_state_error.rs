@@ -9,11 +9,11 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, number, part, positive, second, signal, trace};
 
-/// `|y(t_end) - target|`, in the unit of the signal; with a `window` of length w,
+/// Steady-state error `|y(t_end) - target|`, in the unit of the signal; with a `window` of length w,
 /// `|mean of y over [t_end - w, t_end] - target|`.
 ///
-/// Less is better. Range: from 0 up. The mean is taken before the absolute value, so that a window of whole periods averages a lasting
-/// oscillation out.
+/// Less is better. Range: from 0 up. The mean is taken before the absolute value, so that a window of whole periods
+/// averages out a persistent oscillation.
 ///
 /// Source: K. Ogata, Modern Control Engineering (5th ed., 2010), section 5-8.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -21,9 +21,9 @@ use crate::common::{NOT_NEGATIVE, number, part, positive, second, signal, trace}
 pub struct SteadyStateError {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at.
+    /// Value at which the signal should settle.
     pub target: Quantity,
-    /// Length of the end of the simulation over which the signal is averaged; its last value alone where absent.
+    /// Length of the final part of the simulation over which the signal is averaged; by default its last value only.
     pub window: Option<Quantity>,
 }
 

@@ -9,15 +9,16 @@ use serde::Deserialize;
 
 use crate::common::{number, part, second, signal, step_time, trace};
 
-/// `max_t max(y - upper(t), lower(t) - y)`, in the unit of the signal: how far the response leaves its envelope.
+/// Largest violation of an envelope, `max_t max(y - upper(t), lower(t) - y)`, in the unit of the signal.
 ///
-/// Negative inside: then it is the margin, with the other sign. Each bound is given by points `[time, value]` with
-/// straight lines between them; it begins at its first point and stays at the value of its last one. Two points of the
-/// same time are a step. At least one bound is needed. Example: `upper = [[0, 1.2], [5, 1.2], [5, 1.02]]`,
+/// Inside the envelope the value is negative: minus the margin. Each bound is given by points `[time, value]` with
+/// linear interpolation. It starts at its first point and keeps the value of its last one. Two points at the same time
+/// are a step. At least one bound is needed. Example: `upper = [[0, 1.2], [5, 1.2], [5, 1.02]]`,
 /// `lower = [[3, 0.9], [10, 0.98]]`.
 ///
-/// Less is better. Range: any number. A demand is positive; to ask that the response stays inside, use the pair `good = -0.1`,
-/// `bad = 0`: the scaled value is 1 where the response touches its envelope, 0 with a margin of 0.1.
+/// Less is better. Range: any number. A demand is positive; to require that the response stays inside, use the pair
+/// `good = -0.1`, `bad = 0`. The scaled value then is 1 if the response touches its envelope, and 0 with a margin of
+/// 0.1.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -25,13 +26,13 @@ use crate::common::{number, part, second, signal, step_time, trace};
 pub struct StepEnvelope {
     /// Signal that is measured.
     pub signal: String,
-    /// Points `[time, value]` of the upper bound, by increasing time; there is none where absent.
+    /// Points `[time, value]` of the upper bound, by increasing time; without points there is no upper bound.
     #[serde(default)]
     pub upper: Vec<[Quantity; 2]>,
-    /// Points `[time, value]` of the lower bound, by increasing time; there is none where absent.
+    /// Points `[time, value]` of the lower bound, by increasing time; without points there is no lower bound.
     #[serde(default)]
     pub lower: Vec<[Quantity; 2]>,
-    /// Time of the step, from which the times of the points count; 0 s where absent.
+    /// Time of the step, from which the times of the points count; 0 s by default.
     pub step_time: Option<Quantity>,
 }
 
@@ -43,7 +44,7 @@ impl CriterionSpec for StepEnvelope {
     fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
         let signal = signal(signals, &self.signal)?.clone();
         if self.upper.is_empty() && self.lower.is_empty() {
-            return Err(Mistake::here("an envelope has at least one bound")
+            return Err(Mistake::here("an envelope needs at least one bound")
                 .with_help("add `upper = [[time, value], ...]` or `lower = [[time, value], ...]`"));
         }
         let step_time = step_time(self.step_time.as_ref())?;
@@ -53,7 +54,7 @@ impl CriterionSpec for StepEnvelope {
     }
 }
 
-/// A straight part of a bound: times and values at both ends.
+/// Straight part of a bound: times and values at both ends.
 struct Stretch {
     time: [f64; 2],
     value: [f64; 2],
@@ -66,8 +67,11 @@ fn stretches(key: &str, points: &[[Quantity; 2]], unit: &Unit, step_time: f64) -
         if let Some(last) = stretches.last_mut() {
             if time < last.time[0] {
                 let before = last.time[0] - step_time;
-                return Err(Mistake::new(key, format!("the point at {} s stands after {before} s", time - step_time))
-                    .with_help("give the points by increasing time"));
+                return Err(Mistake::new(
+                    key,
+                    format!("the points are not in order: {} s follows {before} s", time - step_time),
+                )
+                .with_help("give the points by increasing time"));
             }
             last.time[1] = time;
             last.value[1] = value;
@@ -78,13 +82,13 @@ fn stretches(key: &str, points: &[[Quantity; 2]], unit: &Unit, step_time: f64) -
 }
 
 impl Stretch {
-    /// The bound at a time within the stretch.
+    /// Returns the bound at a time within the stretch.
     fn at(&self, t: f64) -> f64 {
         let ([t0, t1], [v0, v1]) = (self.time, self.value);
         if v0 == v1 { v0 } else { v0 + (v1 - v0) * (t - t0) / (t1 - t0) }
     }
 
-    /// `max_t sign (y - bound)`; `None` where the stretch lies outside the simulation.
+    /// Returns `max_t sign (y - bound)`; `None` if the stretch is outside of the simulation.
     fn violation(&self, trace: &Trace, sign: f64) -> Option<f64> {
         let (from, to) = (self.time[0].max(trace.start()), self.time[1].min(trace.end()));
         (from < to).then(|| part(trace, &[from, to], |t, y| sign * (y - self.at(t))).maximum().0)
@@ -117,7 +121,7 @@ impl Criterion for Bound {
         let worst = above.chain(below).reduce(f64::max);
         worst
             .map(Value::from)
-            .ok_or_else(|| format!("the envelope begins after the end of the simulation at {} s", trace.end()))
+            .ok_or_else(|| format!("the envelope starts after the end of the simulation at {} s", trace.end()))
     }
 }
 
@@ -163,14 +167,14 @@ mod tests {
 
     #[test]
     fn an_envelope_needs_a_bound_in_order_within_the_simulation() {
-        assert!(mistake(&envelope(&[], &[])).contains("an envelope has at least one bound"));
+        assert!(mistake(&envelope(&[], &[])).contains("an envelope needs at least one bound"));
         let reversed = mistake(&envelope(&[], &[[2.0, 0.0], [1.0, 0.0]]));
-        assert_eq!(reversed, "lower: the point at 1 s stands after 2 s; give the points by increasing time");
+        assert_eq!(reversed, "lower: the points are not in order: 1 s follows 2 s; give the points by increasing time");
         let metres = StepEnvelope { upper: vec![[quantity("1 m"), quantity("1 m")]], ..envelope(&[], &[]) };
-        assert_eq!(mistake(&metres), "upper: a quantity in `m` stands where one in `s` is expected");
+        assert_eq!(mistake(&metres), "upper: expected a quantity in `s`, found `m`");
         assert_eq!(
             undefined(&envelope(&[[9.0, 1.0]], &[]), &simulated(4.0, |t| t)),
-            "the envelope begins after the end of the simulation at 4 s"
+            "the envelope starts after the end of the simulation at 4 s"
         );
     }
 }

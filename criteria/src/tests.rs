@@ -1,4 +1,4 @@
-//! What holds for every criterion: it is documented, and a study file can name it.
+//! Requirements on every criterion: it is documented, and a study file can refer to it.
 
 use std::collections::HashSet;
 use std::io;
@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use crate::kinds;
 
-/// Every kind, with options as they stand in a study file.
+/// Every kind, with options as written in a study file.
 const EXAMPLES: [(&str, &str); 32] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
@@ -50,7 +50,7 @@ const EXAMPLES: [(&str, &str); 32] = [
     ("frequency-fit", "{ signal = 'y', input = 'u', absolute = false }"),
 ];
 
-/// Kinds from this one on read linear systems.
+/// First kind of criterion that evaluates linear systems; all later ones do too.
 const FIRST_LINEAR: &str = "gain-margin";
 
 fn is_linear(kind: &str) -> bool {
@@ -72,7 +72,7 @@ fn every_page_of_the_manual_opens_with_a_formula_and_names_its_source() {
         let about = page.lines().nth(2).unwrap_or_default();
         assert!(about.contains('`'), "{page}");
         assert!(page.contains("Source: ") && page.contains("Range:"), "{page}");
-        assert!(page.contains(" better"), "the page says which values are better: {page}");
+        assert!(page.contains(" better"), "the page states which values are better: {page}");
         let schema = (kind.schema)();
         let options = schema.as_value()["properties"].as_object().expect("a criterion has options").clone();
         assert!(options.values().all(|option| option["description"].is_string()), "{page}");
@@ -91,7 +91,8 @@ fn every_kind_is_read_from_a_study_file_and_has_a_value() {
     let problem = Problem::new(read_study(&criteria).expect("it is a study").into());
     let evaluation = problem.evaluate_at(&problem.study().start());
     assert!(evaluation.failures.is_empty(), "{:?}", evaluation.failures);
-    // In the case and in both experiments; over time not in the one over frequency; of measurements only where there is one.
+    // In the case and in both experiments; criteria over time not in the frequency experiment; criteria of measurements
+    // only where one exists.
     let measured = ["fit", "normalised-error", "rmse", "fit-percent", "frequency-fit"].len();
     let linear = EXAMPLES.iter().filter(|(name, _)| is_linear(name)).count() - 1;
     let simulated = EXAMPLES.len() - linear - measured;
@@ -113,11 +114,11 @@ fn a_criterion_refuses_a_model_of_the_other_sort_and_names_one_that_fits() {
 }
 
 #[test]
-fn a_mistake_in_an_option_is_led_back_to_its_place() {
+fn a_mistake_in_an_option_is_reported_at_its_place() {
     let wrong = read_study("speed = { settling-time = { signal = 'y', band = '3 s' }, model = 'lag', demand = 1 }")
         .err()
         .expect("the unit is wrong");
-    assert!(wrong.to_string().contains(":14:50: a quantity in `s` stands where one in `m` is expected"), "{wrong}");
+    assert!(wrong.to_string().contains(":14:50: expected a quantity in `m`, found `s`"), "{wrong}");
 }
 
 fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {
@@ -134,7 +135,7 @@ fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic>
     read(&catalogue, "study.toml", &text, &[], &Data).map(|file| file.study)
 }
 
-/// The measurement of all tests.
+/// Measurement of all tests.
 struct Data;
 
 impl Files for Data {
@@ -150,7 +151,7 @@ impl Files for Data {
     }
 }
 
-/// `y = 1 - exp(-t/T)`.
+/// First-order lag, `y = 1 - exp(-t/T)`.
 #[derive(Deserialize, JsonSchema)]
 struct Lag {}
 
@@ -178,7 +179,7 @@ impl Model for LagModel {
     }
 }
 
-/// `3/((T s + 1)(s + 1))`.
+/// Linear system `3/((T s + 1)(s + 1))`.
 #[derive(Deserialize, JsonSchema)]
 struct LinearLag {}
 
@@ -209,7 +210,7 @@ impl Model for LinearLagModel {
     }
 }
 
-/// A study file needs a solver in its catalogue; these tests run none.
+/// Solver for the catalogue of study files; these tests never run it.
 #[derive(Deserialize, JsonSchema)]
 struct NoSolver {}
 

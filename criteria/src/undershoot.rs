@@ -1,4 +1,4 @@
-//! Undershoot of a step response: how far it first goes the wrong way.
+//! Undershoot of a step response: its largest excursion in the wrong direction.
 
 use mops_core::{
     Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
@@ -8,13 +8,14 @@ use serde::Deserialize;
 
 use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 
-/// `max(0, max_t (from - y)/(target - from))`, dimensionless: 0.2 is 20 % of the step, to the wrong side.
+/// Undershoot `max(0, max_t (from - y)/(target - from))`, dimensionless: 0.2 is 20 % of the step, in the wrong
+/// direction.
 ///
-/// A plant with a zero in the right half plane has one: its inverse response. With `absolute = true` the excursion
-/// itself, in the unit of the signal: `max(0, from - min_t y)` for a step upwards, `max(0, max_t y - from)` for one
-/// downwards.
+/// A plant with a zero in the right half-plane has an undershoot (inverse response). With `absolute = true` the value
+/// is the excursion itself, in the unit of the signal. It is `max(0, from - min_t y)` for a step upwards,
+/// `max(0, max_t y - from)` for one downwards.
 ///
-/// Less is better. Range: from 0 up. The whole response counts, so that one that swings back beyond `from` later has an undershoot too.
+/// Less is better. Range: from 0 up. The whole response counts: a later swing back beyond `from` is an undershoot too.
 ///
 /// Source: S. P. Boyd, C. H. Barratt, Linear Controller Design (1991), section 8.1.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -22,13 +23,13 @@ use crate::common::{NOT_NEGATIVE, Step, StepOptions};
 pub struct Undershoot {
     /// Signal that is measured.
     pub signal: String,
-    /// Value the signal should settle at; its value at the end of the simulation where absent.
+    /// Value at which the signal should settle; by default its value at the end of the simulation.
     pub target: Option<Quantity>,
-    /// Value before the step; the signal's first value where absent.
+    /// Value before the step; by default the signal's first value.
     pub from: Option<Quantity>,
-    /// Time of the step, 0 s where absent; what comes before is not looked at.
+    /// Time of the step, 0 s by default; earlier values are ignored.
     pub step_time: Option<Quantity>,
-    /// `true` gives the excursion in the unit of the signal instead of a fraction of the step.
+    /// If `true`, the excursion in the unit of the signal instead of a fraction of the step.
     #[serde(default)]
     pub absolute: bool,
 }
@@ -95,7 +96,7 @@ mod tests {
     use crate::common::testing::{assert_near, second_order, simulated, value};
     use mops_core::math;
 
-    /// Step response of `(1 - s)/(s + 1)^2`: smallest at t = 1/2.
+    /// Returns the step response of `(1 - s)/(s + 1)^2`: smallest at t = 1/2.
     fn inverse(t: f64) -> f64 {
         1.0 - (1.0 + 2.0 * t) * math::exp(-t)
     }

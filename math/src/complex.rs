@@ -1,22 +1,22 @@
-//! What complex numbers need of the functions of real ones.
+//! Functions of complex numbers, based on those of real numbers.
 
 use nalgebra::Complex;
 
-/// Absolute value `|z|`.
+/// Returns the absolute value `|z|`.
 #[inline]
 #[must_use]
 pub fn norm(z: Complex<f64>) -> f64 {
     super::hypot(z.re, z.im)
 }
 
-/// Angle of `z` in rad, from -pi to pi.
+/// Returns the angle of `z` in rad, from -pi to pi.
 #[inline]
 #[must_use]
 pub fn arg(z: Complex<f64>) -> f64 {
     super::atan2(z.im, z.re)
 }
 
-/// The number of absolute value `norm` at the angle `arg`, rad.
+/// Returns the number with absolute value `norm` and angle `arg`, rad.
 #[inline]
 #[must_use]
 pub fn from_polar(norm: f64, arg: f64) -> Complex<f64> {
@@ -24,14 +24,14 @@ pub fn from_polar(norm: f64, arg: f64) -> Complex<f64> {
     Complex::new(norm * cos, norm * sin)
 }
 
-/// Exponential, `e^z`.
+/// Returns the exponential `e^z`.
 #[inline]
 #[must_use]
 pub fn exp(z: Complex<f64>) -> Complex<f64> {
     from_polar(super::exp(z.re), z.im)
 }
 
-/// Square root with a real part that is not negative.
+/// Returns the square root with a nonnegative real part.
 #[inline]
 #[must_use]
 pub fn sqrt(z: Complex<f64>) -> Complex<f64> {

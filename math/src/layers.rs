@@ -1,7 +1,9 @@
 //! Edges of the layers of the normal density.
 
-/// `x_0 .. x_256` of 256 layers of equal area `v`: `x_1 = r` begins the tail, `x_0 = v / f(r)`, `x_(i+1) = f^-1(v / x_i + f(x_i))`,
-/// `x_256 = 0`, with `f(x) = exp(-x^2/2)` and `v = r f(r) + sqrt(pi/2) erfc(r / sqrt(2))`, which determine `r`.
+/// Edges `x_0 .. x_256` of 256 layers of equal area `v`.
+///
+/// The tail starts at `x_1 = r`. `x_0 = v / f(r)`, `x_(i+1) = f^-1(v / x_i + f(x_i))` and `x_256 = 0`, with
+/// `f(x) = exp(-x^2/2)` and `v = r f(r) + sqrt(pi/2) erfc(r / sqrt(2))`, which determine `r`.
 ///
 /// Computed with 60 digits, rounded to `f64`.
 #[rustfmt::skip]

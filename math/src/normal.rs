@@ -5,17 +5,19 @@ use rand::Rng;
 use crate::layers::EDGES;
 use crate::{exp, ln};
 
-/// A standard normal random number, by the ziggurat of 256 layers: a number of 64 bits gives a layer and a place in it, which
-/// lies below the density in 99 of 100 cases; wedges and the tail need more numbers.
+/// Returns a standard normal random number by the ziggurat method with 256 layers.
 ///
-/// Source: J. A. Doornik, An Improved Ziggurat Method to Generate Normal Random Samples, University of Oxford (2005); the
-/// tail by G. Marsaglia, Technometrics 6 (1964) 101-102.
+/// A number of 64 bits selects a layer and a position in it, which lies below the density in 99 of 100 cases. Wedges
+/// and the tail need more numbers.
+///
+/// Source: J. A. Doornik, An Improved Ziggurat Method to Generate Normal Random Samples, University of Oxford (2005);
+/// the tail by G. Marsaglia, Technometrics 6 (1964) 101-102.
 pub fn normal<R: Rng + ?Sized>(random: &mut R) -> f64 {
     let density = |x: f64| exp(-0.5 * x * x);
     loop {
         let bits = random.next_u64();
         let layer = (bits & 0xff) as usize;
-        // The upper 52 bits as the mantissa of a number in [2, 4), from which 3 is taken.
+        // The upper 52 bits are the mantissa of a number in [2, 4), from which 3 is subtracted.
         let u = f64::from_bits(bits >> 12 | 1024 << 52) - 3.0;
         let x = u * EDGES[layer];
         if x.abs() < EDGES[layer + 1] {
@@ -31,7 +33,7 @@ pub fn normal<R: Rng + ?Sized>(random: &mut R) -> f64 {
     }
 }
 
-/// A normal random number beyond the edge of the first layer.
+/// Returns a normal random number beyond the edge of the first layer.
 fn tail<R: Rng + ?Sized>(random: &mut R) -> f64 {
     let edge = EDGES[1];
     loop {
@@ -43,7 +45,7 @@ fn tail<R: Rng + ?Sized>(random: &mut R) -> f64 {
     }
 }
 
-/// A random number in (0, 1), both ends excluded, in steps of 2^-52.
+/// Returns a random number in (0, 1), both ends excluded, in steps of 2^-52.
 fn open<R: Rng + ?Sized>(random: &mut R) -> f64 {
     f64::from_bits(random.next_u64() >> 12 | 1023 << 52) - (1.0 - 0.5 * f64::EPSILON)
 }

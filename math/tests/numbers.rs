@@ -27,7 +27,7 @@ fn roots_and_exponentials_of_complex_numbers_agree_with_their_definitions() {
     assert!((complex::norm(Complex::new(3e200, -4e200)) / 5e200 - 1.0).abs() <= f64::EPSILON);
 }
 
-/// Shares below a level are binomial: four standard deviations are exceeded once in 16,000 levels.
+/// Checks shares below a level, which are binomial: four standard deviations are exceeded once in 16,000 levels.
 #[test]
 fn as_many_normal_numbers_lie_below_every_level_as_should() {
     let mut numbers = drawn();
@@ -41,7 +41,7 @@ fn as_many_normal_numbers_lie_below_every_level_as_should() {
     }
 }
 
-/// Moments of order 1 to 4: 0, 1, 0, 3, with variances 1, 2, 15 and 96 over the count.
+/// Checks the moments of order 1 to 4: 0, 1, 0, 3, with variances 1, 2, 15 and 96 divided by the count.
 #[test]
 fn moments_are_those_of_the_normal_distribution() {
     let numbers = drawn();
@@ -51,7 +51,7 @@ fn moments_are_those_of_the_normal_distribution() {
     }
 }
 
-/// Beyond the edge of the first layer the density falls as `exp(-x^2/2)`: mean `phi(r)/Q(r)`.
+/// Checks the mean `phi(r)/Q(r)` beyond the edge of the first layer, where the density falls as `exp(-x^2/2)`.
 #[test]
 fn the_tail_has_its_mean() {
     let edge = 3.654_152_885_361_009;
@@ -59,6 +59,6 @@ fn the_tail_has_its_mean() {
     let mean = math::exp(-0.5 * edge * edge) / (2.0 * std::f64::consts::PI).sqrt() / chance;
     let tail: Vec<f64> = drawn().into_iter().map(f64::abs).filter(|x| *x > edge).collect();
     let found = tail.iter().sum::<f64>() / tail.len() as f64;
-    // Its standard deviation is about 1/r.
+    // The standard deviation of the tail is about 1/r.
     assert!((found - mean).abs() <= 4.0 / edge / (tail.len() as f64).sqrt(), "{found}, not {mean}");
 }

@@ -1,18 +1,18 @@
-//! Between the samples of a signal without content above half the sampling frequency.
+//! Band-limited interpolation of evenly spaced samples, without content above half the sampling frequency.
 
 use std::sync::LazyLock;
 
-/// Samples to either side that a slope is taken from.
+/// Number of samples to either side used for a derivative.
 const REACH: usize = 32;
 
-/// How far the steps between samples may differ from their mean, in shares of it: beyond, there is no sampling frequency.
+/// Largest relative deviation of the steps between samples from their mean; beyond it, there is no sampling frequency.
 pub const EVEN: f64 = 0.01;
 
 /// Weights of the neighbours at 1, 2, .. samples in the first and the second derivative, for a step of 1, by reach.
 ///
-/// Those of the maximally flat differentiator: exact for polynomials of degree `2 reach`, those of the sinc interpolation in the
-/// limit. Source: B. Fornberg, Generation of finite difference formulas on arbitrarily spaced grids, Mathematics of Computation
-/// 51 (1988) 699.
+/// Weights of the maximally flat differentiator: exact for polynomials of degree `2 reach`, equal to sinc interpolation in
+/// the limit. Source: B. Fornberg, Generation of finite difference formulas on arbitrarily spaced grids, Mathematics of
+/// Computation 51 (1988) 699.
 struct Weights {
     first: Vec<f64>,
     second: Vec<f64>,
@@ -34,9 +34,9 @@ impl Weights {
         Self { first, second }
     }
 
-    /// First and second derivative at sample `k`, per step and per step squared.
+    /// Returns the first and second derivative at sample `k`, per step and per step squared.
     ///
-    /// Beyond its ends the signal goes on turned about them.
+    /// Beyond its ends the signal is extended by point reflection.
     fn at(&self, values: &[f64], k: usize) -> (f64, f64) {
         let last = values.len() - 1;
         let before = |i: usize| if k >= i { values[k - i] } else { 2.0 * values[0] - values[i - k] };
@@ -52,18 +52,17 @@ impl Weights {
     }
 }
 
-/// Coefficients `c0 + c1 s + .. + c5 s^5` of the signal from sample `k` (s = 0) to the next (s = 1): values and two
-/// derivatives are those of the band-limited signal through evenly spaced samples.
+/// Returns the coefficients `c0 + c1 s + .. + c5 s^5` of the signal from sample `k` (s = 0) to the next (s = 1). The values
+/// and first two derivatives are those of the band-limited signal through evenly spaced samples.
 ///
-/// Below half of the highest frequency that the samples can show it is off by less than 0.1 % of the amplitude, away from the
-/// ends of the record.
+/// Below half of the Nyquist frequency the error is less than 0.1 % of the amplitude, except near the ends of the record.
 ///
 /// # Panics
-/// If there is no sample `k + 1`.
+/// Panics if there is no sample `k + 1`.
 pub fn piece(values: &[f64], k: usize) -> [f64; 6] {
     let weights = &WEIGHTS[REACH.min(values.len() - 1)];
     let ((a1, a2), (b1, b2)) = (weights.at(values, k), weights.at(values, k + 1));
-    // The quintic through values, slopes and bends at both ends.
+    // Quintic through values, first and second derivatives at both ends.
     let (c0, c1, c2) = (values[k], a1, 0.5 * a2);
     let (rise, slope, bend) = (values[k + 1] - c0 - c1 - c2, b1 - c1 - 2.0 * c2, b2 - 2.0 * c2);
     let c3 = 10.0 * rise - 4.0 * slope + 0.5 * bend;
@@ -72,7 +71,7 @@ pub fn piece(values: &[f64], k: usize) -> [f64; 6] {
     [c0, c1, c2, c3, c4, c5]
 }
 
-/// The polynomial and its derivative at `s`.
+/// Returns the value of the polynomial and of its derivative at `s`.
 pub fn polynomial(c: &[f64; 6], s: f64) -> (f64, f64) {
     c.iter().rev().fold((0.0, 0.0), |(value, slope), &c| (value * s + c, slope * s + value))
 }
@@ -85,7 +84,7 @@ mod tests {
     #[test]
     fn polynomials_are_met_to_rounding() {
         let cubic = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t - 0.1 * t * t * t;
-        // A turn about the ends bends a cubic there: the middle is looked at, with the reach that remains.
+        // Point reflection distorts a cubic at the ends: only the middle is checked, with the remaining reach.
         let values: Vec<f64> = (0..5).map(|i| cubic(f64::from(i))).collect();
         let weights = Weights::of(2);
         assert!((weights.at(&values, 2).0 - (-2.0 + 2.0 - 0.3 * 4.0)).abs() < 1e-12);

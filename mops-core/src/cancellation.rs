@@ -1,22 +1,22 @@
-//! How whoever waits for a run asks its simulations to end.
+//! Cancellation of the simulations of a run.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// The run is over before the solver is done.
+/// Reason why a run ends before its solver finishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Halt {
-    /// The budget, of evaluations or of time, is spent.
+    /// Budget of evaluations or of time spent.
     Budget,
-    /// The user ended it.
+    /// Interrupted by the user.
     Interrupted,
 }
 
-/// A request to end, shared by all clones. A simulation asks for it at every step and then fails with
-/// [`crate::Failure::Cancelled`]; a run keeps no such simulation, and ends.
+/// A cancellation request, shared by all clones. A simulation polls the request at every step and then fails with
+/// [`crate::Failure::Cancelled`]. A run discards such simulations and ends.
 ///
-/// There are two levels. A search ends at the first. What concludes it (the reported point in every case, its errors, its
-/// plots) goes on with a [`Cancellation::patient`] view and ends at the second.
+/// There are two levels. A search ends at the first. The conclusion of a search (the reported point in every case, its
+/// errors, its plots) uses a [`Cancellation::patient`] view and ends at the second.
 #[derive(Debug, Clone, Default)]
 pub struct Cancellation {
     requests: Arc<AtomicU8>,
@@ -28,7 +28,7 @@ const INTERRUPTED: u8 = 2;
 const INSISTED: u8 = 4;
 
 impl Cancellation {
-    /// Asks searches to end. An interruption outweighs a spent budget.
+    /// Requests the end of searches. An interruption takes precedence over a spent budget.
     pub fn request(&self, why: Halt) {
         let bit = match why {
             Halt::Budget => BUDGET,
@@ -37,18 +37,18 @@ impl Cancellation {
         self.requests.fetch_or(bit, Ordering::Relaxed);
     }
 
-    /// Asks conclusions to end too, where searches were asked to.
+    /// Requests the end of conclusions too, if the end of searches was requested.
     pub fn insist(&self) {
         self.requests.fetch_or(INSISTED, Ordering::Relaxed);
     }
 
-    /// The view of what concludes a search.
+    /// Returns the view for the conclusion of a search.
     #[must_use]
     pub fn patient(&self) -> Self {
         Self { requests: Arc::clone(&self.requests), patient: true }
     }
 
-    /// Why an end was requested, if it was.
+    /// Returns the reason of the request, if there is one.
     pub fn requested(&self) -> Option<Halt> {
         let requests = self.requests.load(Ordering::Relaxed);
         if self.patient && requests & INSISTED == 0 {

@@ -1,4 +1,4 @@
-//! A case: one situation in which every criterion is evaluated.
+//! Cases: situations in which every criterion is evaluated.
 
 use crate::cancellation::Cancellation;
 use crate::experiment::{Experiment, Input, Role};
@@ -8,28 +8,28 @@ use crate::experiment::{Experiment, Input, Role};
 pub struct Case {
     /// Name, unique in the study.
     pub name: String,
-    /// Values of parameters that hold in this case, in the models' units.
+    /// Parameter values of this case, in the units of the models.
     pub parameters: Vec<(String, f64)>,
-    /// Inputs that are not zero, by name, in the models' units. In a window of a record they hold what was before at negative
-    /// times, for actuators that remember or come late.
+    /// Inputs that are not zero, by name, in the units of the models. In a window of a record, negative times contain the
+    /// input before the window, for actuators with memory or delay.
     pub inputs: Vec<(String, Input)>,
-    /// What was measured.
+    /// Measurement, if there is one.
     pub experiment: Option<Experiment>,
-    /// End of the simulation, s; the models' own where absent.
+    /// End of the simulation, s; `None` for the horizon of the model.
     pub horizon: Option<f64>,
-    /// What a clock shows at time 0, s: not 0 in a window of a record, for effects that depend on time.
+    /// Clock time at time 0, s: not 0 in a window of a record, for time-dependent effects.
     pub begins: f64,
-    /// Asks the simulations of this case to end.
+    /// Cancellation of the simulations of this case.
     pub cancellation: Cancellation,
 }
 
 impl Case {
-    /// The input of that name, if something drives it.
+    /// Returns the input with this name, if it is driven.
     pub fn input(&self, name: &str) -> Option<&Input> {
         self.inputs.iter().find(|(key, _)| key == name).map(|(_, input)| input)
     }
 
-    /// What the case is used for: cases without a measurement count as calibration.
+    /// Returns the role of the case: cases without a measurement count as calibration.
     pub fn role(&self) -> Role {
         self.experiment.as_ref().map_or(Role::Calibration, |experiment| experiment.role)
     }

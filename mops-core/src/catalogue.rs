@@ -1,4 +1,4 @@
-//! The catalogue: every kind of model, criterion and solver that a study file can name, and the studies that are shipped.
+//! Catalogue of all kinds of models, criteria and solvers that a study file can name, and of the shipped studies.
 
 use std::sync::Arc;
 
@@ -14,33 +14,33 @@ use crate::mistake::Mistake;
 use crate::model::Model;
 use crate::solver::Solver;
 
-/// Makes a model with effects of a model that has ports: the seam to the simulation, which core does not know.
+/// Function that adds effects to a model with ports. It is injected because core does not contain the simulation.
 pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, Mistake>;
 
-/// Options of a kind of model, as they stand in a study file; their documentation is the kind's page in the manual.
+/// Options of a kind of model, as written in a study file; their documentation is the manual page of the kind.
 pub trait ModelOptions: DeserializeOwned + JsonSchema {
     /// Name of the kind in study files.
     const KIND: &'static str;
 
-    /// Checks the options and makes the model.
+    /// Checks the options and builds the model.
     ///
     /// # Errors
-    /// Options that contradict each other; the mistake names the key.
+    /// Returns an error if options contradict each other; it names the key.
     fn build(self) -> Result<Box<dyn Model>, Mistake>;
 }
 
-/// Options of a kind of criterion, as they stand in a study file; their documentation is the kind's page in the manual.
+/// Options of a kind of criterion, as written in a study file; their documentation is the manual page of the kind.
 pub trait CriterionOptions: CriterionSpec + DeserializeOwned + JsonSchema + 'static {
     /// Name of the kind in study files.
     const KIND: &'static str;
 }
 
-/// Options of a kind of solver, as they stand in a study file; their documentation is the kind's page in the manual.
+/// Options of a kind of solver, as written in a study file; their documentation is the manual page of the kind.
 pub trait SolverOptions: DeserializeOwned + JsonSchema + Send + Sync + 'static {
     /// Name of the kind in study files.
     const KIND: &'static str;
 
-    /// Makes a solver with these options.
+    /// Builds a solver with these options.
     fn build(&self) -> Box<dyn Solver>;
 }
 
@@ -51,18 +51,18 @@ type Reader<T> = fn(ValueDeserializer<'_>) -> Result<T, toml::de::Error>;
 pub struct ModelKind {
     /// Name in study files.
     pub name: &'static str,
-    /// Schema of its options, with their documentation.
+    /// Returns the schema of the options, with their documentation.
     pub schema: fn() -> Schema,
     pub(crate) read: Reader<Result<Box<dyn Model>, Mistake>>,
 }
 
 impl ModelKind {
-    /// The kind with options `O`.
+    /// Creates the kind with options `O`.
     pub fn of<O: ModelOptions>() -> Self {
         Self { name: O::KIND, schema: schema_of::<O>, read: |value| O::deserialize(value).map(O::build) }
     }
 
-    /// A model of this kind with default options, where every option has a default.
+    /// Returns a model of this kind with default options, if every option has a default.
     pub fn default_model(&self) -> Option<Box<dyn Model>> {
         (self.read)(ValueDeserializer::parse("{}").expect("an empty table is TOML")).ok()?.ok()
     }
@@ -73,13 +73,13 @@ impl ModelKind {
 pub struct CriterionKind {
     /// Name in study files.
     pub name: &'static str,
-    /// Schema of its options, with their documentation.
+    /// Returns the schema of the options, with their documentation.
     pub schema: fn() -> Schema,
     pub(crate) read: Reader<Box<dyn CriterionSpec>>,
 }
 
 impl CriterionKind {
-    /// The kind with options `O`.
+    /// Creates the kind with options `O`.
     pub fn of<O: CriterionOptions>() -> Self {
         Self {
             name: O::KIND,
@@ -94,13 +94,13 @@ impl CriterionKind {
 pub struct SolverKind {
     /// Name in study files.
     pub name: &'static str,
-    /// Schema of its options, with their documentation.
+    /// Returns the schema of the options, with their documentation.
     pub schema: fn() -> Schema,
     pub(crate) read: Reader<SolverChoice>,
 }
 
 impl SolverKind {
-    /// The kind with options `O`.
+    /// Creates the kind with options `O`.
     pub fn of<O: SolverOptions>() -> Self {
         Self {
             name: O::KIND,
@@ -112,14 +112,14 @@ impl SolverKind {
         }
     }
 
-    /// A solver of this kind with default options.
+    /// Returns a solver of this kind with default options.
     pub fn default_choice(&self) -> SolverChoice {
         let empty = ValueDeserializer::parse("{}").expect("an empty table is TOML");
         (self.read)(empty).expect("every option of a solver has a default")
     }
 }
 
-/// A kind of solver with its options: makes as many solvers as are needed.
+/// A kind of solver with its options: creates any number of solvers.
 #[derive(Clone)]
 pub struct SolverChoice {
     /// Name of the kind.
@@ -128,24 +128,24 @@ pub struct SolverChoice {
 }
 
 impl SolverChoice {
-    /// A new solver.
+    /// Creates a new solver.
     pub fn make(&self) -> Box<dyn Solver> {
         (self.make)()
     }
 }
 
-/// Everything a study file can name.
+/// All kinds and studies that a study file or a command can name.
 #[derive(Clone, Default)]
 pub struct Catalogue {
     /// Models.
     pub models: Vec<ModelKind>,
     /// Criteria.
     pub criteria: Vec<CriterionKind>,
-    /// Solvers; the first is taken where a study names none.
+    /// Solvers; the first is the default.
     pub solvers: Vec<SolverKind>,
-    /// Effects that models may lack.
+    /// Candidate effects that a model may lack.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// What puts effects into a model; without it no study can name one.
+    /// Function that adds effects to a model; without it no study can name an effect.
     pub augment: Option<Augment>,
     /// Studies known by name.
     pub studies: Vec<KnownStudy>,
@@ -196,7 +196,7 @@ impl Catalogue {
     }
 }
 
-/// The schema of a type, complete in itself.
+/// Returns the self-contained schema of a type.
 pub fn schema_of<T: JsonSchema>() -> Schema {
     let mut settings = SchemaSettings::draft07();
     settings.inline_subschemas = true;

@@ -1,4 +1,4 @@
-//! From a run to its outcome: validation data, standard errors, tables.
+//! Conclusion of a run: validation data, standard errors, tables.
 
 use std::sync::Arc;
 
@@ -19,22 +19,22 @@ use crate::solver::{Oracle, Stop};
 use crate::study::{Study, Task};
 use crate::trade_offs::Pareto;
 
-/// How a run ended, as far as the run itself does not know.
+/// End of a run, as far as the run itself does not record it.
 #[derive(Debug, Clone, Copy)]
 pub struct Ending {
-    /// Why it stopped.
+    /// Reason for stopping.
     pub stop: Stop,
-    /// Whether one criterion can be improved at no cost.
+    /// Pareto optimality of the result.
     pub pareto: Pareto,
     /// Wall-clock time, s.
     pub seconds: f64,
 }
 
-/// Concludes a run: estimates the tuners that are local to selection and validation experiments, and fills in the outcome.
-/// Returns it with the evaluation it reports.
+/// Concludes a run: estimates the local tuners of selection and validation experiments, and fills in the outcome. Returns
+/// the outcome with the evaluation it reports.
 ///
-/// Of a run that was asked to end it reports what is known, and the rest as far as the simulations of the conclusion are let
-/// go on ([`crate::Cancellation::insist`]); a warning says where something is missing.
+/// A cancelled run reports the available results. Remaining simulations run until cancellation is insisted on
+/// ([`crate::Cancellation::insist`]); a warning reports missing parts.
 pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcome, Evaluation) {
     let problem = &run.problem().concluding();
     let study = Arc::clone(problem.study());
@@ -45,7 +45,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let mut simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
     let mut warnings = study.warnings.clone();
 
-    // Experiments whose local tuners no criterion shows.
+    // Cases whose local tuners no criterion determines.
     let mut unknown = Vec::new();
     for case in 0..study.cases.len() {
         if study.cases[case].role() == Role::Calibration || ending.stop == Stop::Interrupted || ended_early {
@@ -89,7 +89,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         });
     if problem.is_cancelled() {
         warnings.push(
-            "the run was ended before all of the result was computed: values, errors or plots are missing".to_owned(),
+            "the run was cancelled before the result was complete: values, errors or plots are missing".to_owned(),
         );
     }
     let failures = run
@@ -139,9 +139,9 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     (outcome, best)
 }
 
-/// An evaluation in every case. Of a run that was asked to end: as it is known, where no more can be simulated.
+/// Returns the evaluation in every case. A cancelled run keeps the available evaluation if no more can be simulated.
 fn whole(problem: &Problem, known: Evaluation, ended_early: bool) -> Evaluation {
-    // Where nothing was simulated in time, nothing will be.
+    // Without any simulation so far, none will follow.
     if ended_early && (known.readings.iter().all(Option::is_some) || known.readings.iter().all(Option::is_none)) {
         return known;
     }
@@ -149,11 +149,11 @@ fn whole(problem: &Problem, known: Evaluation, ended_early: bool) -> Evaluation 
     if all.is_cancelled() { known } else { all }
 }
 
-/// Points of a front in a result, at most.
+/// Maximum number of points of a Pareto front in a result.
 const LONGEST_FRONT: usize = 200;
 
-/// The points of the front by their first criterion, spread evenly where there are many; of a single design, the design
-/// itself.
+/// Returns the points of the Pareto front in order of the first criterion, thinned evenly if there are many. For a single
+/// design, returns the design itself.
 fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<serde_json::Value> {
     let study = run.problem().study();
     let front = run.front();
@@ -164,14 +164,14 @@ fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<serde_json::Value> {
     let objectives: Vec<f64> = front.iter().flat_map(|&i| row(i).iter().copied()).collect();
     let most = if run.shape().points > 0 { run.shape().points + m + 1 } else { LONGEST_FRONT };
     let mut kept: Vec<usize> = front::thinned(&objectives, m, most).into_iter().map(|i| front[i]).collect();
-    // The point that is reported is one of them.
+    // The reported point is part of the front.
     let reported = run.archive().iter().position(|record| record.tuners == best.tuners);
     kept.extend(reported.filter(|i| front.contains(i) && !kept.contains(i)));
     kept.sort_by(|&a, &b| front::compare(row(a), row(b)));
     kept.into_iter().map(|i| outcome::front_point(study, run.evaluation(i))).collect()
 }
 
-/// A number to six significant digits, so that no rounding error shows.
+/// Returns a number with six significant digits, to hide rounding errors.
 fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
@@ -181,7 +181,7 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
         let tuner = &study.tuners[i];
         let side = tuner.at_bound(best.tuners[i])?;
         Some(format!(
-            "`{}` sits at its {side} bound {}: the optimum depends on that bound",
+            "`{}` is at its {side} bound {}: the optimum depends on this bound",
             tuner.name,
             tuner.unit.amount(rounded(best.tuners[i]))
         ))
@@ -189,11 +189,11 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
     problem.active().iter().filter_map(at_bound).collect()
 }
 
-/// Confidence of the intervals of a calibration's parameters.
+/// Confidence level of the parameter intervals of a calibration.
 const LEVEL: f64 = 0.95;
 
-/// Standard errors of the active tuners, to first order ([`identification::Covariance`]), and intervals by Student's t. NaN where
-/// the data do not determine a tuner.
+/// Returns the standard errors of the active tuners, to first order ([`identification::Covariance`]), and intervals by
+/// Student's t. NaN if the data do not determine a tuner.
 fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) -> Vec<ParameterReport> {
     let study = problem.study();
     let report = |(k, &i): (usize, &usize)| {
@@ -205,7 +205,7 @@ fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) 
             name: tuner.name.clone(),
             value,
             std_error: spread.map_or(f64::NAN, |spread| spread.deviation),
-            // What lies beyond a bound was excluded beforehand.
+            // Values beyond a bound are excluded a priori.
             interval95: [value - half, value + half].map(|end| end.clamp(tuner.bounds[0], tuner.bounds[1])),
             unit: tuner.unit.to_string(),
         }
@@ -213,19 +213,19 @@ fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) 
     problem.active().iter().enumerate().map(report).collect()
 }
 
-/// That tuners are local to a case in which no criterion shows them.
+/// Returns a warning that no criterion of a case determines its local tuners.
 fn unknown_warning(part: &Problem, case: usize) -> String {
     let study = part.study();
     let local: Vec<String> = part.active().iter().map(|&i| format!("`{}`", study.tuners[i].name)).collect();
     format!(
-        "no criterion of `{}` can tell {}, which belong to it alone: they keep their start values, and the errors of `{0}` are \
-         not reported; give it a criterion to minimise, such as `fit`",
+        "no criterion of `{}` determines its local tuners {}: they keep their initial guess, and the errors of `{0}` are not \
+         reported; add a criterion to minimise, such as `fit`",
         study.cases[case].name,
         local.join(", ")
     )
 }
 
-/// How well every experiment is met; those in `unknown` have no errors.
+/// Returns the fit of every experiment; those in `unknown` have no errors.
 fn experiments(problem: &Problem, best: &Evaluation, unknown: &[usize]) -> Vec<ExperimentReport> {
     let study = problem.study();
     let mut reports = Vec::new();
@@ -246,7 +246,7 @@ fn experiments(problem: &Problem, best: &Evaluation, unknown: &[usize]) -> Vec<E
     reports
 }
 
-/// Whether the residuals that the estimates rest on are white, a sentence for every channel.
+/// Returns one sentence per calibration channel on the whiteness of its residuals.
 fn whiteness_words(experiments: &[ExperimentReport]) -> Vec<String> {
     let fitted = experiments.iter().filter(|experiment| experiment.role == Role::Calibration);
     let channels = fitted.flat_map(|experiment| experiment.channels.iter().map(move |channel| (experiment, channel)));

@@ -1,4 +1,4 @@
-//! What a criterion is: a number for every analysis, with its unit, its sense and its range.
+//! Criteria: a number for every analysis, with its unit, sense and range.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,72 +9,74 @@ use crate::model::{Analysis, AnalysisKind, Interface};
 use crate::samples::Samples;
 use crate::unit::Unit;
 
-/// A criterion as the study gives it: names and quantities not yet checked against a model.
+/// Options of a criterion as written in the study; names and quantities are not yet checked against a model.
 pub trait CriterionSpec: Send + Sync {
-    /// What it reads; a study refuses it for a model that gives something else.
+    /// Returns the kind of analysis that the criterion reads. A study rejects models with another kind of analysis.
     fn reads(&self) -> AnalysisKind {
         AnalysisKind::Time
     }
 
-    /// Checks names and units against what the model it reads offers.
+    /// Checks names and units against the interface of the model.
     ///
     /// # Errors
-    /// An unknown signal, a quantity in a wrong unit, an impossible option; the mistake names the option.
+    /// Returns an error for an unknown signal, a quantity in a wrong unit or an invalid option. The error names the option.
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake>;
 
-    /// Whether it compares with a measurement, so that it applies only to cases that have one.
+    /// Returns the name of the measured signal if the criterion compares with a measurement; it then applies only to cases
+    /// that have one.
     fn needs_measurement(&self) -> Option<&str> {
         None
     }
 }
 
-/// A criterion whose names and units have been checked: a number for every analysis.
+/// A criterion with checked names and units: a number for every analysis.
 pub trait Criterion: Send + Sync {
-    /// Unit of the value.
+    /// Returns the unit of the value.
     fn unit(&self) -> Unit;
 
-    /// Names of the signals it reads.
+    /// Returns the names of the signals that the criterion reads.
     fn signals(&self) -> Vec<String>;
 
-    /// Whether the case has what the value needs, whatever the analysis; every case has where a criterion says nothing.
+    /// Checks that the case provides all data that the criterion needs, whatever the analysis. By default, every case does.
     ///
     /// # Errors
-    /// The case lacks something: what, and the way out.
+    /// Returns an error if data are missing: which, and how to provide them.
     fn suits(&self, _case: &Case) -> Result<(), Mistake> {
         Ok(())
     }
 
-    /// The value for one case.
+    /// Computes the value for one case.
     ///
     /// # Errors
-    /// A response for which the criterion is not defined: one sentence.
+    /// Returns one sentence if the criterion is not defined for the response.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
 
-    /// Which values are better; the study says it where a criterion does not.
+    /// Returns which values are better; [`Sense::Open`] if the study decides.
     fn sense(&self) -> Sense {
         Sense::Open
     }
 
-    /// The smallest and the largest value it can have, in its unit; a demand beyond them is a mistake.
+    /// Returns the smallest and the largest possible value, in the criterion's unit. A demand outside this range is an
+    /// error.
     fn range(&self) -> [f64; 2] {
         [f64::NEG_INFINITY, f64::INFINITY]
     }
 
-    /// What it assumes where an option is absent, in one sentence, to be noted when the study is checked.
+    /// Returns the assumption made for an absent option, as one sentence. The check of the study prints it as a note.
     fn assumption(&self) -> Option<String> {
         None
     }
 
-    /// The demand where the study gives none; without one, a criterion that is more than watched needs its own.
+    /// Returns the default demand. Without one, a criterion with a usage other than monitor needs a demand in the study.
     fn natural_demand(&self) -> Option<f64> {
         None
     }
 
-    /// The derivative of the value, residuals included, along a tangent of the analysis. Where a criterion says nothing
-    /// else it is the central difference of two analyses moved by `tangent.reach` to both sides, without simulation.
+    /// Computes the directional derivative of the value and of its residuals along a tangent of the analysis. The default is
+    /// a central difference of two analyses moved by `± tangent.reach`, without simulation.
     ///
     /// # Errors
-    /// A response for which the criterion has no derivative: one sentence.
+    /// Returns one sentence if the criterion has no derivative for the response.
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
         let Tangent { analysis, along, reach, .. } = *tangent;
         let [high, low] = [reach, -reach].map(|distance| self.value(case, &analysis.moved(along, distance)));
@@ -87,13 +89,13 @@ pub trait Criterion: Send + Sync {
         })
     }
 
-    /// The samples that its residuals compare with: the standard errors of a calibration rest on their noise. `None`, the
-    /// default, where there are no residuals, or where nothing is known of them but that they have one variance.
+    /// Returns the measured samples behind the residuals; their noise determines the standard errors of a calibration. The
+    /// default `None` means: no residuals, or residuals of which only equal variance is assumed.
     fn samples(&self, _case: &Case) -> Option<Samples> {
         None
     }
 
-    /// Levels to draw beside the signals, where the criterion has some; `limit` is the value that scales to 1.
+    /// Returns levels to draw next to the signals, if any; `limit` is the value that scales to 1.
     fn marks(&self, _limit: Option<f64>, _analysis: &Analysis) -> Vec<Mark> {
         Vec::new()
     }
@@ -102,33 +104,33 @@ pub trait Criterion: Send + Sync {
 /// Which values of a criterion are better.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sense {
-    /// Smaller ones: a demand is the largest that is accepted.
+    /// Smaller values: a demand is an upper limit.
     Less,
-    /// Larger ones: a demand is the smallest that is accepted.
+    /// Larger values: a demand is a lower limit.
     More,
-    /// Those near a target: a demand alone is ambiguous.
+    /// Values near a target: a single demand is ambiguous.
     Target,
-    /// The kind does not say, as for the value of a signal: a demand is the largest that is accepted, and a pair `good`, `bad`
-    /// says it either way.
+    /// Not fixed by the kind, as for the value of a signal. A demand is an upper limit; a pair `good`, `bad` sets either
+    /// direction.
     #[default]
     Open,
 }
 
-/// Where a derivative is taken, and along what.
+/// Point and direction of a derivative.
 #[derive(Debug, Clone, Copy)]
 pub struct Tangent<'a> {
     /// The analysis.
     pub analysis: &'a Analysis,
-    /// The value of the criterion for it.
+    /// Value of the criterion for this analysis.
     pub value: &'a Value,
     /// Derivative of the analysis.
     pub along: &'a Analysis,
-    /// Distance along the derivative within which the slope is to describe the criterion.
+    /// Distance along the derivative within which the derivative is to describe the criterion.
     pub reach: f64,
 }
 
-/// Share by which a criterion that is missed exceeds 1 at least: above what rounding may take a constraint beyond its demand
-/// ([`crate::FEASIBLE`]), so that nothing that was missed is ever met.
+/// Smallest share by which the number of a missed criterion exceeds 1. The share is larger than the constraint tolerance
+/// [`crate::FEASIBLE`], so that a missed criterion never meets its demand.
 const LEAST_MISS: f64 = 1e-5;
 
 /// The value of a criterion.
@@ -136,22 +138,22 @@ const LEAST_MISS: f64 = 1e-5;
 pub struct Value {
     /// The number, in the criterion's unit.
     pub number: f64,
-    /// Where the number is a sum of squares, its terms before squaring: `number = sum r_i^2`.
+    /// Terms before squaring if the number is a sum of squares: `number = sum r_i^2`; else empty.
     pub residuals: Vec<f64>,
-    /// What a reader must know of the number, such as `not settled at the end`.
+    /// Remark on the number, such as `not settled at the end`.
     pub note: Option<&'static str>,
-    /// What the criterion asks for was never reached. `number` then only tells how far it was, see [`Missed`].
+    /// Set if the condition of the criterion was never reached. `number` is then a measure of the distance, see [`Missed`].
     pub missed: Option<Missed>,
 }
 
-/// What a criterion asks for, such as that a response settles, was not reached in a simulation or at any frequency.
+/// A condition of a criterion, such as settling, that was not reached in a simulation or at any frequency.
 ///
-/// The criterion has no value then, and no demand is met. So that solvers still see which way is better, it has the number
-/// `h (1 + e/(e + b))`: `h` is the time in which it could have been reached (1 where the criterion is no time), `e` the distance
-/// of the response from where it should be and `b` what counts as near. [`crate::Demand::scaled`] says how it counts.
+/// The criterion then has no value, and no demand is met. To guide solvers, the number is `h (1 + e/(e + b))`. `h` is the
+/// time available to reach the condition (1 if the criterion is not a time). `e` is the distance of the response from its
+/// target and `b` the tolerance. [`crate::Demand::scaled`] defines the scaled value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
-    /// The time in which it could have been reached, s; `None` where the criterion is no time.
+    /// Time available to reach the condition, s; `None` if the criterion is not a time.
     pub horizon: Option<f64>,
 }
 
@@ -162,53 +164,53 @@ impl From<f64> for Value {
 }
 
 impl Value {
-    /// A number with something to know about it.
+    /// Returns a value with a remark.
     pub fn noted(number: f64, note: &'static str) -> Self {
         Self { number, note: Some(note), ..Self::default() }
     }
 
-    /// Nothing was reached: within `horizon` in s, where the criterion is a time; `distance` is that of the response from where
-    /// it should be, `near` what counts as near, in the same unit.
+    /// Returns the value of a missed criterion. `horizon` is the available time in s if the criterion is a time. `distance`
+    /// is the distance of the response from its target and `near` the tolerance, in the same unit.
     pub fn missed(horizon: Option<f64>, distance: f64, near: f64, note: &'static str) -> Self {
         let share = (distance / (distance + near)).clamp(LEAST_MISS, 1.0);
         let number = horizon.unwrap_or(1.0) * (1.0 + if share.is_nan() { 1.0 } else { share });
         Self { number, note: Some(note), missed: Some(Missed { horizon }), ..Self::default() }
     }
 
-    /// The derivative of [`Value::sum_of_squares`], given the residuals and their derivatives.
+    /// Returns the derivative of [`Value::sum_of_squares`], given the residuals and their derivatives.
     pub fn slope_of_squares(residuals: &[f64], slopes: Vec<f64>) -> Self {
         let number = residuals.iter().zip(&slopes).map(|(r, slope)| 2.0 * r * slope).sum();
         Self { number, residuals: slopes, ..Self::default() }
     }
 
-    /// The sum of squares of `residuals`.
+    /// Returns the sum of squares of `residuals`.
     pub fn sum_of_squares(residuals: Vec<f64>) -> Self {
         Self { number: residuals.iter().map(|r| r * r).sum(), residuals, ..Self::default() }
     }
 }
 
-/// What a study does with a criterion.
+/// Usage of a criterion in a study.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Usage {
-    /// It enters the objective.
+    /// Part of the objective.
     #[default]
     Minimise,
-    /// Its scaled value must be at most 1.
+    /// Constraint: the scaled value must be at most 1.
     Inequality,
-    /// Its scaled value must be 1.
+    /// Constraint: the scaled value must be 1.
     Equality,
-    /// It is only reported.
+    /// Reported only.
     Monitor,
 }
 
-/// A level of a signal that a criterion looks at, to be drawn in plots.
+/// A level of a signal used by a criterion, to be drawn in plots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
     /// The signal.
     pub signal: String,
-    /// What the level is, in a word or two.
+    /// Short name of the level.
     pub label: String,
-    /// Where it lies, in the signal's unit.
+    /// Value of the level, in the signal's unit.
     pub level: f64,
 }

@@ -1,37 +1,37 @@
-//! Demands: how the value of a criterion is scaled, and which demands make sense.
+//! Demands: scaling of criterion values, and validity of demands.
 
 use crate::criterion::{Missed, Sense, Value};
 
-/// How a value is scaled.
+/// Scaling of a criterion value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Demand {
-    /// At most this positive number: divided by it.
+    /// Upper limit, positive: the value is divided by it.
     AtMost(f64),
-    /// At least this number, which is not 0.
+    /// Lower limit, not 0.
     AtLeast(f64),
-    /// 0 at `good`, 1 at `bad`, either way round.
+    /// Scaled value 0 at `good` and 1 at `bad`, in either direction.
     Pair {
         /// Scaled value 0.
         good: f64,
         /// Scaled value 1.
         bad: f64,
     },
-    /// Nothing was asked for: the criterion is only watched, and its scaled value is NaN.
+    /// No demand: the criterion is only monitored, and its scaled value is NaN.
     None,
 }
 
 /// A scaled value, and its derivative with respect to the number of the criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaled {
-    /// The scaled value: at most 1 where the demand is met.
+    /// Scaled value; at most 1 if the demand is met.
     pub value: f64,
-    /// Its derivative.
+    /// Derivative of the scaled value.
     pub slope: f64,
 }
 
 impl Demand {
-    /// The scaled value of a number that was reached: `c/d` at most `d`, `1 + (d - c)/|d|` at least `d`, `(c - good)/(bad - good)`
-    /// for a pair.
+    /// Returns the scaled value of a number. The formulas for `c` are `c/d` for at most `d`, `1 + (d - c)/|d|` for at least
+    /// `d`, and `(c - good)/(bad - good)` for a pair.
     pub fn scale(&self, value: f64) -> f64 {
         match *self {
             Self::AtMost(demand) => value / demand,
@@ -41,7 +41,7 @@ impl Demand {
         }
     }
 
-    /// The derivative of [`Demand::scale`].
+    /// Returns the derivative of [`Demand::scale`].
     pub fn slope(&self) -> f64 {
         match *self {
             Self::AtMost(demand) => 1.0 / demand,
@@ -51,8 +51,9 @@ impl Demand {
         }
     }
 
-    /// The scaled value of a criterion. What was missed counts `max(1, h/d) (1 + e/(e + b))` for a time at most `d`, with the
-    /// horizon `h`, and `1 + e/(e + b)` else: above 1 in any case.
+    /// Returns the scaled value of a criterion. A missed criterion counts as `max(1, h/d) (1 + e/(e + b))` for a time at
+    /// most `d` with the horizon `h`. Any other missed criterion counts as `1 + e/(e + b)`. Both exceed 1; [`Missed`]
+    /// defines `e` and `b`.
     pub fn scaled(&self, value: &Value) -> Scaled {
         let unit = match (value.missed, *self) {
             (_, Self::None) => return Scaled { value: f64::NAN, slope: f64::NAN },
@@ -64,7 +65,7 @@ impl Demand {
         Scaled { value: value.number / unit, slope: 1.0 / unit }
     }
 
-    /// The value that scales to 1.
+    /// Returns the value that scales to 1.
     pub fn limit(&self) -> Option<f64> {
         match *self {
             Self::AtMost(demand) | Self::AtLeast(demand) => Some(demand),
@@ -73,7 +74,7 @@ impl Demand {
         }
     }
 
-    /// Whether larger values scale to smaller ones.
+    /// Returns true if larger values scale to smaller ones.
     pub fn asks_for_more(&self) -> bool {
         match *self {
             Self::AtLeast(_) => true,
@@ -82,8 +83,8 @@ impl Demand {
         }
     }
 
-    /// The demand for one number `d` of a criterion of this sense; `None` where the sense needs more than a number, or the
-    /// number is 0 or of the wrong sign. `equal` asks for the number itself.
+    /// Returns the demand for one number `d` of a criterion with this sense. `None` if the sense needs more than a number,
+    /// or if the number is 0 or has the wrong sign. `equal` demands the number itself.
     pub fn of(number: f64, sense: Sense, equal: bool) -> Option<Self> {
         match sense {
             _ if !number.is_finite() || number == 0.0 => None,
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_missed_is_never_met_whatever_the_demand_and_the_horizon() {
+    fn a_missed_criterion_meets_no_demand_whatever_the_horizon() {
         let settling = |distance| Value::missed(Some(5.0), distance, 0.02, "not settled at the end");
         for (demand, least) in [(1.0, 5.0), (5.0, 1.0), (10.0, 1.0)] {
             let scaled = |distance| Demand::AtMost(demand).scaled(&settling(distance)).value;

@@ -1,23 +1,23 @@
-//! The user's mistakes: one message with the place, the fact and the way out.
+//! User errors: one message with the location, the description and the suggested fix.
 
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A text that positions point into: a study file, or a data file.
+/// A text that locations refer to: a study file or a data file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
-    /// Path as the user wrote it.
+    /// Path as written by the user.
     pub name: String,
-    /// The whole text; empty for binary files.
+    /// Contents of the file; empty for binary files.
     pub text: String,
 }
 
 impl Source {
-    /// A text file as it was read; a byte order mark is dropped.
+    /// Creates a source from the bytes of a text file, without a byte order mark.
     ///
     /// # Errors
-    /// Bytes that are not UTF-8, with the place of the first one.
+    /// Returns an error if the bytes are not UTF-8, with the location of the first invalid one.
     pub fn from_bytes(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
         let source =
             |text: &str| Self { name: name.to_owned(), text: text.strip_prefix('\u{feff}').unwrap_or(text).to_owned() };
@@ -42,49 +42,49 @@ impl Source {
     }
 }
 
-/// A mistake in what the user gave: the study, its data or the command line.
+/// An error in the user's input: the study, its data or the command line.
 ///
-/// Numerical trouble is never a diagnostic: it is a value ([`crate::Failure`]).
+/// Numerical failures are not diagnostics but values ([`crate::Failure`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// The fact, one sentence without a full stop.
+    /// Description, one sentence without a full stop.
     pub message: String,
-    /// What the marked place is, in a few words.
+    /// Label of the marked location, a few words.
     pub label: Option<String>,
-    /// The way out.
+    /// Suggested fix.
     pub help: Option<String>,
-    /// Where: the text and the range of bytes in it; `0..0` is the file as a whole.
+    /// Location: the text and a byte range in it; `0..0` denotes the complete file.
     pub place: Option<(Arc<Source>, Range<usize>)>,
 }
 
 impl Diagnostic {
-    /// A mistake without a place yet.
+    /// Creates an error without a location.
     pub fn new(message: impl Into<String>) -> Self {
         Self { message: message.into(), label: None, help: None, place: None }
     }
 
-    /// Adds the way out.
+    /// Adds a suggested fix.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Adds what the marked place is.
+    /// Adds a label of the marked location.
     #[must_use]
     pub fn with_label(mut self, label: impl Into<String>) -> Self {
         self.label = Some(label.into());
         self
     }
 
-    /// Adds the place: bytes `span` of `source`.
+    /// Adds the location: bytes `span` of `source`.
     #[must_use]
     pub fn at(mut self, source: &Arc<Source>, span: Range<usize>) -> Self {
         self.place = Some((Arc::clone(source), span));
         self
     }
 
-    /// Line and column, both from 1, the column counted in characters; none where the mistake is the file as a whole.
+    /// Returns line and column, both from 1, the column counted in characters; `None` if the location is the whole file.
     pub fn line_column(&self) -> Option<(usize, usize)> {
         let (source, span) = self.place.as_ref().filter(|(_, span)| *span != (0..0))?;
         let before = &source.text[..source.text.floor_char_boundary(span.start)];
@@ -94,7 +94,7 @@ impl Diagnostic {
     }
 }
 
-/// `file:line:column: fact; way out`.
+/// Formats as `file:line:column: description; suggested fix`.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some((source, _)) = &self.place {
@@ -114,8 +114,8 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The known name nearest to `given`, if one is near enough to be meant: up to a quarter of its letters differ, or it
-/// begins with what was given.
+/// Returns the known name nearest to `given`, if one is close enough. At most about a quarter of its letters may differ, or
+/// it starts with `given`.
 pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = given.to_lowercase();
     let length = given.chars().count();
@@ -123,7 +123,7 @@ pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         let name = name.to_lowercase();
         let longer = length.max(name.chars().count());
         let distance = strsim::damerau_levenshtein(&given, &name);
-        // Of a name with one letter nothing is left when that one differs.
+        // If a name has one letter only, no common letter remains when that one differs.
         let near = distance <= 1 + longer / 4 && distance < longer;
         let begun = length >= 3 && name.starts_with(&given);
         (near || begun).then_some(if begun { 0 } else { distance })
@@ -132,13 +132,17 @@ pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
 }
 
-/// "did you mean `omega`?" or the list of what is known.
+/// Returns "did you mean `omega`?" or the list of known names.
 pub fn suggestion<'a>(given: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
     match nearest(given, known.clone()) {
         Some(name) => format!("did you mean `{name}`?"),
         None => {
             let names: Vec<&str> = known.into_iter().collect();
-            if names.is_empty() { "nothing is known here".to_owned() } else { format!("known: {}", names.join(", ")) }
+            if names.is_empty() {
+                "no names are defined here".to_owned()
+            } else {
+                format!("known: {}", names.join(", "))
+            }
         }
     }
 }

@@ -1,15 +1,15 @@
-//! Slopes by differences, for problems whose models give no exact ones.
+//! Finite differences, for problems whose models have no exact derivatives.
 
 use crate::cancellation::Halt;
 use crate::evaluation::Evaluation;
 use crate::math;
 use crate::solver::{Linearisation, Oracle};
 
-/// How slopes are taken from values that are exact to `noise`, relative to their size.
+/// Finite differences of values with the relative accuracy `noise`.
 ///
-/// A one-sided difference is best near the square root of the noise and then keeps half of its digits, a central one near
-/// the cube root and keeps two thirds at twice the price. One-sided ones are taken where half of the digits are plenty:
-/// values exact to 1e-14, and slopes that are to describe a hundred times more than their step.
+/// A one-sided difference is best with a step near the square root of the noise and retains half of the digits. A central
+/// difference is best near the cube root and retains two thirds, at twice the cost. One-sided differences are used if half
+/// of the digits are sufficient. This holds for values exact to 1e-14 and a `reach` of at least a hundred times the step.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
 #[derive(Debug, Clone, Copy)]
@@ -18,13 +18,13 @@ pub struct Differences {
 }
 
 impl Differences {
-    /// Differences of values with this relative error.
+    /// Creates finite differences for values with this relative error.
     pub fn of_noise(noise: f64) -> Self {
         Self { noise }
     }
 
-    /// The step of a central difference for slopes that are to describe the problem within `reach`: a tenth of it, at most
-    /// a fifth of the cube root of the noise, and not so small that the noise takes over.
+    /// Returns the step of a central difference for derivatives that describe the problem within `reach`. The step is a
+    /// tenth of `reach`, at most a fifth of the cube root of the noise. A lower bound limits the influence of the noise.
     pub fn step(self, reach: f64) -> f64 {
         (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * math::cbrt(self.noise))
     }
@@ -33,14 +33,14 @@ impl Differences {
         self.noise <= 1e-14 && reach >= 1e-6
     }
 
-    /// Values and slopes at a point; central differences are one-sided at the bounds and where one side fails.
+    /// Returns values and derivatives at a point. Central differences become one-sided at the bounds and if one side fails.
     ///
     /// # Errors
-    /// The run is over.
+    /// Returns [`Halt`] if the run is over.
     pub fn linearise(self, oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
         if self.one_sided(reach) && oracle.shape().spacing.iter().all(|&spacing| spacing == 0.0) {
             let step = self.noise.sqrt();
-            // Towards the middle of the box, so that no bound is in the way.
+            // Towards the centre of the box, to stay within the bounds.
             let moved = (0..point.len()).map(|j| vec![along(point, j, if point[j] < 0.5 { step } else { -step })]);
             if let Some(found) = slopes(oracle, point, &moved.collect::<Vec<_>>())? {
                 return Ok(Some(found));
@@ -59,8 +59,8 @@ fn along(point: &[f64], j: usize, by: f64) -> Vec<f64> {
     moved
 }
 
-/// Slopes from the point and its neighbours, up to two along every coordinate; the point itself stands in for a neighbour
-/// that is missing, fails or coincides with it. `None` where nothing is left of a coordinate.
+/// Returns derivatives from the point and up to two neighbours along every coordinate. The point itself replaces a neighbour
+/// that is missing, fails or coincides with it. `None` if a coordinate has no usable neighbour.
 fn slopes(oracle: &mut dyn Oracle, point: &[f64], neighbours: &[Vec<Vec<f64>>]) -> Result<Option<Linearisation>, Halt> {
     let points: Vec<Vec<f64>> = std::iter::once(point.to_vec()).chain(neighbours.iter().flatten().cloned()).collect();
     let mut answers = oracle.evaluate(&points)?;

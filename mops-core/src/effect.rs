@@ -1,4 +1,5 @@
-//! Effects: what a model may lack at one of its ports, each with strengths that can be neutral.
+//! Effects: physical effects that a model may lack at one of its ports. Their parameters (strengths) have null values at
+//! which the effect vanishes.
 
 use std::sync::Arc;
 
@@ -7,34 +8,34 @@ use serde::Serialize;
 use crate::port::Port;
 use crate::scalar::{Along, Scalar};
 
-/// What sort of physics an effect is.
+/// Physical class of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EffectClass {
-    /// Takes energy: friction, drag, losses.
+    /// Dissipates energy: friction, drag, losses.
     Dissipative,
-    /// Stores it: springs, stops, play.
+    /// Stores energy: springs, stops, play.
     Elastic,
-    /// Weight: tilt, imbalance.
+    /// Acts through weight: tilt, imbalance.
     Gravity,
-    /// Mass and what hangs on it.
+    /// Inertia: mass and attached bodies.
     Inertial,
-    /// A constant.
+    /// Constant offset.
     Bias,
-    /// A factor, or another static curve.
+    /// Factor, or another static characteristic.
     Gain,
-    /// Comes late.
+    /// Delay or lag.
     DelayLike,
-    /// Repeats over position or time.
+    /// Periodic in position or time.
     Periodic,
     /// Depends on time.
     TimeVarying,
-    /// A stream of matter or heat into or out of a store.
+    /// Flow of matter or heat into or out of a store.
     Flow,
 }
 
 impl EffectClass {
-    /// Its name, as results spell it.
+    /// Returns the name of the class in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Dissipative => "dissipative",
@@ -51,12 +52,12 @@ impl EffectClass {
     }
 }
 
-/// The sort of port that an effect acts at.
+/// Kind of port that an effect acts at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PortKind {
     /// [`Port::Joint`]: a force against a coordinate of second order.
     Joint,
-    /// [`Port::Process`] of a state that is no speed of a joint: a rate.
+    /// [`Port::Process`] of a state that is not the speed of a joint: a rate.
     Process,
     /// [`Port::Actuator`].
     Actuator,
@@ -65,7 +66,7 @@ pub enum PortKind {
 }
 
 impl PortKind {
-    /// Its name, as places begin with it.
+    /// Returns the name of the kind, the prefix of places.
     pub fn name(self) -> &'static str {
         match self {
             Self::Joint => "joint",
@@ -77,7 +78,7 @@ impl PortKind {
 }
 
 impl Port {
-    /// Its sort; `None` for the equation of a joint's speed, which its [`Port::Joint`] stands for.
+    /// Returns the kind of the port; `None` for the speed equation of a joint, which its [`Port::Joint`] represents.
     pub fn kind(&self, ports: &[Self]) -> Option<PortKind> {
         match self {
             Self::Joint { .. } => Some(PortKind::Joint),
@@ -91,43 +92,43 @@ impl Port {
     }
 }
 
-/// The unit of a strength, as powers of the units at its place.
+/// Unit of an effect parameter, as powers of the units at its place.
 ///
-/// `output` is what the effect adds: a force, torque or flow in the equation, the unit of the input at an actuator, of the
-/// signal at a sensor. `position` and `speed` are those of the joint (at a process: of the state and its rate), `value` that
-/// of the input or signal, `time` is s. Of a companion are the position and speed at an actuator or sensor, and the value at
-/// a joint or process.
+/// `output` is the unit of the term that the effect adds. The term is a force, torque or flow in an equation. At an actuator
+/// it has the unit of the input, at a sensor that of the signal. `position` and `speed` are the units of the joint; at a
+/// process, of the state and its rate. `value` is the unit of the input or signal, `time` is s. The second port provides
+/// `position` and `speed` at an actuator or sensor, and `value` at a joint or process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
-    /// Power of what it adds.
+    /// Power of the unit of the added term.
     pub output: i8,
-    /// Power of the position.
+    /// Power of the unit of the position.
     pub position: i8,
-    /// Power of the speed.
+    /// Power of the unit of the speed.
     pub speed: i8,
-    /// Power of the value that passes.
+    /// Power of the unit of the input or signal.
     pub value: i8,
-    /// Power of the time.
+    /// Power of the unit of the time.
     pub time: i8,
 }
 
 impl Dimension {
-    /// No unit.
+    /// Dimensionless.
     pub const ONE: Self = Self { output: 0, position: 0, speed: 0, value: 0, time: 0 };
-    /// What the effect adds.
+    /// Unit of the term that the effect adds.
     pub const OUTPUT: Self = Self { output: 1, ..Self::ONE };
-    /// A position.
+    /// Unit of the position.
     pub const POSITION: Self = Self { position: 1, ..Self::ONE };
-    /// A speed.
+    /// Unit of the speed.
     pub const SPEED: Self = Self { speed: 1, ..Self::ONE };
-    /// An input or a signal.
+    /// Unit of the input or signal.
     pub const VALUE: Self = Self { value: 1, ..Self::ONE };
-    /// A time.
+    /// Unit of the time, s.
     pub const TIME: Self = Self { time: 1, ..Self::ONE };
-    /// A rate, 1/s.
+    /// Unit of a rate, 1/s.
     pub const PER_TIME: Self = Self { time: -1, ..Self::ONE };
 
-    /// `self` over `other`.
+    /// Returns `self` divided by `other`.
     #[must_use]
     pub const fn over(self, other: Self) -> Self {
         Self {
@@ -139,7 +140,7 @@ impl Dimension {
         }
     }
 
-    /// `self` to a power.
+    /// Returns `self` raised to a power.
     #[must_use]
     pub const fn power(self, n: i8) -> Self {
         Self {
@@ -152,85 +153,86 @@ impl Dimension {
     }
 }
 
-/// The values of a strength that are tried before anything is fitted.
+/// Initial grid of an effect parameter, evaluated before any fit.
 ///
-/// They are relative to what the trajectories show, so that they need no knowledge of the plant: the typical size of a
-/// strength is the product of the typical sizes at its place to the powers of its [`Dimension`].
+/// The grid is relative to the trajectories and needs no knowledge of the plant. The typical size of a parameter is the
+/// product of the typical sizes at its place, raised to the powers of its [`Dimension`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trials {
-    /// What the effect adds is proportional to it: one value will do, and regression finds the factor.
+    /// Single value: the added term is proportional to the parameter, and regression determines the factor.
     Linear,
-    /// These multiples of its typical size.
+    /// Multiples of the typical size.
     Scaled(&'static [f64]),
-    /// These places between the smallest and the largest position (of a process: state; of an actuator or sensor: value).
+    /// Relative positions between the smallest and the largest position (of a process: state; of an actuator or sensor:
+    /// value).
     Within(&'static [f64]),
-    /// The same, and the middle of a gap that samples show at a sensor.
+    /// Relative positions as in [`Trials::Within`], and the centre of a dead band visible in the samples of a sensor.
     WithinAndGap(&'static [f64]),
-    /// These multiples of its typical size, and half the width of a gap that samples show at a sensor.
+    /// Multiples of the typical size, and half the width of a dead band visible in the samples of a sensor.
     ScaledAndGap(&'static [f64]),
-    /// These places between the smallest and the largest size of a value, whatever its sign.
+    /// Relative positions between the smallest and the largest magnitude of a value.
     WithinSize(&'static [f64]),
-    /// These shares of the largest slew rate of a command, then these multiples of its typical size.
+    /// Fractions of the largest slew rate of a command, then multiples of the typical size.
     SlewAndScaled(&'static [f64], &'static [f64]),
-    /// These values.
+    /// Listed values.
     Plain(&'static [f64]),
-    /// These values, of a strength at whose changes samples jump: a level at which what stands still breaks away.
+    /// Listed values of a parameter with discontinuous response, such as a break-away force.
     Jumps(&'static [f64]),
-    /// These values, then these multiples of its typical size: periods in a turn, and along a rail.
+    /// Listed values, then multiples of the typical size: periods per turn, and along a rail.
     PlainAndScaled(&'static [f64], &'static [f64]),
-    /// Frequencies in rad/s that the record can resolve: from two thirds of a period in the record to 160 periods, or four samples
-    /// a period.
+    /// Frequencies in rad/s that the record can resolve: at least two thirds of a period in the record, at most 160 periods
+    /// or four samples per period.
     Frequencies,
-    /// Sizes of steps: the largest value over numbers of steps from one on, so close together that about every eighth sample of a
-    /// neighbour is a step off.
+    /// Quantisation steps: the largest value divided by the number of steps, from one step on. Neighbouring candidates
+    /// differ by one step in about every eighth sample.
     Steps,
-    /// Times within the record, at these shares of its length.
+    /// Times within the record, as fractions of its length.
     Moments(&'static [f64]),
 }
 
 impl Trials {
-    /// Whether no slope tells the strength, as samples that it moves jump: sizes of steps, the width of a gap, a level at which
-    /// what stands still breaks away.
+    /// Returns true if the residuals are discontinuous in the parameter, so that gradients carry no information. Examples:
+    /// quantisation steps, the width of a dead band, a break-away force.
     pub fn jumps(&self) -> bool {
         matches!(self, Self::Steps | Self::ScaledAndGap(_) | Self::Jumps(_))
     }
 }
 
-/// Whether a strength belongs to the plant or to one experiment.
+/// Scope of an effect parameter: the plant or a single experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// The same in all experiments.
+    /// Shared by all experiments.
     Study,
-    /// Its own in each experiment: a phase.
+    /// Separate value in each experiment, such as a phase.
     Experiment,
 }
 
-/// A number that says how strong an effect is, or what shape it has.
+/// A parameter (strength) of an effect: a magnitude or a shape parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strength {
     /// Name, such as `torque`.
     pub name: &'static str,
-    /// What it is, in one line.
+    /// Description in one line.
     pub about: &'static str,
-    /// Its unit.
+    /// Unit.
     pub dimension: Dimension,
-    /// The value at which the effect is not there, 0 or infinity; `None` for a shape, which has none.
+    /// Null value, 0 or infinity, at which the effect vanishes; `None` for a shape parameter.
     pub neutral: Option<f64>,
-    /// Smallest and largest value that physics allows.
+    /// Smallest and largest physically possible value.
     pub bounds: [f64; 2],
-    /// Values that are tried first.
+    /// Initial grid.
     pub trials: Trials,
-    /// What it belongs to.
+    /// Scope: the study or a single experiment.
     pub scope: Scope,
-    /// Whether it stays at the value that was tried: a whole number of periods in a turn.
+    /// True if the parameter keeps its grid value, such as an integer number of periods per turn.
     pub fixed: bool,
-    /// Multiples of its typical size from which a fit is restarted, at every shape tried, where one from nothing has stuck: a
-    /// contact that is soft at first spreads over the whole motion. Empty: restarted from once and twice what was found.
+    /// Multiples of the typical size for restarts of a stuck fit, at every shape in the grid. A contact that starts too
+    /// soft would act over the whole motion. If empty, the fit restarts from one and two times the estimate.
     pub restarts: &'static [f64],
 }
 
 impl Strength {
-    /// A factor of what the effect adds: neutral at 0, at least 0.
+    /// Creates a non-negative factor of the added term, with the null value 0.
     pub const fn positive(name: &'static str, about: &'static str, dimension: Dimension) -> Self {
         Self {
             name,
@@ -245,12 +247,12 @@ impl Strength {
         }
     }
 
-    /// A factor of what the effect adds: neutral at 0, of either sign.
+    /// Creates a factor of the added term of either sign, with the null value 0.
     pub const fn signed(name: &'static str, about: &'static str, dimension: Dimension) -> Self {
         Self { bounds: [f64::NEG_INFINITY, f64::INFINITY], ..Self::positive(name, about, dimension) }
     }
 
-    /// A shape: it vanishes with the first strength.
+    /// Creates a shape parameter; it has no influence if the first parameter is at its null value.
     pub const fn shape(
         name: &'static str,
         about: &'static str,
@@ -261,43 +263,43 @@ impl Strength {
         Self { bounds, trials, neutral: None, ..Self::positive(name, about, dimension) }
     }
 
-    /// With other trials.
+    /// Sets another initial grid.
     #[must_use]
     pub const fn tried(mut self, trials: Trials) -> Self {
         self.trials = trials;
         self
     }
 
-    /// With another neutral value.
+    /// Sets another null value.
     #[must_use]
     pub const fn neutral_at(mut self, neutral: f64) -> Self {
         self.neutral = Some(neutral);
         self
     }
 
-    /// With other bounds. A diagnosis does not tell an effect whose first strength the data press against an end that is finite
-    /// and not neutral, but at actuators: there it is a mistake, not an effect.
+    /// Sets other bounds. A diagnosis discards an effect whose first parameter is estimated at a finite bound other than the
+    /// null value, except at actuators. Such an estimate indicates a mistake, not an effect.
     #[must_use]
     pub const fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = [low, high];
         self
     }
 
-    /// Of its own in each experiment.
+    /// Makes the parameter separate in each experiment.
     #[must_use]
     pub const fn per_experiment(mut self) -> Self {
         self.scope = Scope::Experiment;
         self
     }
 
-    /// Restarted from these multiples of its typical size where a fit from nothing has stuck.
+    /// Sets the multiples of the typical size from which a stuck fit is restarted.
     #[must_use]
     pub const fn restarted_from(mut self, multiples: &'static [f64]) -> Self {
         self.restarts = multiples;
         self
     }
 
-    /// Kept at the value that was tried.
+    /// Fixes the parameter at its grid value.
     #[must_use]
     pub const fn kept(mut self) -> Self {
         self.fixed = true;
@@ -305,95 +307,96 @@ impl Strength {
     }
 }
 
-/// What an effect sees at its place.
+/// State of the port at which an effect is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct At<'a, S> {
     /// Time, s.
     pub t: f64,
-    /// At an actuator the command, at a sensor the signal, before the effect; 0 elsewhere.
+    /// Command at an actuator, signal at a sensor, both before the effect; 0 elsewhere.
     pub value: S,
-    /// Position of the joint; at a process the state; else `value`.
+    /// Position of the joint; state at a process; else `value`.
     pub q: S,
-    /// Speed of the joint; else 0.
+    /// Speed of the joint; 0 elsewhere.
     pub v: S,
-    /// Acceleration of the joint without the effect, for those that ask ([`Effect::is_inertial`]); else 0.
+    /// Acceleration of the joint without the effect, provided if [`Effect::is_inertial`]; else 0.
     pub a: S,
-    /// What a unit force adds to the acceleration, likewise.
+    /// Acceleration per unit force, provided if [`Effect::is_inertial`]; else 0.
     pub mobility: S,
-    /// At the companion: the position of a joint, a state, an input, a signal; 0 without one.
+    /// Value at the second port: position of a joint, state, input or signal; 0 without a second port.
     pub other: S,
-    /// The speed of the companion, if it is a joint.
+    /// Speed at the second port, if it is a joint.
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
-    /// Whether the contact of the effect is closed, as a simulation holds it throughout a step; `None` where there is no
-    /// contact, or the sign of [`Acting::gap`] is to tell.
+    /// True if the contact of the effect is closed, fixed by the simulation for a whole step. `None` without a contact, or
+    /// if the sign of [`Acting::gap`] decides.
     pub closed: Option<bool>,
 }
 
-/// Dry friction: the kernel finds out whether the joint sticks.
+/// Dry friction of a joint; the kernel determines whether the joint sticks.
 #[derive(Debug, Clone, Copy)]
 pub struct DryFriction<S> {
-    /// Force against forward and backward motion while it slides, at the present speed; not negative.
+    /// Friction force against forward and backward sliding, at the current speed; not negative.
     pub sliding: [S; 2],
-    /// Force up to which a joint at rest sticks against being moved forward and backward; at least that of sliding there.
+    /// Break-away force of a joint at rest, forward and backward; at least the sliding force at speed 0.
     pub limit: [S; 2],
 }
 
-/// An effect at given strengths.
+/// An effect at given parameters.
 pub trait Acting<S: Scalar> {
-    /// Writes the start values of its states, where nothing else is known of them.
+    /// Writes the default initial values of the states of the effect.
     fn start(&self, _at: &At<'_, S>, _z: &mut [S]) {}
 
-    /// Writes the rates of its states.
+    /// Writes the rates of the states of the effect.
     fn rates(&self, _at: &At<'_, S>, _z: &[S], _dz: &mut [S]) {}
 
-    /// At a joint or a process: what is added to the right-hand side of the equation, positive forward. At an actuator: the
-    /// input that reaches the plant. At a sensor: what is measured.
+    /// Returns the output of the effect. At a joint or a process: the term added to the right-hand side of the equation,
+    /// positive forward. At an actuator: the input that reaches the plant. At a sensor: the measured value.
     fn value(&self, at: &At<'_, S>, z: &[S]) -> S;
 
-    /// At a joint or process whose companion is one too: what is added to the companion's equation.
+    /// Returns the term added to the equation of the second port, if both ports are joints or processes.
     fn onward(&self, _at: &At<'_, S>, _z: &[S]) -> S {
         S::from(0.0)
     }
 
-    /// Dry friction on top of [`Acting::value`], at a joint.
+    /// Returns the dry friction at a joint, in addition to [`Acting::value`].
     fn friction(&self, _at: &At<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
         None
     }
 
-    /// How far a contact at a joint is open; negative while it is closed. It depends on positions and speeds alone, and an
-    /// effect has it throughout a simulation or never. A simulation ends a step where it changes sign, and tangents account
-    /// for that moment; within a step [`At::closed`] says which law holds, also a little beyond the change.
+    /// Returns the opening of a contact at a joint, negative while the contact is closed. The gap depends on positions and
+    /// speeds alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
+    /// tangents account for the event time. Within a step [`At::closed`] selects the law, also slightly beyond the crossing.
     fn gap(&self, _at: &At<'_, S>) -> Option<S> {
         None
     }
 
-    /// The time by which an actuator or a sensor comes late, s.
+    /// Returns the delay of an actuator or a sensor, s.
     fn delay(&self) -> Option<S> {
         None
     }
 
-    /// Times at which it changes its form: steps end there, s.
+    /// Returns the times at which the effect changes its form, s; steps end there.
     fn breaks(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Longest step within which what it does by itself is well resolved, s.
+    /// Returns the largest step size that resolves the internal dynamics of the effect, s.
     fn longest_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Longest step in which an explicit method damps what decays in it by itself, s.
+    /// Returns the largest step size at which an explicit method is stable for the decaying internal dynamics of the effect,
+    /// s.
     fn damped_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Moves what is remembered from one moment to the next ([`Effect::memory`]), NaN before the first: at an actuator
-    /// whenever the command jumps or changes its slope, before and after it, at a sensor along the simulation.
+    /// Updates the hysteresis state ([`Effect::memory`]), which is NaN before the first update. Called at an actuator before
+    /// and after each jump of the command or of its derivative, at a sensor along the simulation.
     fn remember(&self, _at: &At<'_, S>, _memory: &mut [S]) {}
 
-    /// As [`Acting::value`] for an effect that remembers.
+    /// Returns the output, as [`Acting::value`], for an effect with a hysteresis state.
     fn recall(&self, at: &At<'_, S>, _memory: &[S]) -> S {
         self.value(at, &[])
     }
@@ -401,89 +404,91 @@ pub trait Acting<S: Scalar> {
 
 /// A physical effect that a model may lack.
 pub trait Effect: Send + Sync {
-    /// Name in study files and results.
+    /// Returns the name in study files and results.
     fn name(&self) -> &'static str;
 
-    /// What it is, in one sentence.
+    /// Returns the description, one sentence.
     fn about(&self) -> &'static str;
 
-    /// Its formula, for people.
+    /// Returns the formula, for readers.
     fn formula(&self) -> &'static str;
 
-    /// Where the formula comes from.
+    /// Returns the source of the formula.
     fn source(&self) -> &'static str;
 
-    /// Its class.
+    /// Returns the physical class.
     fn class(&self) -> EffectClass;
 
-    /// The effect in a wider sense that it is a form of: of backlash, play in a coupling.
+    /// Returns the more general effect that this effect is a form of, such as `backlash` for play in a coupling.
     fn form_of(&self) -> Option<&'static str> {
         None
     }
 
-    /// Ports that it acts at.
+    /// Returns the kinds of ports that the effect acts at.
     fn ports(&self) -> &'static [PortKind];
 
-    /// The sort of a second place that it needs: where drag comes from, a sensor that talks across.
+    /// Returns the kind of the second port, if one is needed: the origin of drag, a sensor with cross-talk.
     fn companion(&self) -> Option<PortKind> {
         None
     }
 
-    /// Whether it is the same with its place and its companion exchanged.
+    /// Returns true if the effect is symmetric in its two ports.
     fn mutual(&self) -> bool {
         false
     }
 
-    /// Its strengths; the first is the one that makes it vanish.
+    /// Returns the parameters; the effect vanishes if the first is at its null value.
     fn strengths(&self) -> &'static [Strength];
 
-    /// Number of its states; one that has more than eight is no candidate of a diagnosis.
+    /// Returns the number of states; a diagnosis does not consider effects with more than eight.
     fn states(&self) -> usize {
         0
     }
 
-    /// Number of values that it remembers from one moment to the next; the first of them is what it let through.
+    /// Returns the number of values of the hysteresis state; the first is the output.
     fn memory(&self) -> usize {
         0
     }
 
-    /// Dimensions of the start values that an experiment leaves free as they matter: those of all its states, or that of what
-    /// an effect with a memory lets through. One without unit is a share of a limit, between -1 and 1.
+    /// Returns the dimensions of the initial values that an experiment leaves free because they matter. They are those of
+    /// all states, or of the output of an effect with a hysteresis state. A dimensionless one is a fraction of a limit,
+    /// between -1 and 1.
     fn free_starts(&self) -> &'static [Dimension] {
         &[]
     }
 
-    /// Whether it asks for the acceleration: its force is proportional to it.
+    /// Returns true if the effect needs the acceleration because its force is proportional to it.
     fn is_inertial(&self) -> bool {
         false
     }
 
-    /// Whether it happens once, in one experiment.
+    /// Returns true if the effect occurs once, in one experiment.
     fn is_one_off(&self) -> bool {
         false
     }
 
-    /// Which of two effects that explain the data equally well a physicist thinks of first: the smaller number.
+    /// Returns the rarity of the effect. Between effects that explain the data equally well, the smaller number is more
+    /// plausible to a physicist.
     fn rarity(&self) -> u8 {
         1
     }
 
-    /// The effect at these strengths.
+    /// Returns the effect at the given parameters.
     fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>>;
 
-    /// The same with tangents.
+    /// Returns the effect with tangents, at parameters with tangents.
     fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>>;
 }
 
 /// An effect at a place of a model.
 #[derive(Clone)]
 pub struct Placement {
-    /// Its name in the model: its strengths are the parameters `name.strength`.
+    /// Name of the effect in the model; its parameters are called `name.strength`.
     pub name: String,
     /// The effect.
     pub effect: Arc<dyn Effect>,
-    /// The port that it acts at.
+    /// Port that the effect acts at.
     pub port: Port,
-    /// A second port, where the effect needs one.
+    /// Second port, if the effect needs one.
     pub companion: Option<Port>,
 }

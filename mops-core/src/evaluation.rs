@@ -1,48 +1,48 @@
-//! What a point is worth: the readings of its criteria, and how points are ordered.
+//! Evaluations of points: the readings of the criteria, and the order of points.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 
-/// Constraints count as satisfied up to this much of their scaled value.
+/// Tolerance of constraints, in scaled values.
 pub const FEASIBLE: f64 = 1e-6;
 
-/// How the scaled values become one number to minimise.
+/// Combination of the scaled values into one objective.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Objective {
-    /// The largest weighted scaled value.
+    /// Largest weighted scaled value.
     #[default]
     Max,
-    /// The sum of the weighted scaled values.
+    /// Sum of the weighted scaled values.
     Sum,
-    /// None: each counts for itself, and the run keeps the front of points that no other is better than in all of them.
-    /// The point reported is that of the front whose largest is least.
+    /// Vector of all scaled values: the run keeps the Pareto front. The reported point is the front point with the smallest
+    /// largest scaled value.
     Each,
 }
 
-/// What a point is worth.
+/// Evaluation of a point.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
-    /// The point of the unit box.
+    /// Point of the unit box.
     pub point: Vec<f64>,
     /// Values of all tuners of the study.
     pub tuners: Vec<f64>,
-    /// A reading per row of the study; `None` where its simulation failed or was not run.
+    /// Readings, one per row of the study; `None` if its simulation failed or was not run.
     pub readings: Vec<Option<Reading>>,
-    /// Scaled values of all rows, 0 for those that are only watched; `None` if a row that counts has no value.
+    /// Scaled values of all rows, 0 for monitored ones; `None` if a row that counts has no value.
     pub scaled: Option<Vec<f64>>,
-    /// Weighted residuals whose sum of squares is the objective; empty if it is no sum of squares.
+    /// Weighted residuals whose sum of squares is the objective; empty if the objective is not a sum of squares.
     pub residuals: Vec<f64>,
-    /// What failed: index of the job, and why.
+    /// Failures: index of the job, and the reason.
     pub failures: Vec<(usize, Failure)>,
-    /// What it is worth.
+    /// Merit of the point.
     pub merit: Merit,
 }
 
 impl Evaluation {
-    /// Whether one of its simulations was asked to end before it was done: it says nothing of the point.
+    /// Returns true if a simulation was cancelled, so that the evaluation is incomplete.
     pub fn is_cancelled(&self) -> bool {
         self.failures.iter().any(|(_, failure)| *failure == Failure::Cancelled)
     }
@@ -51,35 +51,36 @@ impl Evaluation {
 /// The value of a criterion in a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// In the criterion's unit; NaN where it was never reached.
+    /// Value, in the criterion's unit; NaN if the condition of the criterion was never reached.
     pub value: f64,
-    /// The scaled value, under its demand.
+    /// Value scaled by the demand.
     pub scaled: f64,
     /// Derivative of the scaled value with respect to the number of the criterion.
     pub(crate) slope: f64,
-    /// What a reader must know of it.
+    /// Remark on the value.
     pub note: Option<&'static str>,
 }
 
-/// What a point is worth; [`Merit::is_better_than`] orders points.
+/// Merit of a point; [`Merit::is_better_than`] orders points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Merit {
-    /// The largest violation of a constraint, in scaled values; infinite for a failed point.
+    /// Largest constraint violation, in scaled values; infinite for a failed point.
     pub violation: f64,
-    /// The objective; infinite for a failed point.
+    /// Objective; infinite for a failed point.
     pub objective: f64,
 }
 
 impl Merit {
-    /// A point without a value: worse than every other.
+    /// Merit of a failed point: worse than every other.
     pub const FAILED: Self = Self { violation: f64::INFINITY, objective: f64::INFINITY };
 
-    /// Whether every constraint holds to within [`FEASIBLE`].
+    /// Returns true if every constraint is satisfied to within [`FEASIBLE`].
     pub fn is_feasible(&self) -> bool {
         self.violation <= FEASIBLE
     }
 
-    /// Feasible points by their objective, before all others by their violation; failed points last.
+    /// Returns true if this merit is better. Feasible points come first, ordered by objective; then infeasible ones by
+    /// violation; then failed ones.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.is_feasible(), other.is_feasible()) {
             (true, true) => self.objective < other.objective,

@@ -1,47 +1,47 @@
-//! What a run evaluates: a study's problem, or a problem with a known answer.
+//! Problems that a run evaluates: the problem of a study, or one with a known solution.
 
 use crate::evaluation::Evaluation;
 use crate::known::{Kept, KeptSlopes, Known, RowSlopes};
 use crate::problem::{Problem, Slopes};
 use crate::solver::Shape;
 
-/// Rows of scaled values over the unit box. A pure function: the same point gives the same bits on every thread.
+/// Rows of scaled values over the unit box, as a pure function: equal points give equal bits on every thread.
 ///
-/// Mandatory: shape, evaluate, tuners_at and seed. Who can tell what holds under every demand offers the two methods that
-/// keep as well; their evaluations and slopes have the same bits as the others'.
+/// Mandatory: shape, evaluate, tuners_at and seed. Implementations whose results can be cached under every demand also
+/// provide the two `_keeping` methods. Their evaluations and derivatives have the same bits as those of the plain methods.
 pub trait Evaluator: Sync {
-    /// Sizes and kinds.
+    /// Returns the dimensions and kinds of the problem.
     fn shape(&self) -> &Shape;
 
-    /// What a point of the unit box is worth.
+    /// Evaluates a point of the unit box.
     fn evaluate(&self, point: &[f64]) -> Evaluation;
 
-    /// Values of all tuners at a point of the unit box; points with the same ones are evaluated once.
+    /// Returns the values of all tuners at a point of the unit box; points with equal values are evaluated once.
     fn tuners_at(&self, point: &[f64]) -> Vec<f64>;
 
-    /// Exact slopes at an evaluated point; `None` where there are none. `reach` is the distance within which they are to
-    /// describe the problem.
+    /// Returns exact derivatives at an evaluated point; `None` if there are none. `reach` is the distance within which they
+    /// are to describe the problem.
     fn slopes(&self, _at: &Evaluation, _reach: f64) -> Option<Slopes> {
         None
     }
 
-    /// The evaluation of a point of which something is known already.
+    /// Evaluates a point with a cache entry.
     fn evaluate_keeping(&self, point: &[f64], _known: Option<Known>) -> Kept {
         Kept { evaluation: self.evaluate(point), learned: None }
     }
 
-    /// The slopes at a point of which they may be known already.
+    /// Returns the derivatives at a point with a cache entry.
     fn slopes_keeping(&self, at: &Evaluation, reach: f64, _known: Option<Option<RowSlopes>>) -> KeptSlopes<Slopes> {
         KeptSlopes { slopes: self.slopes(at, reach), learned: None }
     }
 
-    /// How far values of neighbouring points are off, relative to their size. Simulations at a relative tolerance of 1e-8
-    /// repeat to about 1e-9.
+    /// Returns the relative noise of values at neighbouring points. Simulations at a relative tolerance of 1e-8 repeat to
+    /// about 1e-9.
     fn noise(&self) -> f64 {
         1e-9
     }
 
-    /// The seed of the random streams.
+    /// Returns the seed of the random streams.
     fn seed(&self) -> u64;
 }
 

@@ -1,4 +1,4 @@
-//! Inputs that drive a model, and measurements that it is compared with.
+//! Inputs that drive a model, and measurements for comparison.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,21 +7,21 @@ use crate::band_limited;
 use crate::math;
 use crate::unit::Unit;
 
-/// What an experiment is used for.
+/// Role of an experiment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// Parameters are estimated from it.
+    /// Used to estimate parameters.
     #[default]
     Calibration,
-    /// It helps to choose between models, but moves no parameter.
+    /// Used to choose between models, but not to estimate parameters.
     Selection,
-    /// It is reported only.
+    /// Reported only.
     Validation,
 }
 
 impl Role {
-    /// Its name, as studies write it.
+    /// Returns the name of the role in study files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Calibration => "calibration",
@@ -31,34 +31,34 @@ impl Role {
     }
 }
 
-/// How a sampled input acts between its samples.
+/// Interpolation of a sampled input between its samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
-    /// The value stays until the next sample.
+    /// Zero-order hold: the value is constant until the next sample.
     #[default]
     Zero,
-    /// Straight line from sample to sample.
+    /// First-order hold: linear interpolation between samples.
     First,
-    /// The signal without content above half the sampling frequency that passes through the samples, which are evenly spaced.
+    /// Band-limited interpolation: no content above half the sampling frequency. The samples must be evenly spaced.
     BandLimited,
 }
 
-/// How an input of a model moves over time.
+/// An input of a model as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
-    /// The same value throughout.
+    /// Constant value.
     Constant(f64),
-    /// `before` until `time` (s), `after` from then on.
+    /// Step: `before` until `time` (s), `after` from then on.
     Step {
-        /// When it steps, s.
+        /// Time of the step, s.
         time: f64,
-        /// Value before.
+        /// Value before `time`.
         before: f64,
         /// Value from `time` on.
         after: f64,
     },
-    /// `offset + amplitude sin(2 pi frequency t + phase)`.
+    /// Sine: `offset + amplitude sin(2 pi frequency t + phase)`.
     Sine {
         /// Amplitude, in the unit of the input.
         amplitude: f64,
@@ -75,13 +75,13 @@ pub enum Input {
         times: Vec<f64>,
         /// The samples, in the unit of the input; all finite.
         values: Vec<f64>,
-        /// What happens between them.
+        /// Interpolation between the samples.
         hold: Hold,
     },
 }
 
 impl Input {
-    /// The value at time `t`, from the right where it jumps.
+    /// Returns the value at time `t`, the right-hand limit at jumps.
     pub fn at(&self, t: f64) -> f64 {
         match self {
             Self::Constant(value) => *value,
@@ -112,8 +112,8 @@ impl Input {
         }
     }
 
-    /// Where the input has to be evenly sampled, the time (s) from which a step between samples differs from the mean step by
-    /// more than 1 %.
+    /// Returns the first time (s) at which the step between samples differs from the mean step by more than 1 %. `None` for
+    /// even sampling, and for inputs that need not be evenly sampled.
     pub fn uneven(&self) -> Option<f64> {
         let Self::Sampled { times, hold: Hold::BandLimited, .. } = self else { return None };
         #[allow(clippy::cast_precision_loss)]
@@ -122,8 +122,8 @@ impl Input {
         times.windows(2).find(differs).map(|pair| pair[0])
     }
 
-    /// Whether samples that are held look as if they had moved smoothly: most differ from the one before, by steps (their
-    /// median) of less than a tenth of the range. Fewer than 20 samples tell nothing.
+    /// Returns true if zero-order-hold samples look like a smooth signal. More than half of the samples must differ from
+    /// their predecessor, with a median step below a tenth of the range. Fewer than 20 samples return false.
     pub fn looks_smooth(&self) -> bool {
         let Self::Sampled { values, hold: Hold::Zero, .. } = self else { return false };
         let range = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
@@ -134,7 +134,7 @@ impl Input {
         values.len() >= 20 && 2 * steps.len() > values.len() && steps[steps.len() / 2] < 0.1 * range
     }
 
-    /// The first time after `t` at which the value or its slope jumps; infinity if it never does again.
+    /// Returns the first time after `t` at which the value or its derivative jumps; infinity if there is none.
     pub fn next_break(&self, t: f64) -> f64 {
         match self {
             Self::Constant(_) | Self::Sine { .. } => f64::INFINITY,
@@ -152,55 +152,55 @@ impl Input {
     }
 }
 
-/// One measured signal.
+/// A measured signal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// The model's signal that it measures.
+    /// Signal of the model that is measured.
     pub signal: String,
-    /// Times of the samples, s, increasing; channels may differ.
+    /// Times of the samples, s, increasing; channels may have different times.
     pub times: Vec<f64>,
-    /// The samples, in the unit of the signal; gaps are left out.
+    /// Samples, in the unit of the signal; missing samples are omitted.
     pub values: Vec<f64>,
-    /// Standard deviation of the noise, in the unit of the signal, where it is known.
+    /// Standard deviation of the noise, in the unit of the signal, if known.
     pub noise: Option<f64>,
 }
 
 /// A measured frequency response.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ResponseData {
-    /// The output, a signal of a linear model.
+    /// Output: a signal of a linear model.
     pub signal: String,
     /// Angular frequencies, rad/s.
     pub frequencies: Vec<f64>,
-    /// Real and imaginary part at each; gaps are left out.
+    /// Real and imaginary part at each frequency; missing values are omitted.
     pub values: Vec<[f64; 2]>,
-    /// Unit of the values; that of the output over that of the input where absent, and in a study that is built.
+    /// Unit of the values. `None` for the unit of the output divided by that of the input, and in a built study.
     pub unit: Option<Unit>,
 }
 
-/// A measurement: what was recorded, what it is used for.
+/// A measurement: recorded signals and their role.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Experiment {
-    /// The measured signals.
+    /// Measured signals.
     pub channels: Vec<Channel>,
-    /// The measured frequency responses.
+    /// Measured frequency responses.
     pub responses: Vec<ResponseData>,
-    /// What it is used for.
+    /// Role of the experiment.
     pub role: Role,
 }
 
 impl Experiment {
-    /// The channel that measures `signal`.
+    /// Returns the channel that measures `signal`.
     pub fn channel(&self, signal: &str) -> Option<&Channel> {
         self.channels.iter().find(|channel| channel.signal == signal)
     }
 
-    /// The frequency response of which `signal` is the output.
+    /// Returns the frequency response with the output `signal`.
     pub fn response(&self, signal: &str) -> Option<&ResponseData> {
         self.responses.iter().find(|response| response.signal == signal)
     }
 
-    /// Time of the last sample of all channels, s.
+    /// Returns the time of the last sample of all channels, s.
     pub fn end(&self) -> f64 {
         self.channels.iter().filter_map(|c| c.times.last().copied()).fold(0.0, f64::max)
     }

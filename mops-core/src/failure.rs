@@ -1,33 +1,34 @@
-//! Why an analysis gave nothing.
+//! Failures of an analysis.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// Why an analysis gave nothing.
+/// Reason why an analysis has no result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Failure {
-    /// A state or a derivative stopped being finite at this time, s.
+    /// A state or a derivative became non-finite at this time, s.
     Diverged(f64),
-    /// The limit on steps was reached at this time, s.
+    /// The maximum number of steps was reached at this time, s.
     StepLimit(f64),
-    /// The step size became too small for the clock at this time, s: the equations are stiff or singular there.
+    /// The step size underflowed at this time, s: the equations are stiff or singular there.
     StepTooSmall(f64),
-    /// Events come closer and closer, or conditions never agree on whose turn it is, at this time, s; which, and the way out.
+    /// Events accumulate, or switching conditions never become consistent, at this time, s. The text names them and a
+    /// remedy.
     EventsAccumulate(f64, String),
-    /// Parameter values for which the model is not defined.
+    /// The model is not defined at the parameter values.
     Undefined(String),
-    /// A criterion has no value for this response.
+    /// A criterion has no value for the response.
     Criterion(String),
-    /// What is recorded takes more memory than a simulation may have, at this time, s.
+    /// The recorded signals exceeded the memory limit of a simulation at this time, s.
     RecordLimit(f64),
-    /// Whoever waits for the run asked it to end: nothing is known of the simulation.
+    /// The simulation was cancelled on request; its result is unknown.
     Cancelled,
 }
 
 impl Failure {
-    /// The kind alone, to count failures by.
+    /// Returns the kind of failure, used to count failures.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Diverged(_) => "diverged",
@@ -47,18 +48,17 @@ impl fmt::Display for Failure {
         match self {
             Self::Diverged(t) => write!(f, "diverged at {t:.4} s"),
             Self::StepLimit(t) => {
-                write!(f, "took too many steps, the last at {t:.4} s: stiff equations, or too tight a tolerance")
+                write!(f, "step limit reached at t = {t:.4} s: the equations are stiff or the tolerance is too tight")
             }
-            Self::StepTooSmall(t) => write!(f, "needs steps too small for the clock at {t:.4} s"),
+            Self::StepTooSmall(t) => {
+                write!(f, "step size underflow at t = {t:.4} s: the solution diverges or is very stiff")
+            }
             Self::EventsAccumulate(t, why) => write!(f, "events accumulate at {t:.4} s: {why}"),
             Self::Undefined(what) | Self::Criterion(what) => f.write_str(what),
             Self::RecordLimit(t) => {
-                write!(
-                    f,
-                    "records too much for memory, up to {t:.4} s: fewer steps or signals, or a shorter horizon, do"
-                )
+                write!(f, "memory limit reached at t = {t:.4} s: use fewer steps or signals, or a shorter horizon")
             }
-            Self::Cancelled => f.write_str("ended before it was done"),
+            Self::Cancelled => f.write_str("cancelled before the end"),
         }
     }
 }

@@ -1,26 +1,26 @@
-//! What is known of points before demands, usages and weights: what a run that was killed, or a study that asks for
-//! something else, need not simulate again.
+//! Cache of criterion values and derivatives, independent of demands, usages and weights. A resumed run, or a study with
+//! other demands, need not simulate cached points again.
 
 use crate::cancellation::Cancellation;
 use crate::criterion::Value;
 use crate::evaluation::Evaluation;
 use crate::failure::Failure;
 
-/// The value of a row, by index, or why it has none.
+/// Value of a row, by index, or the reason why there is none.
 pub type RowValue = (usize, Result<Value, String>);
 
-/// What one job gave: the values of the rows that read it, or why there are none.
+/// Result of one job: the values of the rows that read it, or the failure.
 pub type JobValues = Result<Vec<RowValue>, Failure>;
 
-/// What is known of a point, by jobs. Rows and residuals may be absent: a problem that needs them simulates again.
+/// Cache entry of a point, by jobs. Rows and residuals may be absent: a problem that needs them simulates again.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Known {
-    /// Index of the job, and what it gave.
+    /// Index of the job, and its result.
     pub jobs: Vec<(usize, JobValues)>,
 }
 
 impl Known {
-    /// Adds what is not known of what was known before.
+    /// Adds entries of `before` that this entry lacks.
     pub fn complete(&mut self, before: &Self) {
         for (job, then) in &before.jobs {
             match (self.jobs.iter_mut().find(|(index, _)| index == job), then) {
@@ -35,56 +35,57 @@ impl Known {
         }
     }
 
-    /// What a job gave, if it is known.
+    /// Returns the cached result of a job.
     pub fn job(&self, job: usize) -> Option<&JobValues> {
         self.jobs.iter().find(|(index, _)| *index == job).map(|(_, values)| values)
     }
 }
 
-/// The derivatives of rows, by index, along every coordinate of the unit box, in the units of the criteria.
+/// Derivatives of rows, by index, along every coordinate of the unit box, in the units of the criteria.
 pub type RowSlopes = Vec<(usize, Vec<Value>)>;
 
-/// An evaluation, and what of it can be kept.
+/// An evaluation, and the new cache entry.
 pub struct Kept {
     /// The evaluation.
     pub evaluation: Evaluation,
-    /// What holds under every demand, usage and weight; `None` where nothing new was learned.
+    /// New results, valid under every demand, usage and weight; `None` if there are none.
     pub learned: Option<Known>,
 }
 
-/// Slopes, and what of them can be kept.
+/// Derivatives, and the new cache entry.
 pub struct KeptSlopes<S> {
-    /// The slopes; `None` where there are no exact ones.
+    /// Derivatives; `None` if there are no exact ones.
     pub slopes: Option<S>,
-    /// What was learned; `None` where it was known, or the problem keeps nothing.
+    /// New results; `None` if the derivatives were cached, or if the problem has no cache.
     pub learned: Option<Option<RowSlopes>>,
 }
 
-/// Where a run keeps what it learns, and finds what is known already. Points go by the values of all tuners, bit by bit.
+/// Cache of a run: stores and returns results of points. Points are identified by the bits of all tuner values.
 ///
-/// A search asks it from many threads and tells it from one, in the order of its points; samples and searches for worst cases
-/// tell it from many. Answers must be what the problem
-/// would give itself: then they change no bit of the run, whatever is known.
+/// A search reads from many threads and writes from one, in the order of its points. Sampling and worst-case searches write
+/// from many threads. Results must equal those that the problem itself would compute; the cache then changes no bit of a
+/// run.
 pub trait Store: Send + Sync {
-    /// What is known of a point.
+    /// Returns the cache entry of a point.
     fn known(&self, tuners: &[f64]) -> Option<Known>;
 
-    /// Whether anything is known of a point.
+    /// Returns true if there is a cache entry of a point.
     fn is_known(&self, tuners: &[f64]) -> bool {
         self.known(tuners).is_some()
     }
 
-    /// Of a store that only looks back: who is asked to end at a point that is not known. `None`: such a point is simulated.
+    /// Returns the cancellation to request at a point without cache entry, for a read-only store. `None`: such points are
+    /// simulated.
     fn closed(&self) -> Option<&Cancellation> {
         None
     }
 
-    /// A point of the run was answered; `learned` is what was simulated for it, `None` where nothing was.
+    /// Stores the answer of a point; `learned` contains the newly simulated results, `None` if there are none.
     fn answered(&self, tuners: &[f64], learned: Option<Known>);
 
-    /// The derivatives at a point that describe it within `reach`; `Some(None)` where it is known that there are none.
+    /// Returns the cached derivatives at a point that describe it within `reach`; `Some(None)` if there are no exact ones.
     fn known_slopes(&self, tuners: &[f64], reach: f64) -> Option<Option<RowSlopes>>;
 
-    /// Derivatives were taken.
+    /// Stores derivatives.
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>);
 }

@@ -17,17 +17,17 @@ pub enum KnownStudy {
     Built(BuiltStudy),
 }
 
-/// A study that comes with the program: its files, by their names in its folder.
+/// Study shipped with the program: its files, by name.
 #[derive(Debug, Clone, Copy)]
 pub struct Shipped {
     /// Name.
     pub name: &'static str,
-    /// `study.toml`, `README.md` and data.
+    /// File names and contents: `study.toml`, `README.md` and data.
     pub files: &'static [(&'static str, &'static [u8])],
 }
 
 impl Shipped {
-    /// One of its files.
+    /// Returns the contents of a file.
     pub fn file(&self, name: &str) -> Option<&'static [u8]> {
         self.files.iter().find(|(path, _)| *path == name).map(|(_, bytes)| *bytes)
     }

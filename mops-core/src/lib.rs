@@ -1,6 +1,7 @@
-//! Vocabulary and machinery of mops: tuner, criterion, demand, usage, case, experiment, study, the min-max problem, run.
+//! Core types and algorithms of mops: tuners, criteria, demands, usages, cases, experiments, studies, the min-max problem
+//! and runs.
 //!
-//! This crate knows no concrete criterion, model or solver; they come in through a [`Catalogue`].
+//! Concrete criteria, models and solvers are not part of this crate; a [`Catalogue`] provides them.
 
 pub mod band_limited;
 mod cancellation;

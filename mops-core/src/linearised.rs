@@ -1,4 +1,5 @@
-//! A model's linearisation as a model of its own: the same parameters, at an operating point, between chosen signals.
+//! Linearisation of a model, itself a model: with the same parameters, at an operating point, between chosen inputs and
+//! outputs.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,64 +14,66 @@ use crate::mistake::Mistake;
 use crate::model::{Analysis, AnalysisKind, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::unit::Quantity;
 
-/// What is linearised: where, and between which inputs and signals.
+/// Options of a linearisation: operating point, inputs and outputs.
 #[derive(Debug, Clone, Default)]
 pub struct Linearise {
-    /// Inputs; all where absent.
+    /// Inputs; `None` for all.
     pub inputs: Option<Vec<String>>,
-    /// Outputs, which are signals of the model; all where absent.
+    /// Outputs, which are signals of the model; `None` for all.
     pub outputs: Option<Vec<String>>,
-    /// Values of states and inputs; a state that is not named has its start value, an input that of the case.
+    /// Values of states and inputs at the operating point. Other states have their initial values, other inputs the values
+    /// of the case.
     pub at: Vec<(String, Quantity)>,
-    /// Whether the operating point is moved to where the model rests; what `at` names is held, and so are inputs.
+    /// True if the operating point is moved to an equilibrium. The states and inputs in `at` stay fixed, and so do all other
+    /// inputs.
     pub equilibrium: bool,
-    /// States and inputs that the search may move although they would be held.
+    /// States and inputs that the search may vary although they would be fixed.
     pub free: Vec<String>,
 }
 
-/// The linearisation of a model: for every value of its parameters the system of its deviations from the operating point.
+/// Linearisation of a model: for given parameters, the linear system of the deviations from the operating point.
 pub struct Linearised {
     model: Arc<dyn Model>,
     interface: Interface,
     states: Vec<Variable>,
-    /// Indices of the inputs and outputs, in the model.
+    /// Indices of the inputs in the model.
     inputs: Vec<usize>,
     outputs: Vec<usize>,
-    /// Values of states, then inputs, where they are given.
+    /// Given values of the states, then of the inputs.
     given: Vec<Option<f64>>,
-    /// For each state the parameter that is its start value.
+    /// Index of the parameter that sets the initial value, for each state.
     starts: Vec<Option<usize>>,
-    /// Which of states, then inputs, a search may move; `None` where there is no search.
+    /// True for each state, then input, that the equilibrium search may vary; `None` without a search.
     free: Option<Vec<bool>>,
 }
 
-/// A linear system, and where it comes from.
+/// A linear system and its operating point.
 #[derive(Debug, Clone)]
 pub struct Resting {
-    /// The system of the deviations.
+    /// Linear system of the deviations.
     pub system: StateSpace,
     /// Values of the states.
     pub states: Vec<f64>,
     /// Values of all inputs of the model.
     pub inputs: Vec<f64>,
-    /// Rates of change of the states there; zero in an equilibrium.
+    /// Rates of change of the states at the operating point; zero at an equilibrium.
     pub rates: Vec<f64>,
-    /// The joints whose dry friction is left out, by the names of their positions.
+    /// Joints whose dry friction is omitted, as names of their positions.
     pub frictionless: Vec<String>,
-    /// Slopes that the model does not have there.
+    /// Derivatives that do not exist at the operating point.
     pub rough: Vec<Rough>,
 }
 
-/// A rate or an output without a slope at an operating point: it jumps there, has a kink, or is infinitely steep.
+/// A rate or an output that is not differentiable at an operating point: a jump, a kink or an infinite derivative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rough {
-    /// The state whose rate it is, or the output.
+    /// State whose rate is affected, or the output.
     pub of: String,
-    /// Whether it is the rate of a state.
+    /// True for the rate of a state.
     pub is_rate: bool,
-    /// The state or input along which there is no slope, and its value.
+    /// State or input with respect to which the derivative does not exist.
     pub along: String,
-    /// The value of that, in its unit.
+    /// Value of this state or input, in its unit.
     pub at: f64,
 }
 
@@ -80,24 +83,25 @@ impl fmt::Display for Rough {
         let what = if *is_rate { "the rate of " } else { "" };
         write!(
             f,
-            "{what}`{of}` has no slope along `{along}` at {along} = {at}: it jumps, has a kink or is infinite there"
+            "{what}`{of}` is not differentiable with respect to `{along}` at {along} = {at}: jump, kink or infinite derivative"
         )
     }
 }
 
 impl Linearised {
-    /// The linearisation of a model.
+    /// Creates the linearisation of a model.
     ///
     /// # Errors
-    /// A model without equations that can be linearised; names that it does not have; quantities in a wrong unit.
+    /// Returns an error if the model has no equations that can be linearised, for unknown names and for quantities in a
+    /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, Mistake> {
         let states = model.equation_states();
         let of = model.interface();
         if states.is_empty() {
             let fact = match of.analysis {
                 AnalysisKind::Time if model.augmented().is_some() => "a model with effects cannot be linearised",
-                AnalysisKind::Time => "this model cannot be linearised: it does not give its equations",
-                AnalysisKind::Linear => "this model is linear already",
+                AnalysisKind::Time => "this model cannot be linearised: its equations are not available",
+                AnalysisKind::Linear => "this model is already linear",
             };
             return Err(Mistake::here(fact).with_help("remove `linearise`"));
         }
@@ -115,12 +119,14 @@ impl Linearised {
             let index = place(name).map_err(|m| m.within("at"))?;
             let value = quantity.to(&places[index].unit).map_err(|why| Mistake::new(name, why).within("at"))?;
             if !value.is_finite() {
-                return Err(Mistake::new(name, format!("`{name}` must be finite, not {value}")).within("at"));
+                return Err(
+                    Mistake::new(name, format!("expected a finite value for `{name}`, found {value}")).within("at")
+                );
             }
             given[index] = Some(value);
         }
         if !options.equilibrium && !options.free.is_empty() {
-            return Err(Mistake::new("free", "only the search for an equilibrium moves something")
+            return Err(Mistake::new("free", "`free` applies only to the search for an equilibrium")
                 .with_help("add equilibrium = true, or remove `free`"));
         }
         let mut free: Vec<bool> = (0..places.len()).map(|i| i < states.len() && given[i].is_none()).collect();
@@ -128,8 +134,11 @@ impl Linearised {
             free[place(name).map_err(|m| m.within("free"))?] = true;
         }
         if options.equilibrium && !free.contains(&true) {
-            return Err(Mistake::new("equilibrium", "every state and input is held: nothing is left to move")
-                .with_help("name fewer under `at`, or add one to `free`"));
+            return Err(Mistake::new(
+                "equilibrium",
+                "every state and input is fixed, so that the search has no variables",
+            )
+            .with_help("remove one from `at`, or add one to `free`"));
         }
         let start_of = |state: &Variable| {
             let start = &of.states.iter().find(|s| s.name == state.name)?.start;
@@ -147,15 +156,15 @@ impl Linearised {
         Ok(Self { model, interface, states, inputs, outputs, given, starts, free })
     }
 
-    /// The states of the model.
+    /// Returns the states of the model.
     pub fn states(&self) -> &[Variable] {
         &self.states
     }
 
-    /// The system for given parameters, and the operating point it belongs to.
+    /// Returns the linear system at given parameters, with its operating point.
     ///
     /// # Errors
-    /// Parameters for which the model is not defined; no equilibrium.
+    /// Returns an error if the model is not defined for the parameters, or if there is no equilibrium.
     pub fn at(&self, case: &Case, parameters: &[f64]) -> Result<Resting, Failure> {
         let of = self.model.interface();
         let n = self.states.len();
@@ -187,7 +196,7 @@ impl Linearised {
         Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless, rough })
     }
 
-    /// The rates and outputs that have no slope at a point, among those that are part of the system.
+    /// Returns the rates and outputs of the system that are not differentiable at a point.
     fn rough(&self, point: &[f64], here: &Local, local: impl Fn(&[f64]) -> Option<Local>) -> Vec<Rough> {
         let n = self.states.len();
         let values = |at: &Local| [&at.rates[..], &at.signals].concat();
@@ -207,13 +216,13 @@ impl Linearised {
             .collect()
     }
 
-    /// Why there is no equilibrium, and what may help.
+    /// Returns the reason why there is no equilibrium, and a remedy.
     fn restless(&self, why: &NoEquilibrium) -> String {
         let NoEquilibrium::Restless { state, rate } = why else { return why.to_string() };
         let Variable { name, unit, .. } = &self.states[*state];
         let unit = unit.power(1, -1);
         let mut text = format!(
-            "no equilibrium was found: where the search ends `{name}` still changes by {rate:.3e} {unit}, most of all states"
+            "no equilibrium found: at the end of the search `{name}` still changes by {rate:.3e} {unit}, most of all states"
         );
         let free = self.free.as_deref().unwrap_or_default();
         let held = |from: usize, names: &[Variable]| -> Vec<String> {
@@ -223,9 +232,9 @@ impl Linearised {
         let states = held(0, &self.states);
         match (inputs.as_slice(), states.as_slice()) {
             ([], []) => {}
-            ([], states) => text += &format!("; the state {} is held", states.join(", ")),
+            ([], states) => text += &format!("; the state {} is fixed", states.join(", ")),
             (inputs, _) => {
-                text += &format!("; the input {} is held, --free lets the search move it", inputs.join(", "))
+                text += &format!("; the input {} is fixed, --free lets the search vary it", inputs.join(", "))
             }
         }
         text
@@ -261,13 +270,15 @@ impl Model for Linearised {
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         let resting = self.at(job.case, job.parameters)?;
         match resting.rough.first() {
-            Some(rough) => Err(Failure::Undefined(format!("the model cannot be linearised there: {rough}"))),
+            Some(rough) => {
+                Err(Failure::Undefined(format!("the model cannot be linearised at the operating point: {rough}")))
+            }
             None => Ok(Analysis::Linear(resting.system)),
         }
     }
 }
 
-/// Indices of the named variables; of all where none is named.
+/// Returns the indices of the named variables; of all variables without names.
 fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -> Result<Vec<usize>, Mistake> {
     let Some(names) = names else { return Ok((0..known.len()).collect()) };
     let find = |name: &String| {
@@ -278,7 +289,8 @@ fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -
         })
     };
     if names.is_empty() {
-        return Err(Mistake::new(key, format!("no {what} is named")).with_help(format!("leave `{key}` out for all")));
+        return Err(Mistake::new(key, format!("`{key}` is empty"))
+            .with_help(format!("list at least one {what}, or omit `{key}` for all")));
     }
     names.iter().map(find).collect()
 }
@@ -297,7 +309,7 @@ mod tests {
             &self.0
         }
         fn analyse(&self, _: &Job<'_>) -> Result<Analysis, Failure> {
-            unreachable!("it is only linearised")
+            unreachable!("only used for linearisation")
         }
         fn equation_states(&self) -> Vec<Variable> {
             vec![Variable::new("angle", "rad", ""), Variable::new("speed", "rad/s", "")]
@@ -330,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn the_operating_point_is_what_is_given_else_the_start_value() {
+    fn the_operating_point_is_given_or_else_the_initial_value() {
         let by_start = Linearised::new(pendulum(), &Linearise::default()).unwrap();
         let resting = by_start.at(&Case::default(), &[9.0, 0.5]).unwrap();
         assert_eq!((resting.states[0], resting.system.a[(1, 0)]), (0.5, 9.0 * math::cos(0.5)));
@@ -351,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equilibrium_holds_what_is_given_and_moves_an_input_only_if_it_may() {
+    fn an_equilibrium_keeps_given_values_and_moves_only_free_inputs() {
         let at = vec![("angle".into(), quantity("0.4"))];
         let trim = Linearise { at: at.clone(), equilibrium: true, free: vec!["u".into()], ..Linearise::default() };
         let resting = Linearised::new(pendulum(), &trim).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap();
@@ -359,9 +371,9 @@ mod tests {
         let held = Linearise { at, equilibrium: true, ..Linearise::default() };
         let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
         assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");
-        // Newton's method ends where the speed is 0 and only the torque of gravity is left.
+        // Newton's method stops at zero speed, with the gravity torque unbalanced.
         assert!(failure.to_string().contains("`speed` still changes by 3.505e0"), "{failure}");
-        assert!(failure.to_string().ends_with("the input `u` is held, --free lets the search move it"), "{failure}");
+        assert!(failure.to_string().ends_with("the input `u` is fixed, --free lets the search vary it"), "{failure}");
     }
 
     #[test]
@@ -373,7 +385,8 @@ mod tests {
             "at.angel: the model has no state or input `angel`; did you mean `angle`?"
         );
         assert!(
-            wrong(Linearise { at: at("angle", "1 s"), ..Linearise::default() }).starts_with("at.angle: a quantity in")
+            wrong(Linearise { at: at("angle", "1 s"), ..Linearise::default() })
+                .starts_with("at.angle: expected a quantity in")
         );
         assert!(wrong(Linearise { inputs: Some(vec!["v".into()]), ..Linearise::default() }).starts_with("inputs.v: "));
         assert!(wrong(Linearise { free: vec!["u".into()], ..Linearise::default() }).starts_with("free: "));

@@ -1,47 +1,47 @@
-//! Mistakes of users, with the keys that lead to their place.
+//! Errors in a study, with the path of keys to their location.
 
 use std::fmt;
 use std::ops::Range;
 
-/// A mistake in a study, with the keys that lead to its place: `criteria`, `overshoot`, `overshoot`, `signal`.
+/// An error in a study, with the path of keys to its location: `criteria`, `overshoot`, `overshoot`, `signal`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {
-    /// Keys from the study down.
+    /// Keys from the root of the study.
     pub path: Vec<String>,
-    /// The fact.
+    /// Description of the error.
     pub message: String,
-    /// The way out.
+    /// Suggested fix.
     pub help: Option<String>,
-    /// Bytes of the text under the last key, where the mistake is in a part of it.
+    /// Byte range within the text under the last key, if only a part of the text is wrong.
     pub span: Option<Range<usize>>,
 }
 
 impl Mistake {
-    /// A mistake at a key.
+    /// Creates an error at a key.
     pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { path: vec![key.into()], message: message.into(), help: None, span: None }
     }
 
-    /// A mistake in the thing itself rather than under one of its keys.
+    /// Creates an error in the object itself rather than under one of its keys.
     pub fn here(message: impl Into<String>) -> Self {
         Self { path: Vec::new(), message: message.into(), help: None, span: None }
     }
 
-    /// Adds the way out.
+    /// Adds a suggested fix.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Narrows the place to these bytes of the text under the key.
+    /// Restricts the location to these bytes of the text under the key.
     #[must_use]
     pub fn at(mut self, span: Range<usize>) -> Self {
         self.span = Some(span);
         self
     }
 
-    /// Puts the mistake under one more key.
+    /// Prepends a key to the path.
     #[must_use]
     pub fn within(mut self, key: &str) -> Self {
         self.path.insert(0, key.to_owned());

@@ -1,4 +1,4 @@
-//! What a run leaves behind: the content of `result.json`. Numbers that are not finite are written as null.
+//! Result of a run: the content of `result.json`. Non-finite numbers are written as null.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -24,123 +24,123 @@ pub struct Outcome {
     pub mops: &'static str,
     /// Name of the study.
     pub study: String,
-    /// What it is for.
+    /// Task of the study.
     pub task: Task,
     /// Seed of all random streams.
     pub seed: u64,
     /// Kind of the solver.
     pub solver: String,
-    /// Kinds of the solvers that a composite one has run, in the order in which they began; absent where it is none.
+    /// Kinds of the solvers that a composite solver has run, in order of their start; absent for other solvers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub methods: Vec<&'static str>,
-    /// Which run of the command line it is the result of: a digest of what it was asked, as its database has it.
+    /// Identifier of the command-line run with this result: a digest of its request, as stored in its database.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,
     /// Why the run stopped.
     pub stop: Stop,
-    /// Points evaluated.
+    /// Number of evaluated points.
     pub evaluations: usize,
-    /// Of a run that uses points of another again: how many of its own were known, and not simulated.
+    /// Number of evaluated points taken from another run without simulation; absent if no run was reused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reused: Option<usize>,
-    /// Models run; points that were known count as if they were simulated.
+    /// Number of simulations; cached points count as if simulated.
     pub simulations: usize,
     /// Wall-clock time, s.
     pub seconds: f64,
-    /// Whether every constraint holds.
+    /// True if all constraints are satisfied.
     pub feasible: bool,
     /// The largest weighted scaled value among those minimised.
     pub worst_scaled: f64,
-    /// What was minimised: the worst scaled value of a design, the sum of a calibration.
+    /// Minimised objective: the worst scaled value of a design, the sum of a calibration.
     pub objective: f64,
     /// The largest violation of a constraint, in scaled values.
     pub violation: f64,
-    /// Whether one criterion can be improved at no cost.
+    /// Pareto optimality of the result.
     pub pareto: Pareto,
     /// The tuners at the best point.
     pub tuners: Vec<TunerReport>,
     /// The criteria at the best point.
     pub criteria: Vec<CriterionReport>,
-    /// The same at the start values.
+    /// Criteria and objective at the initial guess.
     pub start: StartReport,
-    /// Points of the front; of a single design, the design itself.
+    /// Points of the Pareto front; for a single design, the design itself.
     pub front: Vec<Value>,
-    /// Of a calibration: estimates and errors.
+    /// Estimates and errors of a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
-    /// What tasks other than design and calibration found: a block for each.
+    /// Results of tasks other than design and calibration, one block each.
     #[serde(flatten)]
     pub found: Findings,
-    /// What failed on the way.
+    /// Failures during the run.
     pub failures: Vec<FailureReport>,
-    /// What a reader should know.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
-/// What tasks other than design and calibration found.
+/// Results of tasks other than design and calibration.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Findings {
-    /// How rich the inputs are.
+    /// Order of persistent excitation of the inputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<ExcitationFindings>,
-    /// What the data or the criteria tell of the tuners.
+    /// Identifiability of the tuners from the data or the criteria.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<SensitivityReport>,
-    /// Of a design: how the criteria change with the tuners at the reported point.
+    /// Derivatives of a design's criteria with respect to the tuners at the reported point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slopes: Option<SlopesReport>,
-    /// The objective over one tuner or two.
+    /// Objective over one or two tuners.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,
-    /// What the points of the front tell.
+    /// Trade-offs along the Pareto front.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trade_offs: Option<TradeOffs>,
-    /// What the model lacks, as the search for it writes it down.
+    /// Missing effect of the model, as written by the diagnosis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Value>,
-    /// The worst cases over a box of uncertain parameters.
+    /// Worst cases over a box of uncertain parameters.
     #[serde(rename = "worst-case", skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCaseReport>,
-    /// How the criteria are distributed.
+    /// Distributions of the criteria.
     #[serde(rename = "monte-carlo", skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<MonteCarloReport>,
-    /// How a design against worst cases was found.
+    /// Iterations of a design against worst cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robust: Option<RobustReport>,
-    /// What more is told of the uncertainty of a calibration's estimates.
+    /// Profiles, bootstrap and bands for the estimates of a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintyReport>,
-    /// Effects of the uncertain parameters over their whole ranges.
+    /// Global sensitivity of the criteria to the uncertain parameters.
     #[serde(rename = "global-sensitivity", skip_serializing_if = "Option::is_none")]
     pub global_sensitivity: Option<GlobalSensitivityReport>,
 }
 
-/// How rich inputs are, and what regressions make of them.
+/// Order of persistent excitation of the inputs, and regressions on them.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExcitationFindings {
-    /// Every input of every case.
+    /// All inputs of all cases.
     pub inputs: Vec<ExcitationReport>,
-    /// FIR and ARX models.
+    /// Estimated FIR and ARX models.
     pub regressions: Vec<RegressionReport>,
 }
 
-/// The objective over one tuner or two.
+/// Objective over one or two tuners.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings as sentences; names are in backticks.
     pub words: Vec<String>,
-    /// The tuner along x.
+    /// Tuner along x.
     pub x: SweepAxis,
-    /// The tuner along y, if there is one.
+    /// Tuner along y, if there is one.
     pub y: Option<SweepAxis>,
-    /// The objective: one row per value of y (a single one without y), with one number per value of x; null where a
-    /// simulation failed.
+    /// Objective: one row per value of y (a single one without y), with one number per value of x; null if a simulation
+    /// failed.
     pub objective: Vec<Vec<f64>>,
-    /// The largest violation of a constraint, in scaled values, likewise.
+    /// Largest constraint violation, in scaled values, in the same layout.
     pub violation: Vec<Vec<f64>>,
-    /// Value of x, of y (null without y), and objective at the best point of the sweep.
+    /// Value of x, value of y (null without y) and objective at the best point of the sweep.
     pub best: [f64; 3],
-    /// The same at the point around which it was made.
+    /// Value of x, value of y (null without y) and objective at the centre of the sweep.
     pub centre: [f64; 3],
 }
 
@@ -151,95 +151,97 @@ pub struct SweepAxis {
     pub tuner: String,
     /// Unit of the values.
     pub unit: String,
-    /// Whether the values are spread evenly in the logarithm.
+    /// True if the values are evenly spaced in the logarithm.
     pub log: bool,
-    /// The values.
+    /// Values of the tuner.
     pub values: Vec<f64>,
 }
 
-/// A tuner of a result.
+/// Tuner values in a result.
 #[derive(Debug, Clone, Serialize)]
 pub struct TunerReport {
     /// Name.
     pub name: String,
     /// Value at the best point.
     pub value: f64,
-    /// Value at the start.
+    /// Initial guess.
     pub start: f64,
     /// Smallest and largest value.
     pub bounds: [f64; 2],
-    /// Unit of all of these.
+    /// Unit of the values and bounds.
     pub unit: String,
-    /// `lower` or `upper` where the value is at that bound.
+    /// `lower` or `upper` if the value is at that bound.
     pub at_bound: Option<&'static str>,
-    /// Whether the solver could change it.
+    /// True if the solver could change the tuner.
     pub active: bool,
 }
 
-/// A criterion of a result, in one case.
+/// Criterion values in a result, for one case.
 #[derive(Debug, Clone, Serialize)]
 pub struct CriterionReport {
     /// Name.
     pub name: String,
-    /// The model it reads.
+    /// Model that the criterion reads.
     pub model: String,
-    /// The case.
+    /// Name of the case.
     pub case: String,
-    /// What the study does with it.
+    /// Usage of the criterion in the study.
     pub usage: Usage,
-    /// The demand; null where `good` and `bad` stand for it, or nothing was asked.
+    /// Demand; null if `good` and `bad` replace it, or if there is no demand.
     pub demand: Option<f64>,
-    /// Value that scales to 0, where given.
+    /// Value that scales to 0, if given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub good: Option<f64>,
-    /// Value that scales to 1, where given.
+    /// Value that scales to 1, if given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bad: Option<f64>,
-    /// The value; null where what the criterion asks for was never reached, or nothing could be computed.
+    /// Value; null if the condition of the criterion was never reached, or if the value could not be computed.
     pub value: f64,
-    /// The scaled value, at most 1 where the demand is met. A demand `d` is the largest value that is accepted for a kind of which
-    /// less is better, and scales `c/d`; it is the smallest for one of which more is better, and scales `1 + (d - c)/|d|`. A pair
-    /// scales `(c - good)/(bad - good)`. What was never reached counts `max(1, h/d) (1 + e/(e + b))`: `h` is the time in
-    /// which it could have been reached, `e` the mean distance of the signal from where it should be over the last tenth of that
-    /// time, `b` the half-width of the band (for levels 1 % of the step); `1 + e/(e + b)` under a pair, and for a kind
-    /// that is no time.
+    /// Scaled value, at most 1 if the demand is met. A demand `d` is the upper limit `c <= d` if less is better, with the
+    /// scaled value `c/d`. It is the lower limit `c >= d` if more is better, with the scaled value `1 + (d - c)/|d|`. A pair
+    /// scales to `(c - good)/(bad - good)`.
+    ///
+    /// A condition that was never reached scales to `max(1, h/d) (1 + e/(e + b))`. Under a pair, and for a criterion that is
+    /// not a time, it scales to `1 + e/(e + b)`. `h` is the time available to reach the condition. `e` is the mean distance
+    /// of the signal from its target over the last tenth of that time. `b` is the half-width of the band (for levels 1 % of
+    /// the step).
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,
-    /// Whether the demand is met; true where there is none, never where the value was not reached.
+    /// True if the demand is met, or if there is none; false if the condition was not reached.
     pub met: bool,
-    /// Whether more is asked for, not less.
+    /// True if the demand is a lower limit.
     #[serde(skip)]
     pub at_least: bool,
-    /// What a reader must know of the value.
+    /// Remark on the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<&'static str>,
 }
 
-/// The result at the start values.
+/// Result at the initial guess.
 #[derive(Debug, Clone, Serialize)]
 pub struct StartReport {
-    /// Whether every constraint holds.
+    /// True if all constraints are satisfied.
     pub feasible: bool,
     /// The largest weighted scaled value among those minimised.
     pub worst_scaled: f64,
-    /// What was minimised.
+    /// Minimised objective.
     pub objective: f64,
-    /// The criteria.
+    /// Criteria at the initial guess.
     pub criteria: Vec<CriterionReport>,
 }
 
-/// What a calibration gives beside its tuners.
+/// Results of a calibration in addition to the tuners.
 #[derive(Debug, Clone, Serialize)]
 pub struct CalibrationReport {
-    /// Estimates, with what the data tell of their uncertainty.
+    /// Estimates and their uncertainty.
     pub parameters: Vec<ParameterReport>,
-    /// How well each experiment is met.
+    /// Fit of each experiment.
     pub experiments: Vec<ExperimentReport>,
-    /// Which tuners, or which combinations of them, the data determine.
+    /// Tuners, and combinations of tuners, that the data determine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<SensitivityReport>,
-    /// How rich the inputs of the experiments are; empty where nothing is driven.
+    /// Order of persistent excitation of the inputs of the experiments; empty if no input is driven.
     pub excitation: Vec<ExcitationReport>,
 }
 
@@ -250,60 +252,60 @@ pub struct ParameterReport {
     pub name: String,
     /// Estimate.
     pub value: f64,
-    /// Standard error to first order; null where the data do not determine it.
+    /// Standard error to first order; null if the data do not determine the parameter.
     pub std_error: f64,
-    /// 95 % interval: estimate +- t quantile times standard error, within the bounds; null where the data do not determine
-    /// it.
+    /// 95 % confidence interval: estimate +- t quantile times standard error, clamped to the bounds. Null if the data do not
+    /// determine the parameter.
     pub interval95: [f64; 2],
-    /// Unit of all of these.
+    /// Unit of the estimate, error and interval.
     pub unit: String,
 }
 
-/// How well an experiment is met.
+/// Fit of an experiment.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExperimentReport {
     /// Name.
     pub name: String,
-    /// What it is used for.
+    /// Role of the experiment.
     pub role: Role,
-    /// Its channels.
+    /// Fit of each channel.
     pub channels: Vec<ChannelReport>,
 }
 
-/// How well a channel is met.
+/// Fit of a channel.
 #[derive(Debug, Clone, Serialize)]
 pub struct ChannelReport {
-    /// The measured signal.
+    /// Name of the measured signal.
     pub name: String,
-    /// Root of the mean square of measured - simulated.
+    /// Root mean square of measured - simulated.
     pub rmse: f64,
-    /// Standard deviation of the noise, where known.
+    /// Standard deviation of the noise, if known.
     pub noise: Option<f64>,
-    /// `100 (1 - |y - yhat| / |y - mean y|)`.
+    /// Fit in percent: `100 (1 - |y - yhat| / |y - mean y|)`.
     pub fit_percent: f64,
-    /// Unit of error and noise.
+    /// Unit of the error and the noise.
     pub unit: String,
-    /// Whether its residuals are white; absent for too few of them, or where nothing was simulated.
+    /// Whiteness of the residuals; absent if there are too few residuals or no simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub whiteness: Option<Whiteness>,
 }
 
-/// Simulations that failed.
+/// Failed simulations of one kind.
 #[derive(Debug, Clone, Serialize)]
 pub struct FailureReport {
-    /// The model.
+    /// Name of the model.
     pub model: String,
-    /// The case.
+    /// Name of the case.
     pub case: String,
     /// Kind of failure.
     pub failure: String,
-    /// The first of them, in words.
+    /// Description of the first failure.
     pub first: String,
-    /// How often.
+    /// Number of failures.
     pub count: usize,
 }
 
-/// The tuners of an evaluation, beside their start values.
+/// Returns the tuner values of an evaluation, with the initial guess.
 pub(crate) fn tuners(study: &Study, at: &Evaluation) -> Vec<TunerReport> {
     let start = study.start();
     let report = |(i, tuner): (usize, &crate::tuner::Tuner)| TunerReport {
@@ -318,7 +320,7 @@ pub(crate) fn tuners(study: &Study, at: &Evaluation) -> Vec<TunerReport> {
     study.tuners.iter().enumerate().map(report).collect()
 }
 
-/// The criteria of an evaluation.
+/// Returns the criterion values of an evaluation.
 pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport> {
     let report = |(row, reading): (&crate::study::Row, &Option<crate::evaluation::Reading>)| {
         let plan = &study.jobs[row.job];
@@ -347,7 +349,7 @@ pub fn criterion_reports(study: &Study, at: &Evaluation) -> Vec<CriterionReport>
     study.rows.iter().zip(&at.readings).map(report).collect()
 }
 
-/// The largest weighted scaled value among the rows minimised in calibration cases; NaN if one has none.
+/// Returns the largest weighted scaled value among the rows minimised in calibration cases; NaN if a row has no value.
 pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
     let counts =
         |row: &&crate::study::Row| row.usage == Usage::Minimise && study.case_of(row).role() == Role::Calibration;
@@ -357,7 +359,7 @@ pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// A point of a front: its tuners and its criteria.
+/// Returns the tuners and criteria at a point of a Pareto front.
 pub(crate) fn front_point(study: &Study, at: &Evaluation) -> Value {
     let tuners: Map<String, Value> =
         study.tuners.iter().zip(&at.tuners).map(|(t, &v)| (t.name.clone(), json!(v))).collect();

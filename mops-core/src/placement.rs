@@ -1,4 +1,4 @@
-//! Effects at places of a model, as they are written down.
+//! Effects at places of a model, as written in a study.
 
 use std::sync::Arc;
 
@@ -9,36 +9,36 @@ use crate::mistake::Mistake;
 use crate::model::{Interface, Model};
 use crate::port::Port;
 
-/// An effect at a place of a model, as it is written down: nothing checked yet.
+/// An effect at a place of a model, as written in a study and not yet checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EffectDraft {
-    /// Its name in the model: its strengths are the parameters `name.strength`.
+    /// Name of the effect in the model; its parameters are called `name.strength`.
     pub name: String,
-    /// The kind of effect.
+    /// Kind of effect.
     pub kind: String,
-    /// The place that it acts at, as `joint:phi`.
+    /// Place that the effect acts at, such as `joint:phi`.
     pub place: String,
-    /// A second place, where the effect needs one.
+    /// Second place, if the effect needs one.
     pub companion: Option<String>,
 }
 
 impl EffectDraft {
-    /// An effect of a kind at a place.
+    /// Creates an effect of a kind at a place.
     pub fn new(name: impl Into<String>, kind: impl Into<String>, place: impl Into<String>) -> Self {
         Self { name: name.into(), kind: kind.into(), place: place.into(), companion: None }
     }
 
-    /// With a second place.
+    /// Sets a second place.
     #[must_use]
     pub fn with_companion(self, place: impl Into<String>) -> Self {
         Self { companion: Some(place.into()), ..self }
     }
 
-    /// The effect and the ports that are meant.
+    /// Returns the effect and its ports.
     fn placement(&self, catalogue: &Catalogue, model: &Interface) -> Result<Placement, Mistake> {
         if self.name.is_empty() || !self.name.chars().all(|c| c.is_alphanumeric() || "_-".contains(c)) {
-            return Err(Mistake::here(format!("an effect cannot be called `{}`", self.name))
-                .with_help("a name is made of letters, digits, `_` and `-`"));
+            return Err(Mistake::here(format!("invalid effect name `{}`", self.name))
+                .with_help("use letters, digits, `_` and `-` only"));
         }
         let effect = catalogue.effects.iter().find(|effect| effect.name() == self.kind).ok_or_else(|| {
             Mistake::new(&self.kind, format!("there is no effect `{}`", self.kind))
@@ -55,11 +55,12 @@ impl EffectDraft {
 }
 
 impl Catalogue {
-    /// A model with effects at its places; each strength is a parameter `name.strength`, neutral unless it is set.
+    /// Returns a model with effects at its places. Each effect parameter is a model parameter `name.strength`, at its null
+    /// value by default.
     ///
     /// # Errors
-    /// A kind of effect, or a place, that there is not; an effect that does not act there. The mistake stands under the
-    /// effect's name.
+    /// Returns an error for an unknown kind of effect or place, and for an effect that does not act there. The error has the
+    /// effect's name as its first key.
     pub fn with_effects(&self, model: Arc<dyn Model>, effects: &[EffectDraft]) -> Result<Box<dyn Model>, Mistake> {
         let placement = |draft: &EffectDraft| {
             draft.placement(self, model.interface()).map_err(|mistake| mistake.within(&draft.name))
@@ -71,27 +72,27 @@ impl Catalogue {
 }
 
 impl Interface {
-    /// The ports that effects act at: a joint stands for the equation of its speed.
+    /// Returns the ports that effects act at; a joint represents the equation of its speed.
     pub fn places(&self) -> impl Iterator<Item = &Port> {
         self.ports.iter().filter(|port| port.kind(&self.ports).is_some())
     }
 }
 
 impl Port {
-    /// The port of a model that is called so, as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
+    /// Returns the port of a model with this name, such as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
     ///
     /// # Errors
-    /// There is none of this name.
+    /// Returns an error if the model has no such port.
     pub fn named(text: &str, model: &Interface) -> Result<Self, Mistake> {
         if let Some(port) = model.ports.iter().find(|port| port.to_string() == text) {
             return Ok(port.clone());
         }
         if model.ports.is_empty() {
-            return Err(Mistake::here("this model has no places for effects: it does not open its equations")
-                .with_help("remove `effects`, or take a model of its equations (`mops describe equations`)"));
+            return Err(Mistake::here("this model has no places for effects: its equations are not accessible")
+                .with_help("remove `effects`, or write the model as equations (`mops describe equations`)"));
         }
         let names: Vec<String> = model.places().map(ToString::to_string).collect();
-        // A kind alone, or a name alone, is not far from what was meant.
+        // A kind alone, or a name alone, is a near match.
         let meant: Vec<&str> = names.iter().filter(|n| n.split(':').any(|part| part == text)).map(|n| &**n).collect();
         let help = if meant.is_empty() {
             suggestion(text, names.iter().map(String::as_str))
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn an_effect_that_is_not_there_is_a_mistake_at_its_kind() {
+    fn an_unknown_effect_is_a_mistake_at_its_kind() {
         let catalogue = Catalogue::default();
         let draft = EffectDraft::new("arm", "coulomb-friction", "joint:phi");
         let mistake = draft.placement(&catalogue, &Interface::default()).err().unwrap();

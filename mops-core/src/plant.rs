@@ -1,10 +1,10 @@
-//! The plant of a model: its equations at given parameters, with inputs and forces as arguments.
+//! Plants: the equations of a model at given parameters, with inputs and forces as arguments.
 
 use crate::enclosure::Enclosure;
 use crate::failure::Failure;
 use crate::scalar::{Along, Scalar};
 
-/// Where a plant is looked at.
+/// Time, states, inputs and forces at which a plant is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Instant<'a, S> {
     /// Time, s.
@@ -13,149 +13,151 @@ pub struct Instant<'a, S> {
     pub x: &'a [S],
     /// The inputs as they reach the plant, in the order of [`crate::Interface::inputs`].
     pub u: &'a [S],
-    /// What is added to the right-hand sides, one for every [`crate::Port::Process`] in the order of
-    /// [`crate::Interface::ports`]; 0 in the declared model.
+    /// Additive terms of the right-hand sides, one for every [`crate::Port::Process`] in the order of
+    /// [`crate::Interface::ports`]; 0 in the nominal model.
     pub w: &'a [S],
 }
 
-/// The instant of an event, and how it moves with the parameters.
+/// The instant of an event and its derivatives with respect to the parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct EventInstant<'a, S> {
-    /// Time, states, inputs and forces just before the event; the inputs move with it.
+    /// Time, states, inputs and forces just before the event; the inputs vary with the event time.
     pub at: Instant<'a, S>,
     /// Rates of the inputs, per s.
     pub du: &'a [f64],
-    /// The derivatives of the time of the event with respect to the directions of the scalar; its value is 0.
+    /// Derivatives of the event time along the directions of the scalar; the value part is 0.
     pub delay: S,
 }
 
-/// What is known of a plant over a time: bounds of what an [`Instant`] gives.
+/// Bounds on the time, states, inputs and forces of a plant over a time interval, see [`Instant`].
 #[derive(Debug, Clone, Copy)]
 pub struct Span<'a> {
-    /// Time, s.
+    /// Time interval, s.
     pub time: Enclosure,
-    /// The states.
+    /// Bounds of the states.
     pub x: &'a [Enclosure],
-    /// The inputs.
+    /// Bounds of the inputs.
     pub u: &'a [Enclosure],
-    /// What is added to the right-hand sides.
+    /// Bounds of the additive terms of the right-hand sides.
     pub w: &'a [Enclosure],
 }
 
-/// A plant: `x' = f(t, x, u, w)` at given parameters, in modes of its own between which guards switch.
+/// A plant: `x' = f(t, x, u, w)` at given parameters, as a hybrid system whose guards switch between modes.
 ///
-/// It is written once over [`Scalar`], so that it runs with values and with exact tangents, those of jumps at events included.
-/// All of its state that is not in `x` is its mode, which changes in [`Plant::switch`], [`Plant::rest`], [`Plant::settle`] and
-/// [`Plant::linearised_at`] alone; between them it is smooth.
+/// Implementations are generic over [`Scalar`]: they run with values and with exact tangents, including those of jumps at
+/// events. The mode is the only state not contained in `x`. The mode changes in [`Plant::switch`], [`Plant::rest`],
+/// [`Plant::settle`] and [`Plant::linearised_at`] alone; between mode changes the plant is smooth.
 pub trait Plant<S: Scalar> {
-    /// The states at time 0.
+    /// Returns the states at time 0.
     fn start(&self) -> Vec<S>;
 
-    /// Whether a simulation can begin here.
+    /// Checks that a simulation can start here.
     ///
     /// # Errors
-    /// Why it cannot: equations that have no solution here, or parameters that contradict one another.
+    /// Returns the reason if the equations have no solution here or parameters contradict one another.
     fn can_start(&self, _at: &Instant<'_, S>) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Writes `x'` in the present mode.
+    /// Writes `x'` in the current mode.
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]);
 
-    /// The value of a signal, by its index in the interface; where not said otherwise, signals are the states, then the inputs.
+    /// Returns the value of a signal, by its index in the interface. By default, the signals are the states, then the
+    /// inputs.
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
         at.x.get(signal).copied().unwrap_or_else(|| at.u[signal - at.x.len()])
     }
 
-    /// Number of guards in the present mode.
+    /// Returns the number of guards in the current mode.
     fn guards(&self) -> usize {
         0
     }
 
-    /// The value of a guard: the mode holds while it is not negative.
+    /// Returns the value of a guard: the mode is valid while the guard is not negative.
     fn guard(&self, _index: usize, _at: &Instant<'_, S>) -> S {
         S::from(1.0)
     }
 
-    /// The state that a guard is, and the factor that it has: the speed of a joint that slides. `None` where it must be computed; the
-    /// search for events then reads one state instead of all.
+    /// Returns the index and factor of the state that a guard is proportional to, such as the speed of a sliding joint. The
+    /// event search then reads one state instead of all. `None` if the guard must be computed.
     fn guard_shows(&self, _index: usize) -> Option<(usize, f64)> {
         None
     }
 
-    /// The rate of a guard along the solution, per s; `du` are the rates of the inputs. `None` where only values of the guard
-    /// tell it.
+    /// Returns the rate of a guard along the solution, per s; `du` are the rates of the inputs. `None` if only values of the
+    /// guard are available.
     fn guard_rate(&self, _index: usize, _at: &Instant<'_, S>, _du: &[f64]) -> Option<f64> {
         None
     }
 
-    /// A guard became negative: changes the mode; where the state jumps, writes the state after the event to `x`, in which the
-    /// state before it stands. Returns what happened; an empty text where a user need not know.
+    /// Changes the mode after a guard became negative. If the state jumps, overwrites the state before the event in `x` with
+    /// the state after it. Returns a description of the event, empty if users need not see it.
     fn switch(&mut self, _index: usize, _event: &EventInstant<'_, S>, _x: &mut [S]) -> &str {
         ""
     }
 
-    /// Whether it encloses its guards.
+    /// Returns true if the plant provides bounds of its guards.
     fn has_bounds(&self) -> bool {
         false
     }
 
-    /// Bounds of a guard and of its rate over a time; asked for where [`Plant::has_bounds`].
+    /// Returns bounds of a guard and of its rate over a time interval; called only if [`Plant::has_bounds`].
     fn enclose_guard(&self, _index: usize, _over: &Span<'_>) -> Enclosure {
         Enclosure::UNKNOWN
     }
 
-    /// The events of a guard accumulate, in intervals below `close` in s: writes the state in which they end to `x` and returns
-    /// what happened.
+    /// Handles accumulating (Zeno) events of a guard, at intervals below `close` in s. Writes the limit state to `x` and
+    /// returns a description.
     ///
     /// # Errors
-    /// There is no such state: which events accumulate, and the way out. The simulation fails.
+    /// Returns an error if there is no limit state: which events accumulate, and how to avoid them. The simulation fails.
     fn rest(&mut self, _index: usize, _event: &EventInstant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
-        Err("a mode of the model changes to and fro without end".to_owned())
+        Err("a mode of the model chatters without end".to_owned())
     }
 
-    /// Finds the mode: at the start, at each of its own breaks, and where inputs or forces jump.
+    /// Determines the mode: at the start, at each break of the plant, and at jumps of inputs or forces.
     fn settle(&mut self, _at: &Instant<'_, S>) {}
 
-    /// Takes the mode in which the plant is linearised. Where it is `at_rest`, or a search for such a point passes, no joint has
-    /// dry friction; else joints have none whose speed is as good as 0, and the others slide the way they move. Returns the
-    /// positions, as states, of the joints whose dry friction is left out.
+    /// Enters the mode for linearisation. If `at_rest`, at an equilibrium or during the search for one, no joint has dry
+    /// friction. Otherwise dry friction is omitted only for joints with practically zero speed; the others slide in their
+    /// direction of motion. Returns the positions, as states, of the joints without dry friction.
     ///
     /// # Errors
-    /// The plant has no linearisation.
+    /// Returns an error if the plant has no linearisation.
     fn linearised_at(&mut self, at: &Instant<'_, S>, _at_rest: bool) -> Result<Vec<usize>, Failure> {
         self.settle(at);
         Ok(Vec::new())
     }
 
-    /// The typical size of a state, in its unit; `None` where only the simulation tells it.
+    /// Returns the typical magnitude of a state, in its unit; `None` if only the simulation can determine it.
     fn scale(&self, _state: usize) -> Option<f64> {
         None
     }
 
-    /// The next time after `t` at which the plant itself takes a sample or jumps, s; infinity if never.
+    /// Returns the next time after `t` at which the plant itself samples or jumps, s; infinity if never.
     fn next_break(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// The longest step within which the plant is well resolved, s: a state that rests says nothing of it.
+    /// Returns the largest step size that resolves the plant, s. The limit is needed because a state at rest does not limit
+    /// the step size.
     fn longest_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// The entries of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
-    /// method solves with the band that they span.
+    /// Returns the sparsity pattern of the Jacobian `df/dx` as pairs of row and column; `None` for a dense one. The stiff
+    /// method uses the band spanned by the pattern.
     fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
         None
     }
 
-    /// Passes each entry of the Jacobian `df/dx` on as row, column and value, and returns `true`; `false` where the plant has
-    /// no exact one, and differences must do.
+    /// Passes each entry of the Jacobian `df/dx` as row, column and value to `entry` and returns `true`. Returns `false` if
+    /// there is no exact Jacobian; finite differences are then used.
     fn jacobian(&self, _at: &Instant<'_, S>, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         false
     }
 
-    /// What a failure of the simulation means for this plant.
+    /// Returns the failure, with an explanation specific to this plant if there is one.
     fn explain(&self, failure: Failure) -> Failure {
         failure
     }
@@ -226,31 +228,31 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
 
 /// A model that can be opened at its ports.
 pub trait Open: Send + Sync {
-    /// The plant at these values of the model's parameters.
+    /// Returns the plant at the given parameter values.
     ///
     /// # Errors
-    /// Parameters for which the model is not defined.
+    /// Returns an error if the model is not defined for the parameters.
     fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure>;
 
-    /// The same with tangents.
+    /// Returns the plant with tangents, at parameter values with tangents.
     ///
     /// # Errors
-    /// As [`Open::open`].
+    /// Returns an error as [`Open::open`] does.
     fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure>;
 
-    /// Accuracy and limits of its simulations.
+    /// Returns the accuracy and the limits of simulations of the model.
     fn tolerance(&self) -> crate::Tolerance;
 }
 
-/// A scalar in which effects and opened models run: a number, or a number with tangents.
+/// Scalar type of effects and opened models: a number, or a number with tangents.
 pub trait Opening: Scalar {
-    /// [`Open::open`] or [`Open::open_along`].
+    /// Calls [`Open::open`] or [`Open::open_along`].
     ///
     /// # Errors
-    /// As these.
+    /// Returns an error as these functions do.
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure>;
 
-    /// [`crate::Effect::act`] or [`crate::Effect::act_along`].
+    /// Calls [`crate::Effect::act`] or [`crate::Effect::act_along`].
     fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::Acting<Self>>;
 }
 

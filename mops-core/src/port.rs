@@ -1,45 +1,45 @@
-//! Places of a model where an effect that it lacks may act.
+//! Ports: places of a model where a missing effect may act.
 
 use std::fmt;
 
 use crate::unit::Unit;
 
-/// A place where a missing force, rate, actuator or sensor effect may act.
+/// A place where a missing force, rate, actuator effect or sensor effect may act.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Port {
-    /// A force on a coordinate of second order, which may depend on its position and speed.
+    /// A force on a second-order coordinate, which may depend on position and speed.
     Joint {
-        /// Name of the place: the position, where the study gives no other.
+        /// Name of the place: by default that of the position.
         name: String,
-        /// The state that is the position.
+        /// State that is the position.
         position: String,
-        /// The state that is its rate of change; the force enters its equation, before a mass matrix is solved.
+        /// State that is the rate of change of the position; the force enters its equation, before a mass matrix is solved.
         velocity: String,
-        /// Unit of the force, where the model tells it.
+        /// Unit of the force, if the model provides it.
         unit: Option<Unit>,
     },
     /// A term in the equation of a state, before a mass matrix is solved.
     Process {
-        /// Name of the place: that of the joint, or the state.
+        /// Name of the place: the joint or the state.
         name: String,
-        /// The state whose equation it is.
+        /// State whose equation contains the term.
         state: String,
-        /// Unit of the term, where the model tells it.
+        /// Unit of the term, if the model provides it.
         unit: Option<Unit>,
     },
-    /// What an input does before it acts.
+    /// Effect between an input and the plant.
     Actuator {
-        /// The input.
+        /// Name of the input.
         input: String,
     },
-    /// What a signal does before it is measured.
+    /// Effect between a signal and its measurement.
     Sensor {
-        /// The signal.
+        /// Name of the signal.
         output: String,
     },
 }
 
-/// `kind:name`, as results spell a place.
+/// Formats a place as `kind:name`, as in results.
 impl fmt::Display for Port {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

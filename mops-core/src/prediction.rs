@@ -1,17 +1,17 @@
-//! Single values and signals of a problem: what a criterion is at a point, and how a signal depends on the tuners.
+//! Criterion values and signals of a problem at given tuners, with the derivatives of signals with respect to the tuners.
 
 use crate::model::{Analysis, Job};
 use crate::problem::Problem;
 use crate::study::Row;
 
-/// Values of a signal, and for every active tuner their derivative along it.
+/// Values of a signal, and its derivatives with respect to every active tuner.
 pub type SignalSlopes = (Vec<f64>, Vec<Vec<f64>>);
 
-/// Step of central differences, in the unit box: near the cube root of what simulations are exact to.
+/// Step of central differences in the unit box: near the cube root of the relative accuracy of simulations.
 const STEP: f64 = 1e-4;
 
 impl Problem {
-    /// The value of one criterion for given values of all tuners; `None` where it has none.
+    /// Returns the value of one criterion for given values of all tuners; `None` if the criterion has no value.
     pub fn value_at(&self, row: &Row, tuners: &[f64]) -> Option<f64> {
         let plan = &self.study().jobs[row.job];
         let case = &self.study().cases[plan.case];
@@ -21,8 +21,9 @@ impl Problem {
         row.criterion.value(case, &analysis).ok().map(|value| value.number).filter(|number| number.is_finite())
     }
 
-    /// A signal of a job at increasing times, and its derivative along every active tuner in the tuner's own unit: exact where
-    /// the model has tangents, by central differences of simulations elsewhere. `None` where a simulation fails.
+    /// Returns a signal of a job at increasing times, and its derivative with respect to every active tuner, in the tuner's
+    /// unit. The derivatives are exact if the model has tangents, else central differences of simulations. `None` if a
+    /// simulation fails.
     pub fn signal_slopes(&self, job: usize, tuners: &[f64], signal: &str, times: &[f64]) -> Option<SignalSlopes> {
         let sample = |analysis: &Analysis| Some(analysis.response()?.trace(signal)?.sample(times));
         let plan = &self.study().jobs[job];

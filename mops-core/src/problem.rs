@@ -1,4 +1,4 @@
-//! The weighted min-max problem over the unit box that a study poses.
+//! The weighted min-max problem of a study over the unit box.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::solver::Shape;
 use crate::study::{Row, Study, Task};
 use crate::tuner::Tuner;
 
-/// A study as solvers see it: active tuners as coordinates of the unit box, criteria as rows of scaled values.
+/// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled values.
 #[derive(Clone)]
 pub struct Problem {
     study: Arc<Study>,
@@ -29,13 +29,13 @@ pub struct Problem {
     shape: Shape,
     /// Jobs of the problem.
     jobs: Vec<usize>,
-    /// Those of them that a solver's points need: the others are only watched.
+    /// Jobs needed for the points of a solver: all except monitored ones.
     counting: Vec<usize>,
 }
 
-/// Slopes of the rows and residuals, as in [`crate::Linearisation`].
+/// Derivatives of the rows and residuals, as in [`crate::Linearisation`].
 pub struct Slopes {
-    /// Derivative of the scaled value of row `i` along coordinate `j`: `rows[i][j]`; 0 for rows that are only watched.
+    /// Derivative of the scaled value of row `i` along coordinate `j`: `rows[i][j]`; 0 for monitored rows.
     pub rows: Vec<Vec<f64>>,
     /// Derivative of residual `i` along coordinate `j`: `residuals[j][i]`.
     pub residuals: Vec<Vec<f64>>,
@@ -45,16 +45,17 @@ pub struct Slopes {
 type RowSlopes = (usize, Vec<Value>);
 
 impl Problem {
-    /// The problem of the study itself: tuners of the study and of its calibration cases; the other cases are watched.
+    /// Creates the problem of the study itself: tuners of the study and of its calibration cases. The other cases are
+    /// monitored.
     pub fn new(study: Arc<Study>) -> Self {
         let base = study.start();
         let active = active(&study);
         Self::with(study, active, base, own_usage)
     }
 
-    /// The problem of one case alone: the tuners of this case (free start values, and all with `per-case = true`) are active,
-    /// all else keeps the values in `tuners`. This estimates what is local to an experiment whose data must move no parameter
-    /// of the study.
+    /// Creates the problem of a single case. The tuners of this case (free initial states, and all with `per-case = true`)
+    /// are active; all others keep their values in `tuners`. This estimates the local parameters of an experiment whose data
+    /// must not influence the parameters of the study.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
         let moves = |tuner: &Tuner| tuner.active && tuner.case == Some(case);
         let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
@@ -67,8 +68,8 @@ impl Problem {
         problem
     }
 
-    /// Sizes and kinds of the problem of a study, as far as they are known without a simulation: a sum is taken for one of
-    /// squares, of one residual.
+    /// Returns the dimensions and kinds of the problem of a study, as far as known without a simulation. A sum is assumed to
+    /// be a sum of squares with one residual.
     pub fn outline(study: &Study) -> Shape {
         let residuals = usize::from(study.objective == Objective::Sum);
         Shape { residuals, ..shape(study, &active(study), own_usage) }
@@ -86,8 +87,8 @@ impl Problem {
         problem
     }
 
-    /// Length of the residual vector, from an evaluation that succeeds: a criterion knows it only once it has seen its
-    /// data. Looked for at the start and, where that fails, at some points of the box.
+    /// Returns the length of the residual vector, from a successful evaluation: a criterion needs its data to determine it.
+    /// The start is tried first, then random points of the box.
     fn count_residuals(&self) -> usize {
         if self.shape.objective != Objective::Sum {
             return 0;
@@ -99,7 +100,7 @@ impl Problem {
         succeeds.map_or(0, |evaluation| evaluation.residuals.len())
     }
 
-    /// The problem as what concludes a run sees it: its simulations end only where that is insisted on.
+    /// Returns a copy for concluding a run: only a second, insistent cancellation request ends its simulations.
     #[must_use]
     pub fn concluding(&self) -> Self {
         let mut study = Study::clone(&self.study);
@@ -107,37 +108,37 @@ impl Problem {
         Self { study: Arc::new(study), ..self.clone() }
     }
 
-    /// Whether its simulations were asked to end.
+    /// Returns true if cancellation of the simulations was requested.
     pub fn is_cancelled(&self) -> bool {
         self.study.cases.iter().any(|case| case.cancellation.requested().is_some())
     }
 
-    /// The study.
+    /// Returns the study.
     pub fn study(&self) -> &Arc<Study> {
         &self.study
     }
 
-    /// Sizes and kinds.
+    /// Returns the dimensions and kinds of the problem.
     pub fn shape(&self) -> &Shape {
         &self.shape
     }
 
-    /// Active tuners, as indices into the study's.
+    /// Returns the active tuners, as indices into the tuners of the study.
     pub fn active(&self) -> &[usize] {
         &self.active
     }
 
-    /// The start values as a point of the unit box.
+    /// Returns the initial guess as a point of the unit box.
     pub fn start(&self) -> Vec<f64> {
         self.point_of(&self.base)
     }
 
-    /// The point of the unit box at which the active tuners have the given values.
+    /// Returns the point of the unit box at which the active tuners have the given values.
     pub fn point_of(&self, tuners: &[f64]) -> Vec<f64> {
         self.active.iter().map(|&i| self.study.tuners[i].position_of(tuners[i])).collect()
     }
 
-    /// Values of all tuners at a point of the unit box.
+    /// Returns the values of all tuners at a point of the unit box.
     pub fn tuners_at(&self, point: &[f64]) -> Vec<f64> {
         let mut values = self.base.clone();
         for (&i, &u) in self.active.iter().zip(point) {
@@ -147,32 +148,31 @@ impl Problem {
         values
     }
 
-    /// Evaluates a point of the unit box; its simulations run in parallel. Cases that are only watched are left out.
+    /// Evaluates a point of the unit box; its simulations run in parallel. Monitored cases are omitted.
     pub fn evaluate(&self, point: &[f64]) -> Evaluation {
         self.evaluate_tuners(point.to_vec(), self.tuners_at(point), &self.counting)
     }
 
-    /// Evaluates given values of all tuners, which need not lie within their bounds, in every case.
+    /// Evaluates given values of all tuners, which may lie outside their bounds, in every case.
     pub fn evaluate_at(&self, tuners: &[f64]) -> Evaluation {
         self.evaluate_tuners(self.point_of(tuners), tuners.to_vec(), &self.jobs)
     }
 
-    /// Whether something is known of every simulation that the evaluation of a point takes, in `every` case or in those that
-    /// count.
+    /// Returns true if the cache contains a result for every simulation of a point, in `every` case or in those that count.
     pub fn has_met(&self, known: Option<&Known>, every: bool) -> bool {
         let mut jobs = if every { self.jobs.iter() } else { self.counting.iter() };
         jobs.all(|&job| known.is_some_and(|known| known.job(job).is_some()))
     }
 
-    /// Number of simulations that the evaluation of a point takes.
+    /// Returns the number of simulations per evaluation of a point.
     pub fn simulations(&self) -> usize {
         self.counting.len()
     }
 
-    /// The analysis of one job with every signal, to look at; `horizon` in s where another is wanted.
+    /// Analyses one job with all signals, for plots. `horizon` in s replaces the planned one.
     ///
     /// # Errors
-    /// The failure of the simulation.
+    /// Returns the failure of the simulation.
     pub fn analyse_all(&self, job: usize, tuners: &[f64], horizon: Option<f64>) -> Result<Analysis, Failure> {
         let plan = &self.study.jobs[job];
         let model = &self.study.models[plan.model].1;
@@ -185,7 +185,7 @@ impl Problem {
         })
     }
 
-    /// A point that was not simulated: no row has a value.
+    /// Returns the evaluation of a point that was not simulated: no row has a value.
     pub fn unknown(&self, tuners: &[f64]) -> Evaluation {
         self.judge(self.point_of(tuners), tuners.to_vec(), std::iter::empty())
     }
@@ -195,12 +195,12 @@ impl Problem {
         self.judge(point, tuners, jobs.iter().copied().zip(values))
     }
 
-    /// The evaluation of a point of which something is known already: only the jobs that are not known are run.
+    /// Evaluates a point with a cache entry: only jobs that are not cached run.
     pub fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
         self.keep(point.to_vec(), self.tuners_at(point), &self.counting, known)
     }
 
-    /// The same as [`Problem::evaluate_at`], where something is known already.
+    /// Evaluates given values of all tuners in every case, as [`Problem::evaluate_at`], with a cache entry.
     pub fn evaluate_at_keeping(&self, tuners: &[f64], known: Option<Known>) -> Kept {
         self.keep(self.point_of(tuners), tuners.to_vec(), &self.jobs, known)
     }
@@ -222,14 +222,14 @@ impl Problem {
         Kept { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
     }
 
-    /// The evaluation of a point, of which everything that counts is known; `None` where it is not.
+    /// Returns the evaluation of a point from its cache entry; `None` if the entry is incomplete.
     pub fn known(&self, tuners: &[f64], known: &Known) -> Option<Evaluation> {
         let of_job = |&job: &usize| Some((job, known.job(job).filter(|values| self.suffices(job, values))?.clone()));
         let values: Vec<(usize, JobValues)> = self.counting.iter().map(of_job).collect::<Option<_>>()?;
         Some(self.judge(self.point_of(tuners), tuners.to_vec(), values.into_iter()))
     }
 
-    /// Whether what is known of a job is all that this problem asks of it.
+    /// Returns true if the cached values of a job contain everything that this problem needs.
     fn suffices(&self, job: usize, values: &JobValues) -> bool {
         let Ok(values) = values else { return true };
         let rows = self.study.rows.iter().zip(&self.shape.rows).enumerate().filter(|(_, (row, _))| row.job == job);
@@ -241,7 +241,7 @@ impl Problem {
         })
     }
 
-    /// What the values of jobs are worth under the demands of the study.
+    /// Rates the values of jobs by the demands of the study.
     fn judge(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: impl Iterator<Item = (usize, JobValues)>) -> Evaluation {
         let study = &self.study;
         let mut readings = vec![None; study.rows.len()];
@@ -271,7 +271,7 @@ impl Problem {
         Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
     }
 
-    /// The values of all rows that read one job. A criterion without a value takes none from the others.
+    /// Returns the values of all rows that read one job. A criterion without a value does not affect the others.
     fn run_job(&self, job: usize, tuners: &[f64]) -> JobValues {
         let study = &self.study;
         let plan = &study.jobs[job];
@@ -295,13 +295,13 @@ impl Problem {
         rows.map(unless_cancelled).collect()
     }
 
-    /// The slopes at an evaluated point, from the tangents of the models; `None` where a model, a criterion or a tuner
-    /// has no exact ones. `reach` is the distance within which they are to describe the problem.
+    /// Returns the derivatives at an evaluated point, from the tangents of the models. `None` if a model, a criterion or a
+    /// tuner has no exact derivatives. `reach` is the distance within which the derivatives are to describe the problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
         self.scaled_slopes(at, self.row_slopes(at, reach)?)
     }
 
-    /// The same where the derivatives of the rows may be known already.
+    /// Returns the derivatives at an evaluated point as [`Problem::slopes`], with cached derivatives of the rows.
     pub fn slopes_keeping(
         &self,
         at: &Evaluation,
@@ -310,12 +310,12 @@ impl Problem {
     ) -> KeptSlopes<Slopes> {
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
         let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
-        // Of derivatives that were cut off nothing is known.
+        // Derivatives that were cut off are not cached.
         let learned = (new && (rows.is_some() || !self.is_cancelled())).then(|| rows.clone());
         KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
     }
 
-    /// Whether known derivatives are all that this problem asks for.
+    /// Returns true if cached derivatives contain everything that this problem needs.
     fn suffice(&self, known: &KnownSlopes) -> bool {
         let n = self.active.len();
         self.shape.rows.iter().enumerate().all(|(index, (usage, _))| {
@@ -330,7 +330,7 @@ impl Problem {
         })
     }
 
-    /// The derivatives of the rows that count along every coordinate, in the units of their criteria.
+    /// Returns the derivatives of the rows that count along every coordinate, in the units of their criteria.
     fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<KnownSlopes> {
         if self.shape.spacing.iter().any(|&spacing| spacing > 0.0) || at.scaled.is_none() {
             return None;
@@ -345,7 +345,7 @@ impl Problem {
         Some(rows)
     }
 
-    /// Slopes of the scaled values and of the weighted residuals.
+    /// Returns the derivatives of the scaled values and of the weighted residuals.
     fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes) -> Option<Slopes> {
         let (count, n) = (self.study.rows.len(), self.active.len());
         let mut rows = vec![vec![0.0; n]; count];
@@ -361,7 +361,7 @@ impl Problem {
         finite.then_some(Slopes { rows, residuals })
     }
 
-    /// The derivative of all tuners along each coordinate of the unit box, ties included.
+    /// Returns the derivative of all tuners along each coordinate of the unit box, ties included.
     pub(crate) fn tuner_slopes(&self, tuners: &[f64]) -> Vec<Vec<f64>> {
         let along = |&active: &usize| {
             let mut duals: Vec<Dual<1>> = tuners.iter().map(|&value| Dual::from(value)).collect();
@@ -372,7 +372,7 @@ impl Problem {
         self.active.iter().map(along).collect()
     }
 
-    /// The derivative of every row that counts and reads one job, along every coordinate.
+    /// Returns the derivatives of the counting rows of one job along every coordinate.
     fn job_slopes(&self, job: usize, tuners: &[f64], moves: &[Vec<f64>], reach: f64) -> Option<Vec<RowSlopes>> {
         let study = &self.study;
         let plan = &study.jobs[job];
@@ -382,7 +382,7 @@ impl Problem {
         }
         let seed = |along: &Vec<f64>| study.parameter_slopes(plan, along);
         let seeds: Vec<Vec<f64>> = moves.iter().map(seed).collect();
-        // Start values of other cases move nothing here.
+        // Initial states of other cases do not affect this job.
         let moving: Vec<usize> = (0..seeds.len()).filter(|&j| seeds[j].iter().any(|&s| s != 0.0)).collect();
         let wanted: Vec<Vec<f64>> = moving.iter().map(|&j| seeds[j].clone()).collect();
         let parameters = study.parameters(plan, tuners);
@@ -418,8 +418,8 @@ impl Problem {
             .collect()
     }
 
-    /// Residuals of all rows to be minimised, weighted so that their squares sum to the objective; empty if one of the
-    /// rows is no sum of squares.
+    /// Returns the residuals of all rows to be minimised, weighted so that their squares sum to the objective. Empty if one
+    /// of the rows is not a sum of squares.
     fn residuals(&self, of_rows: Vec<Vec<f64>>) -> Vec<f64> {
         let mut all = Vec::new();
         if self.shape.objective != Objective::Sum {
@@ -432,12 +432,13 @@ impl Problem {
         all
     }
 
-    /// Whether a row enters the objective.
+    /// Returns true if a row is part of the objective.
     pub(crate) fn is_minimised(&self, row: usize) -> bool {
         self.shape.rows[row].0 == Usage::Minimise
     }
 
-    /// Factor of the residuals of a row in the residual vector: the root of weight / demand; `None` without such a demand.
+    /// Returns the factor of a row's residuals in the residual vector: the root of weight / demand. `None` without such a
+    /// demand.
     pub(crate) fn residual_factor(&self, row: usize) -> Option<f64> {
         match self.study.rows[row] {
             Row { demand: Demand::AtMost(demand), reversed: false, .. } => {
@@ -448,18 +449,18 @@ impl Problem {
     }
 }
 
-/// The active tuners of a study and of its calibration cases, as indices.
+/// Returns the active tuners of a study and of its calibration cases, as indices.
 fn active(study: &Study) -> Vec<usize> {
     let counts = |case: Option<usize>| case.is_none_or(|c| study.cases[c].role() == Role::Calibration);
     (0..study.tuners.len()).filter(|&i| study.tuners[i].active && counts(study.tuners[i].case)).collect()
 }
 
-/// What a row of a study is for: in cases that are no calibration data it is watched.
+/// Returns the usage of a row: monitored in cases that are not calibration data.
 fn own_usage(row: &Row, study: &Study) -> Usage {
     if study.case_of(row).role() == Role::Calibration { row.usage } else { Usage::Monitor }
 }
 
-/// Sizes and kinds, without residuals.
+/// Returns the dimensions and kinds of the problem, without residuals.
 fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage) -> Shape {
     let rows = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
     let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
@@ -467,7 +468,7 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
     Shape { spacing, rows, objective: study.objective, points, residuals: 0 }
 }
 
-/// Values of a job as they are kept where nobody needs the terms of sums of squares.
+/// Returns the values of a job without residuals, for a cache that does not need them.
 fn without_residuals(values: &JobValues) -> JobValues {
     let bare = |(row, value): &RowValue| {
         let value = value.as_ref().map(|v| Value { residuals: Vec::new(), ..v.clone() });

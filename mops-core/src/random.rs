@@ -3,8 +3,8 @@
 use rand::SeedableRng;
 pub use rand_xoshiro::Xoshiro256PlusPlus as Stream;
 
-/// The stream that belongs to `label` under `seed`: the same pair always gives the same numbers, and streams of
-/// different labels are independent, so that adding a consumer changes no other.
+/// Returns the random stream of `label` under `seed`. The same pair always gives the same numbers. Streams of different
+/// labels are independent, so that adding a consumer changes no other stream.
 pub fn stream(seed: u64, label: &str) -> Stream {
     // FNV-1a over the label, folded into the seed; `seed_from_u64` spreads it by SplitMix64.
     // Source: G. Fowler, L. C. Noll, K.-P. Vo, The FNV non-cryptographic hash algorithm, IETF draft (2019).

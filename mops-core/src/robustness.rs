@@ -1,4 +1,4 @@
-//! What is found where parameters are uncertain, as it stands in `result.json`: worst cases, distributions, effects.
+//! Results with uncertain parameters in `result.json`: worst cases, distributions, effects.
 
 use serde::Serialize;
 
@@ -6,311 +6,312 @@ use crate::criterion::Usage;
 use crate::statistics::Sampling;
 use crate::study::{Distribution, Row, Study};
 
-/// An uncertain parameter of a result.
+/// Uncertain parameter in a result.
 #[derive(Debug, Clone, Serialize)]
 pub struct UncertainReport {
-    /// Name.
+    /// Name of the parameter.
     pub name: String,
-    /// Smallest and largest value; null where there is none.
+    /// Smallest and largest value; null if unbounded.
     pub bounds: [f64; 2],
-    /// Value without uncertainty.
+    /// Nominal value.
     pub nominal: f64,
-    /// How its values are distributed, in words.
+    /// Distribution of the values, in words.
     pub distribution: String,
-    /// Unit of all of these.
+    /// Unit of the values.
     pub unit: String,
 }
 
-/// The criterion that something was found of.
+/// Criterion that a result refers to.
 #[derive(Debug, Clone, Serialize)]
 pub struct Subject {
-    /// Name.
+    /// Name of the criterion.
     pub criterion: String,
-    /// The model it reads.
+    /// Name of its model.
     pub model: String,
-    /// The case; the uncertain parameters have other values than there.
+    /// Name of its case; the uncertain parameters differ from that case.
     pub case: String,
-    /// What the study does with it.
+    /// Usage of the criterion in the study.
     pub usage: Usage,
-    /// The value that scales to 1; null where nothing was asked.
+    /// Value that scales to 1; null without a demand.
     pub demand: Option<f64>,
-    /// Unit of its values.
+    /// Unit of the values.
     pub unit: String,
-    /// Its value without uncertainty.
+    /// Value for nominal parameters.
     pub nominal: f64,
 }
 
-/// The worst cases over a box.
+/// Worst cases over a box.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorstCaseReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// What is uncertain.
+    /// Uncertain parameters.
     pub parameters: Vec<UncertainReport>,
-    /// The worst of every criterion.
+    /// Worst case of every criterion.
     pub criteria: Vec<WorstReport>,
-    /// Simulations that the searches took.
+    /// Number of simulations of the searches.
     pub simulations: usize,
-    /// Whether it is shown that nothing in the box is worse: it never is.
+    /// True if proven that nothing in the box is worse; always false.
     pub guaranteed: bool,
 }
 
-/// The worst that was found of a criterion.
+/// Worst case found for a criterion.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorstReport {
-    /// The criterion.
+    /// Criterion of the worst case.
     #[serde(flatten)]
     pub of: Subject,
-    /// Its worst value that was found; null where every simulation failed.
+    /// Worst value found; null if every simulation failed.
     pub value: f64,
-    /// By its demand; null where nothing was asked.
+    /// Scaled value (worst value divided by the demand); null without a demand.
     pub scaled: f64,
-    /// Whether its demand is met even there; true where there is none.
+    /// True if the demand is met in the worst case, or if there is none.
     pub met: bool,
-    /// Where that is.
+    /// Values of the uncertain parameters in the worst case.
     pub at: Vec<CoordinateReport>,
-    /// Searches.
+    /// Number of searches.
     pub starts: usize,
-    /// Searches that ended there.
+    /// Number of searches that ended in this worst case.
     pub ended_here: usize,
-    /// Simulations that the searches took, those shared by all criteria not counted.
+    /// Number of simulations of the searches, without those shared by all criteria.
     pub simulations: usize,
-    /// Simulations among them, and among the shared ones, that failed: there the criterion has no value.
+    /// Number of failed simulations, including shared ones; there the criterion has no value.
     pub failed: usize,
-    /// The first of these failures, and where it was.
+    /// First of these failures, with its parameter values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<FailedAt>,
-    /// The value along each parameter through the worst case.
+    /// Values along each parameter through the worst case.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub slices: Vec<Slice>,
 }
 
-/// A simulation that failed.
+/// Failed simulation.
 #[derive(Debug, Clone, Serialize)]
 pub struct FailedAt {
-    /// Why, in words.
+    /// Reason for the failure.
     pub why: String,
-    /// Where.
+    /// Values of the uncertain parameters.
     pub at: Vec<CoordinateReport>,
 }
 
-/// The value of an uncertain parameter at a point.
+/// Value of an uncertain parameter at a point.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoordinateReport {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its value.
+    /// Value of the parameter.
     pub value: f64,
-    /// Its unit.
+    /// Unit of the value.
     pub unit: String,
-    /// `lower` or `upper` where it is at that end of its range.
+    /// End of the range at which the value lies, `lower` or `upper`, if any.
     pub at_bound: Option<&'static str>,
 }
 
-/// A criterion along one parameter, the others held.
+/// Criterion along one parameter, with the others fixed.
 #[derive(Debug, Clone, Serialize)]
 pub struct Slice {
     /// Name of the parameter.
     pub parameter: String,
-    /// Unit of its values.
+    /// Unit of the parameter values.
     pub unit: String,
-    /// Its values.
+    /// Values of the parameter.
     pub x: Vec<f64>,
-    /// Those of the criterion; null where the simulation failed.
+    /// Values of the criterion; null for failed simulations.
     pub y: Vec<f64>,
 }
 
-/// How criteria are distributed where parameters are uncertain.
+/// Distributions of criteria for uncertain parameters.
 #[derive(Debug, Clone, Serialize)]
 pub struct MonteCarloReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// What is uncertain.
+    /// Uncertain parameters.
     pub parameters: Vec<UncertainReport>,
     /// Number of samples.
     pub samples: usize,
-    /// How they were drawn.
+    /// Sampling method.
     pub method: Sampling,
-    /// Confidence of all intervals; exact for samples drawn at random.
+    /// Confidence level of all intervals; exact for random samples.
     pub level: f64,
-    /// Samples in which a simulation or a criterion failed.
+    /// Number of samples in which a simulation or a criterion failed.
     pub failed: usize,
-    /// Every criterion.
+    /// Distribution of every criterion.
     pub criteria: Vec<DistributionReport>,
-    /// Samples that meet every demand at once; null where nothing is demanded.
+    /// Samples that meet all demands; null without demands.
     pub all: Option<ShareReport>,
-    /// The samples: values of the uncertain parameters, then of the criteria. They are written as `samples.csv`.
+    /// Values of the uncertain parameters, then of the criteria, per sample; written as `samples.csv`.
     #[serde(skip)]
     pub table: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
-/// How a criterion is distributed.
+/// Distribution of a criterion.
 #[derive(Debug, Clone, Serialize)]
 pub struct DistributionReport {
-    /// The criterion.
+    /// Criterion of the distribution.
     #[serde(flatten)]
     pub of: Subject,
-    /// Mean of the samples that have a value.
+    /// Mean of the samples with a value.
     pub mean: f64,
-    /// Their standard deviation.
+    /// Standard deviation of the samples with a value.
     pub deviation: f64,
-    /// The smallest.
+    /// Smallest value.
     pub min: f64,
-    /// The largest.
+    /// Largest value.
     pub max: f64,
-    /// Quantiles.
+    /// Quantiles of the values.
     pub quantiles: Vec<QuantileReport>,
-    /// Samples that meet the demand; one that failed does not. Null where there is none.
+    /// Samples that meet the demand; failed samples do not. Null without a demand.
     pub met: Option<ShareReport>,
-    /// Samples without a value.
+    /// Number of samples without a value.
     pub failed: usize,
 }
 
-/// A quantile with its confidence interval, which supposes no distribution.
+/// Quantile with its distribution-free confidence interval.
 #[derive(Debug, Clone, Serialize)]
 pub struct QuantileReport {
-    /// Share of the values that do not exceed it.
+    /// Share of the values that do not exceed the quantile.
     pub share: f64,
-    /// The quantile.
+    /// Value of the quantile.
     pub value: f64,
-    /// Its interval; an end is null where the samples are too few for one.
+    /// Confidence interval; an end is null if there are too few samples.
     pub interval: [f64; 2],
 }
 
-/// A share of samples with its confidence interval (Clopper-Pearson).
+/// Share of samples with its confidence interval (Clopper-Pearson).
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct ShareReport {
-    /// Samples that count.
+    /// Number of samples that count.
     pub count: usize,
-    /// All samples.
+    /// Number of all samples.
     pub of: usize,
-    /// Their share.
+    /// Share of the samples that count.
     pub share: f64,
-    /// Its interval.
+    /// Confidence interval of the share.
     pub interval: [f64; 2],
 }
 
-/// How a design against worst cases was found.
+/// Robust design against worst cases.
 #[derive(Debug, Clone, Serialize)]
 pub struct RobustReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// What is uncertain.
+    /// Uncertain parameters.
     pub parameters: Vec<UncertainReport>,
-    /// Every round: a design for the cases at hand, and the worst cases found for it.
+    /// Rounds, each with a design for the present cases and the worst cases found for it.
     pub rounds: Vec<RoundReport>,
-    /// The round whose design is reported: that with the best worst case.
+    /// Index of the reported round: the one with the best worst case.
     pub chosen: usize,
-    /// Whether the last search found nothing worse than the cases at hand by more than the tolerance.
+    /// True if the last search found no case worse than the present ones by more than the tolerance.
     pub settled: bool,
-    /// The tolerance, in scaled values.
+    /// Tolerance, in scaled values.
     pub tolerance: f64,
-    /// The worst of every criterion for the reported design.
+    /// Worst case of every criterion for the reported design.
     pub criteria: Vec<WorstReport>,
-    /// Whether it is shown that nothing in the box is worse: it never is.
+    /// True if proven that nothing in the box is worse; always false.
     pub guaranteed: bool,
 }
 
-/// A round of a design against worst cases.
+/// Round of a robust design.
 #[derive(Debug, Clone, Serialize)]
 pub struct RoundReport {
-    /// Number of cases that the design was made for.
+    /// Number of cases of the design problem.
     pub cases: usize,
-    /// The design: values of all tuners.
+    /// Design: values of all tuners.
     pub tuners: Vec<f64>,
     /// Worst weighted scaled value over these cases.
     pub for_cases: f64,
     /// Largest violation of a constraint over these cases, in scaled values.
     pub violation_for_cases: f64,
-    /// Worst weighted scaled value that was found in the box.
+    /// Worst weighted scaled value found in the box.
     pub found: f64,
-    /// Largest violation of a constraint that was found in the box.
+    /// Largest violation of a constraint found in the box.
     pub violation_found: f64,
-    /// Points evaluated to make the design.
+    /// Number of points evaluated for the design.
     pub evaluations: usize,
-    /// Simulations of the searches for worst cases.
+    /// Number of simulations of the searches for worst cases.
     pub simulations: usize,
-    /// The cases that were added.
+    /// Added cases.
     pub added: Vec<AddedReport>,
 }
 
-/// A case that was added.
+/// Added case.
 #[derive(Debug, Clone, Serialize)]
 pub struct AddedReport {
-    /// Its name.
+    /// Name of the case.
     pub name: String,
-    /// The criterion for which it is a worst case.
+    /// Criterion for which it is a worst case.
     pub criterion: String,
-    /// Its scaled value there.
+    /// Scaled value of the criterion in the case.
     pub scaled: f64,
-    /// The values of the uncertain parameters.
+    /// Values of the uncertain parameters.
     pub at: Vec<CoordinateReport>,
 }
 
 /// Effects of the uncertain parameters over their whole ranges.
 #[derive(Debug, Clone, Serialize)]
 pub struct GlobalSensitivityReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// `morris` or `sobol`.
+    /// Method: `morris` or `sobol`.
     pub method: crate::study::SensitivityMethod,
-    /// What is uncertain.
+    /// Uncertain parameters.
     pub parameters: Vec<UncertainReport>,
-    /// Trajectories, or samples.
+    /// Number of trajectories, or of samples.
     pub samples: usize,
-    /// Those of them that were left out because a simulation failed.
+    /// Number of trajectories or samples omitted because a simulation failed.
     pub failed: usize,
-    /// Simulations.
+    /// Number of simulations.
     pub simulations: usize,
-    /// Confidence of the intervals.
+    /// Confidence level of the intervals.
     pub level: f64,
-    /// Every criterion.
+    /// Effects on every criterion.
     pub criteria: Vec<EffectsReport>,
 }
 
 /// Effects of the uncertain parameters on a criterion.
 #[derive(Debug, Clone, Serialize)]
 pub struct EffectsReport {
-    /// The criterion.
+    /// Criterion of the effects.
     #[serde(flatten)]
     pub of: Subject,
-    /// Every parameter; empty where the criterion does not vary.
+    /// Effect of every parameter; empty if the criterion does not vary.
     pub effects: Vec<EffectReport>,
 }
 
-/// Effect of an uncertain parameter: `morris` fills the first three, `sobol` the others.
+/// Effect of an uncertain parameter: `morris` sets the first three numbers, `sobol` the others.
 #[derive(Debug, Clone, Serialize)]
 pub struct EffectReport {
-    /// The parameter.
+    /// Name of the parameter.
     pub parameter: String,
-    /// Mean of its elementary effects, per range of the parameter, in the criterion's unit.
+    /// Mean of the elementary effects, per range of the parameter, in the criterion's unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean: Option<f64>,
-    /// Mean of their magnitudes.
+    /// Mean of the magnitudes of the elementary effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub magnitude: Option<f64>,
-    /// Their standard deviation.
+    /// Standard deviation of the elementary effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<f64>,
-    /// Share of the variance by the parameter alone, and its interval.
+    /// First-order Sobol index: share of the variance due to the parameter alone, with its interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first: Option<Estimated>,
-    /// Share of the variance by the parameter alone and together with others, and its interval.
+    /// Total Sobol index: share of the variance due to the parameter alone and in interaction with others, with its
+    /// interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub total: Option<Estimated>,
 }
 
-/// A number that is known within an interval.
+/// Estimate with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimated {
-    /// The estimate.
+    /// Value of the estimate.
     pub value: f64,
-    /// Its interval.
+    /// Confidence interval.
     pub interval: [f64; 2],
 }
 
 impl Subject {
-    /// A row of a study, with its value without uncertainty.
+    /// Creates the reference to a row of a study, with its value for nominal parameters.
     pub fn of(study: &Study, row: &Row, nominal: f64) -> Self {
         let plan = &study.jobs[row.job];
         Self {
@@ -325,7 +326,7 @@ impl Subject {
     }
 }
 
-/// The uncertain parameters of a study that was made by [`Study::over_uncertain`].
+/// Returns the uncertain parameters of a study created by [`Study::over_uncertain`].
 pub fn uncertain_reports(study: &Study) -> Vec<UncertainReport> {
     let first = study.tuners.len() - study.tasks.uncertain.len();
     let report = |(uncertain, tuner): (&crate::study::Uncertain, &crate::tuner::Tuner)| {

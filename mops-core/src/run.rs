@@ -1,4 +1,4 @@
-//! A run: owns the budget, the cache, the archive and the random streams, and keeps the best point.
+//! Runs: a [`Run`] owns the budget, the cache, the archive and the random streams, and keeps the best point.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -16,43 +16,44 @@ use crate::problem::{Problem, Slopes};
 use crate::random::{Stream, stream};
 use crate::solver::{Linearisation, Oracle, Progress, Shape, Solver, Stop};
 
-/// What a run may cost.
+/// Budget of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
-    /// Largest number of points evaluated.
+    /// Maximum number of evaluated points.
     pub evaluations: usize,
 }
 
-/// Looks on while a run goes, and may end it. Only this sees the clock, so that time changes no number.
+/// Observer of a run, which may also stop it. Only the observer reads the clock, so that time changes no number.
 pub trait Watch: Sync {
-    /// Whether the run must end now.
+    /// Returns true if the run must stop now.
     fn wants_stop(&self) -> bool {
         false
     }
 
-    /// Why the run must end, where it must.
+    /// Returns the reason for stopping.
     fn halt(&self) -> Halt {
         Halt::Interrupted
     }
 
-    /// New points were evaluated.
+    /// Called after new points were evaluated.
     fn evaluated(&self, _state: &State) {}
 
-    /// The best point changed; told at most once for the points that [`Watch::evaluated`] was told of just before.
+    /// Called when the best point changed, at most once after each [`Watch::evaluated`].
     fn improved(&self, _best: &Evaluation) {}
 
-    /// Something that goes in stages, and counts no points, is in this one, such as `screening 412 candidates`; `done` is
-    /// the share of the whole that lies behind it, from 0 to 1.
+    /// Called at each stage of work that evaluates no points, such as `screening 412 candidates`. `done` is the finished
+    /// share of the work, from 0 to 1.
     fn stage(&self, _what: &str, _done: f64) {}
 
-    /// What the run learns cannot be kept at present, and why; `None` once it can be again, and all of it is.
+    /// Called with the reason when results cannot be stored. Called with `None` once storing works again and all results are
+    /// stored.
     fn keeping(&self, _trouble: Option<&str>) {}
 }
 
-/// Nobody looks on.
+/// The unit type observes nothing.
 impl Watch for () {}
 
-/// Hears the wish to stop, and shows nothing: searches inside a task are no run of their own.
+/// Observer that only forwards stop requests, for searches inside a task.
 pub struct Quiet<'a>(pub &'a dyn Watch);
 
 impl Watch for Quiet<'_> {
@@ -65,67 +66,67 @@ impl Watch for Quiet<'_> {
     }
 }
 
-/// Where a run stands.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
-    /// Points evaluated.
+    /// Number of evaluated points.
     pub evaluations: usize,
-    /// Largest number of points.
+    /// Maximum number of points.
     pub budget: usize,
-    /// Points that failed.
+    /// Number of failed points.
     pub failed: usize,
-    /// The best so far.
+    /// Merit of the best point so far.
     pub best: Merit,
 }
 
-/// One evaluated point, as it is kept for the report.
+/// An evaluated point, as kept for the report.
 #[derive(Debug, Clone)]
 pub struct Record {
     /// Values of all tuners.
     pub tuners: Vec<f64>,
-    /// Values of all rows; NaN where there is none.
+    /// Values of all rows; NaN for rows without a value.
     pub values: Vec<f64>,
-    /// Weighted scaled values of the rows to be minimised where each counts for itself; else empty.
+    /// Weighted scaled values of the rows to be minimised if each is an objective of its own; else empty.
     pub objectives: Vec<f64>,
-    /// What the point is worth.
+    /// Merit of the point.
     pub merit: Merit,
 }
 
-/// A run of a solver on a problem: that of a study, or one with a known answer.
+/// A run of a solver on a problem: the problem of a study, or one with a known solution.
 pub struct Run<'a, E: Evaluator = Problem> {
     problem: &'a E,
     budget: Budget,
     watch: &'a dyn Watch,
     store: Option<&'a dyn Store>,
-    /// Points answered without a simulation, from what was known.
+    /// Number of points answered from the store, without a simulation.
     reused: usize,
-    /// Whether the best point is another than the one that was last told of.
+    /// True if the best point changed since the last notification.
     improved: bool,
     cache: HashMap<Vec<u64>, Evaluation, BuildHasherDefault<Bits>>,
     failed: usize,
     archive: Vec<Record>,
     best: Option<Evaluation>,
     failures: Vec<FailureCount>,
-    /// Whether slopes come from tangents where there are some.
+    /// True if exact derivatives from tangents are used where available.
     exact: bool,
     linearisations: usize,
-    /// Points of the front that the solver has solved for, as values of all tuners.
+    /// Points of the Pareto front that the solver has solved for, as values of all tuners.
     solved: Vec<Vec<f64>>,
 }
 
 /// Failures of one kind in one job.
 #[derive(Debug, Clone)]
 pub struct FailureCount {
-    /// The job, by index.
+    /// Index of the job.
     pub job: usize,
-    /// The first of them.
+    /// First failure.
     pub first: Failure,
-    /// How many.
+    /// Number of failures.
     pub count: usize,
 }
 
 impl<'a, E: Evaluator> Run<'a, E> {
-    /// A run that has not begun.
+    /// Creates a run that has not started.
     pub fn new(problem: &'a E, budget: Budget, watch: &'a dyn Watch) -> Self {
         Self {
             problem,
@@ -145,31 +146,31 @@ impl<'a, E: Evaluator> Run<'a, E> {
         }
     }
 
-    /// Takes slopes from differences alone, to compare.
+    /// Uses finite differences only, for comparison.
     #[must_use]
     pub fn by_differences(self) -> Self {
         Self { exact: false, ..self }
     }
 
-    /// Keeps what it learns in a store, and simulates nothing that is known there.
+    /// Stores results in a store, and takes cached results from it instead of simulating.
     #[must_use]
     pub fn keeping(self, store: Option<&'a dyn Store>) -> Self {
         Self { store, ..self }
     }
 
-    /// Number of points that were answered from the store, without a simulation.
+    /// Returns the number of points answered from the store, without a simulation.
     pub fn reused(&self) -> usize {
         self.reused
     }
 
-    /// Number of times that slopes were taken from tangents: each is a simulation with tangents of every job that counts.
+    /// Returns the number of exact linearisations. Each is a simulation with tangents of every job that counts.
     pub fn linearisations(&self) -> usize {
         self.linearisations
     }
 
-    /// Runs the solver from `start`, a point of the unit box, to its end.
+    /// Runs the solver to its end from `start`, a point of the unit box.
     pub fn solve(&mut self, solver: &mut dyn Solver, start: &[f64]) -> Stop {
-        // The start is evaluated before all else, so that there is a point to report; none where even that is cut off.
+        // The start is evaluated first, so that there is a point to report, unless even this evaluation is cancelled.
         let first = self.answer(start);
         if first.evaluation.is_cancelled() {
             return self.watch.halt().into();
@@ -191,29 +192,32 @@ impl<'a, E: Evaluator> Run<'a, E> {
         stop
     }
 
-    /// Takes an answer to the start that was simulated elsewhere: a run that was cut off before it had one can still report it.
+    /// Records an evaluation of the start made elsewhere, so that a run cancelled before its first evaluation has a point to
+    /// report.
     pub fn take_start(&mut self, answer: Kept) {
         let key = bits(&answer.evaluation.tuners);
         self.keep(key, answer);
     }
 
-    /// All points, in the order of their evaluation.
+    /// Returns all points, in the order of their evaluation.
     pub fn archive(&self) -> &[Record] {
         &self.archive
     }
 
-    /// What failed, by job and kind.
+    /// Returns the failures, by job and kind.
     pub fn failures(&self) -> &[FailureCount] {
         &self.failures
     }
 
-    /// The problem.
+    /// Returns the problem.
     pub fn problem(&self) -> &'a E {
         self.problem
     }
 
-    /// The front, by place in the archive: the points that the solver has solved for ([`Solver::front`]), or what is better
-    /// than them; all that nothing is better than where it names none. Empty where the objectives become one number.
+    /// Returns the Pareto front, as indices into the archive. Empty for a single objective.
+    ///
+    /// The points are those that the solver has solved for ([`Solver::front`]), each replaced by a better point if there is
+    /// one. If the solver has solved for none, all non-dominated points are returned.
     pub fn front(&self) -> Vec<usize> {
         let all = self.non_dominated();
         if self.solved.is_empty() {
@@ -234,8 +238,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         front
     }
 
-    /// The feasible points that no other feasible point is better than in every objective, by their place in the archive.
-    /// Empty where the objectives become one number.
+    /// Returns the feasible, non-dominated points, as indices into the archive. Empty for a single objective.
     pub fn non_dominated(&self) -> Vec<usize> {
         let feasible = |i: &usize| self.archive[*i].merit.is_feasible() && !self.archive[*i].objectives.is_empty();
         let candidates: Vec<usize> = (0..self.archive.len()).filter(feasible).collect();
@@ -245,20 +248,20 @@ impl<'a, E: Evaluator> Run<'a, E> {
         front::non_dominated(&objectives, m).into_iter().map(|i| candidates[i]).collect()
     }
 
-    /// The evaluation of a point of the archive.
+    /// Returns the evaluation of a point of the archive.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// Panics if the index is out of range.
     pub fn evaluation(&self, index: usize) -> &Evaluation {
         &self.cache[&bits(&self.archive[index].tuners)]
     }
 
-    /// The answer to a point, simulated as far as it is not known.
+    /// Evaluates a point, simulating only what is not in the store.
     fn answer(&self, point: &[f64]) -> Kept {
         answer(self.problem, self.store, point)
     }
 
-    /// Records an answered point, and tells the store.
+    /// Records an evaluated point, and passes new results to the store.
     fn keep(&mut self, key: Vec<u64>, answer: Kept) {
         let Kept { evaluation, learned } = answer;
         self.record(&evaluation);
@@ -269,7 +272,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.cache.insert(key, evaluation);
     }
 
-    /// Tells who looks on where the run stands.
+    /// Notifies the observer of the progress.
     fn tell(&mut self) {
         self.watch.evaluated(&self.state());
         if let Some(best) = self.best.as_ref().filter(|_| std::mem::take(&mut self.improved)) {
@@ -277,7 +280,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         }
     }
 
-    /// Exact slopes, from the store where it has them.
+    /// Returns exact derivatives, from the store if available.
     fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
         let Some(store) = self.store else { return self.problem.slopes(at, reach) };
         let known = store.known_slopes(&at.tuners, reach);
@@ -321,7 +324,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
     }
 }
 
-/// A hash of the bits of numbers: each word is folded in by a multiplication. The keys are nobody's attack.
+/// Hash of the bits of numbers: each word is folded in by a multiplication. Resistance to attacks is not needed.
 ///
 /// Source: the constant is that of D. E. Knuth, The Art of Computer Programming, volume 3, section 6.4.
 #[derive(Debug, Clone, Copy, Default)]
@@ -350,7 +353,7 @@ impl Hasher for Bits {
     }
 }
 
-/// The answer to a point, simulated as far as the store does not know it.
+/// Evaluates a point, simulating only what is not in the store.
 fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) -> Kept {
     match store {
         None => Kept { evaluation: problem.evaluate(point), learned: None },
@@ -364,12 +367,12 @@ fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) ->
     }
 }
 
-/// Bits of the values a point stands for: points that round to the same tuners are one.
+/// Returns the bits of the tuner values at a point: points that round to the same tuners are identical.
 fn key(problem: &impl Evaluator, point: &[f64]) -> Vec<u64> {
     bits(&problem.tuners_at(point))
 }
 
-/// Bits of values; minus zero, to which small negative numbers round, is zero.
+/// Returns the bits of values; minus zero, to which small negative numbers round, becomes zero.
 fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
@@ -388,14 +391,14 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         let left = self.budget.evaluations.saturating_sub(self.archive.len());
         let within_budget = new.len() <= left;
         new.truncate(left);
-        // A small batch at a time, so that an interrupt is heard soon; the results are folded in order, so that
-        // neither the batches nor the number of threads change a bit.
+        // Small batches, so that an interrupt takes effect soon. The results are folded in order, so that neither the
+        // batches nor the number of threads change a bit.
         for batch in new.chunks(4 * rayon::current_num_threads().max(1)) {
             if self.watch.wants_stop() {
                 return Err(self.watch.halt());
             }
             let (problem, store) = (self.problem, self.store);
-            // A single point is not worth the way to another thread.
+            // Sending a single point to another thread does not pay off.
             let answers: Vec<Kept> = match batch {
                 [i] => vec![answer(problem, store, &points[*i])],
                 _ => batch.par_iter().map(|&i| answer(problem, store, &points[i])).collect(),
@@ -419,7 +422,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             .collect())
     }
 
-    /// Exact slopes where models and criteria have them, differences elsewhere.
+    /// Returns exact derivatives if models and criteria provide them, else finite differences.
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
         let differences = Differences::of_noise(self.problem.noise());
         let at = self.evaluate(&[point.to_vec()])?.pop().expect("one point, one answer");
@@ -430,7 +433,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             if self.watch.wants_stop() {
                 return Err(self.watch.halt());
             }
-            // Slopes are no points, but a run that does nothing else must end as well.
+            // Linearisations evaluate no points, but a run that only linearises must end as well.
             if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }

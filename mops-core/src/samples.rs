@@ -1,12 +1,12 @@
-//! The samples that the residuals of a criterion compare with.
+//! Measured samples that the residuals of a criterion compare with.
 
-/// Samples behind the residuals of a criterion that is a sum of squares: one sample for every residual, in their order.
+/// Samples behind the residuals of a sum-of-squares criterion: one sample per residual, in the same order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
     /// Measured signal.
     pub signal: String,
     /// Residual divided by (simulated - measured), for every sample; positive.
     pub weights: Vec<f64>,
-    /// Standard deviation of the noise of one sample, in the unit of the signal, where it is known.
+    /// Standard deviation of the noise of one sample, in the unit of the signal, if known.
     pub noise: Option<f64>,
 }

@@ -1,12 +1,12 @@
-//! Numbers that equations are written in: `f64`, and dual numbers that carry derivatives along.
+//! Scalar types of model equations: `f64`, and dual numbers with derivatives.
 
 use crate::math;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// What an equation needs of a number. Written once over `Scalar`, it runs with values and with exact tangents.
+/// Scalar type of model equations. Equations generic over `Scalar` run with values and with exact tangents.
 ///
-/// Comparisons and step-size control use [`Scalar::value`] alone, so that asking for tangents changes no value.
+/// Comparisons and step-size control use [`Scalar::value`] alone, so that computing tangents changes no value.
 pub trait Scalar:
     Copy
     + Debug
@@ -27,66 +27,66 @@ pub trait Scalar:
     + SubAssign
     + MulAssign
 {
-    /// Number of tangents it carries.
+    /// Number of tangents.
     const DIRECTIONS: usize;
 
-    /// The number without its tangents.
+    /// Returns the value without tangents.
     fn value(self) -> f64;
-    /// Its tangents, [`Scalar::DIRECTIONS`] of them.
+    /// Returns the tangents, [`Scalar::DIRECTIONS`] of them.
     fn tangents(&self) -> &[f64];
-    /// Sets one of its tangents.
+    /// Sets one tangent.
     fn set_tangent(&mut self, direction: usize, tangent: f64);
-    /// `f(self)`, given the value and the derivative of `f` at [`Scalar::value`].
+    /// Returns `f(self)`, given the value and the derivative of `f` at [`Scalar::value`] (chain rule).
     #[must_use]
     fn chain(self, value: f64, derivative: f64) -> Self;
 
-    /// Sine of an angle in rad.
+    /// Returns the sine of an angle in rad.
     #[must_use]
     fn sin(self) -> Self {
         let (sin, cos) = math::sin_cos(self.value());
         self.chain(sin, cos)
     }
-    /// Cosine of an angle in rad.
+    /// Returns the cosine of an angle in rad.
     #[must_use]
     fn cos(self) -> Self {
         let (sin, cos) = math::sin_cos(self.value());
         self.chain(cos, -sin)
     }
-    /// Sine and cosine at once.
+    /// Returns the sine and the cosine of an angle in rad.
     #[must_use]
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = math::sin_cos(self.value());
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
-    /// Exponential.
+    /// Returns the exponential.
     #[must_use]
     fn exp(self) -> Self {
         let e = math::exp(self.value());
         self.chain(e, e)
     }
-    /// Natural logarithm.
+    /// Returns the natural logarithm.
     #[must_use]
     fn ln(self) -> Self {
         self.chain(math::ln(self.value()), 1.0 / self.value())
     }
-    /// Square root.
+    /// Returns the square root.
     #[must_use]
     fn sqrt(self) -> Self {
         let root = self.value().sqrt();
         self.chain(root, 0.5 / root)
     }
-    /// Hyperbolic tangent.
+    /// Returns the hyperbolic tangent.
     #[must_use]
     fn tanh(self) -> Self {
         let t = math::tanh(self.value());
         self.chain(t, 1.0 - t * t)
     }
-    /// Power with a constant exponent.
+    /// Returns the power with a constant exponent.
     #[must_use]
     fn powf(self, exponent: f64) -> Self {
         self.chain(math::powf(self.value(), exponent), exponent * math::powf(self.value(), exponent - 1.0))
     }
-    /// Absolute value; the derivative at 0 is 0.
+    /// Returns the absolute value; its derivative at 0 is defined as 0.
     #[must_use]
     fn abs(self) -> Self {
         let x = self.value();
@@ -112,7 +112,7 @@ impl Scalar for f64 {
         value
     }
 
-    // The defaults would compute derivatives that nobody reads.
+    // The default implementations would compute unused derivatives.
     #[inline]
     fn sin(self) -> f64 {
         math::sin(self)
@@ -127,26 +127,27 @@ impl Scalar for f64 {
     }
 }
 
-/// Directions that one simulation carries: a compromise between many tuners and few; with the value they are eight numbers,
-/// which fill the registers of processors. Every width is compiled for every model, which takes long, so that there is one.
+/// Number of directions per simulation, a compromise between many and few tuners. Value and tangents are eight numbers,
+/// which fill the vector registers of processors. Only one width is used, because every width is compiled for every model
+/// and compilation takes long.
 pub const DIRECTIONS: usize = 7;
 
-/// A number with the tangents that one simulation carries.
+/// Dual number with the tangents of one simulation.
 pub type Along = Dual<DIRECTIONS>;
 
-/// A value with its derivatives with respect to `N` quantities (forward differentiation).
+/// A dual number: a value with its derivatives with respect to `N` quantities (forward differentiation).
 ///
 /// Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd edition (SIAM 2008), chapter 3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dual<const N: usize> {
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// The derivatives.
+    /// Derivatives.
     pub tangent: [f64; N],
 }
 
 impl<const N: usize> Dual<N> {
-    /// The `index`-th of the `N` quantities itself: tangent 1 in its own direction.
+    /// Creates the `index`-th of the `N` quantities: tangent 1 in its own direction.
     pub fn variable(value: f64, index: usize) -> Self {
         let mut tangent = [0.0; N];
         tangent[index] = 1.0;

@@ -1,4 +1,4 @@
-//! How the criteria of a design change with its tuners, at the point that is reported.
+//! Derivatives of the criteria of a design with respect to its tuners, at the reported point.
 
 use serde::Serialize;
 
@@ -11,23 +11,24 @@ use crate::solver::Oracle;
 pub struct SlopesReport {
     /// Names of the tuners that the solver could change.
     pub tuners: Vec<String>,
-    /// The criteria that count, each in its case.
+    /// Criteria that count, one entry per case.
     pub criteria: Vec<CriterionSlopes>,
 }
 
-/// The slopes of a criterion in a case.
+/// Derivatives of a criterion in a case.
 #[derive(Debug, Clone, Serialize)]
 pub struct CriterionSlopes {
-    /// Its key, `case/criterion`.
+    /// Key, `case/criterion`.
     pub key: String,
-    /// For every tuner: the derivative of the scaled value by the tuner's place within its bounds (0 at the lower, 1 at the
-    /// upper; logarithmic where the tuner is). A hundredth of it is what a step of 1 % of the range changes, to first order.
+    /// Derivative of the scaled value with respect to the position of each tuner within its bounds. The position is 0 at the
+    /// lower and 1 at the upper bound, logarithmic for logarithmic tuners. A hundredth of the derivative is the first-order
+    /// change for a step of 1 % of the range.
     pub slopes: Vec<f64>,
 }
 
 impl SlopesReport {
-    /// The slopes at a point of the unit box, as `oracle` gives them within `reach`; `None` where a simulation near it fails,
-    /// or where nothing can be changed.
+    /// Returns the derivatives at a point of the unit box, as `oracle` provides them within `reach`. `None` if a simulation
+    /// near the point fails, or if no tuner can be changed.
     pub fn at(problem: &Problem, oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Option<Self> {
         if point.is_empty() {
             return None;

@@ -11,30 +11,30 @@ use crate::unit::{Quantity, Unit};
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Tolerance {
-    /// Error per step relative to the state.
+    /// Relative error tolerance per step.
     pub relative: f64,
-    /// Error per step of a state near 0, in the unit of the state and the same for all of them; where it is not given, every
-    /// state has its own: a hundredth of `relative` times the largest absolute value that the state has had, or its `scale`.
+    /// Absolute error tolerance per step, in the unit of the state and identical for all states. By default every state has
+    /// its own: a hundredth of `relative` times the largest absolute value of the state so far, or its `scale`.
     pub absolute: Option<f64>,
-    /// Longest step: a number of seconds, or a time as in "10 ms". Without it a motion that is at rest at all places where a
-    /// step looks may be stepped over, such as a pulse `exp(-(time - 500)^2)`.
+    /// Maximum step size: a number of seconds, or a time such as "10 ms". Without a maximum, a step may miss a short motion
+    /// that is at rest at all evaluated times, such as a pulse `exp(-(time - 500)^2)`.
     #[serde(deserialize_with = "seconds")]
     #[schemars(with = "Option<Quantity>")]
     pub max_step: Option<f64>,
-    /// Largest number of steps; a simulation that needs more is a failure.
+    /// Maximum number of steps; a simulation that exceeds it fails.
     pub max_steps: usize,
-    /// The method of integration.
+    /// Integration method.
     pub method: IntegrationMethod,
 }
 
-/// A method of integration.
+/// Integration method.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum IntegrationMethod {
-    /// Dormand-Prince 5(4): for models whose fastest motion is of interest.
+    /// Dormand-Prince 5(4), explicit: for models whose fastest dynamics are of interest.
     #[default]
     Explicit,
-    /// ESDIRK 4(3), L-stable: for models with motions much faster than what is of interest (heat, reactions, stiff contacts).
+    /// ESDIRK 4(3), L-stable: for models with dynamics much faster than those of interest (heat, reactions, stiff contacts).
     Stiff,
 }
 
@@ -50,7 +50,7 @@ fn seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D:
 }
 
 impl Tolerance {
-    /// The tolerance where a study gives none.
+    /// Default tolerance.
     pub const DEFAULT: Self = Self {
         relative: 1e-8,
         absolute: None,
@@ -59,10 +59,10 @@ impl Tolerance {
         method: IntegrationMethod::Explicit,
     };
 
-    /// Checks that the numbers make sense.
+    /// Checks the tolerance.
     ///
     /// # Errors
-    /// A tolerance outside (0, 1), or no steps at all.
+    /// Returns an error for a tolerance outside (0, 1), a maximum step size that is not positive, or no steps at all.
     pub fn check(&self) -> Result<(), Mistake> {
         let wrong = |key: &str, fact: String| Mistake::new(key, fact).within("tolerance");
         for (key, value) in [("relative", Some(self.relative)), ("absolute", self.absolute)] {
@@ -73,6 +73,6 @@ impl Tolerance {
         if let Some(step) = self.max_step.filter(|step| !(*step > 0.0 && step.is_finite())) {
             return Err(wrong("max-step", format!("expected a positive time, found {step} s")));
         }
-        if self.max_steps == 0 { Err(wrong("max-steps", "a simulation needs steps".into())) } else { Ok(()) }
+        if self.max_steps == 0 { Err(wrong("max-steps", "expected at least 1 step, found 0".into())) } else { Ok(()) }
     }
 }

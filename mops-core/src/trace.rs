@@ -1,21 +1,21 @@
-//! A signal over time as it was simulated: a polynomial per step of the integrator.
+//! Simulated signals over time: a polynomial per step of the integrator.
 //!
-//! Criteria read traces, never samples, so that a peak or a settling time does not depend on the step size.
+//! Criteria read traces, not samples, so that a peak or a settling time does not depend on the step size.
 
 /// A signal as a piecewise quartic over consecutive segments, with jumps allowed between them.
 ///
-/// On segment `i`, from `knots[i]` to `knots[i + 1]`, the value at `t = knots[i] + s (knots[i + 1] - knots[i])`, `s` in
-/// [0, 1], is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order Runge-Kutta step.
-/// At a jump the trace has the later value, also at one that falls on its end.
+/// On segment `i`, from `knots[i]` to `knots[i + 1]`, let `t = knots[i] + s (knots[i + 1] - knots[i])` with `s` in [0, 1].
+/// The value at `t` is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order Runge-Kutta step.
+/// At a jump, including a jump at its end, the trace has the later value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     knots: Vec<f64>,
     segments: Vec<[f64; 5]>,
-    /// The value at the end, where it differs from that of the last segment.
+    /// Value at the end, if it differs from the value of the last segment.
     jumped: Option<f64>,
 }
 
-/// A part of a trace on which it is monotone: times and values at both ends.
+/// A monotone part of a trace: times and values at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
     /// Time at the start and the end, s.
@@ -27,17 +27,17 @@ pub struct Piece {
 }
 
 impl Trace {
-    /// Where within a segment [`Trace::push`] wants the signal, as `s`.
+    /// Positions `s` within a segment at which [`Trace::push`] expects samples.
     pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-    /// An empty trace that begins at `start`, with room for `segments`.
+    /// Creates an empty trace that starts at `start`, with capacity for `segments`.
     pub fn starting_at(start: f64, segments: usize) -> Self {
         let mut knots = Vec::with_capacity(segments + 1);
         knots.push(start);
         Self { knots, segments: Vec::with_capacity(segments), jumped: None }
     }
 
-    /// Adds the segment from the last knot to `end` that passes through `samples` at [`Trace::NODES`].
+    /// Appends the segment from the last knot to `end` that interpolates `samples` at [`Trace::NODES`].
     pub fn push(&mut self, end: f64, samples: [f64; 5]) {
         let [f0, f1, f2, f3, f4] = samples;
         // Newton's forward differences on the nodes k/4, expanded in powers of s.
@@ -54,7 +54,7 @@ impl Trace {
         );
     }
 
-    /// Adds the segment from the last knot to `end` with the given coefficients of `s^0 ... s^4`.
+    /// Appends the segment from the last knot to `end` with the given coefficients of `s^0 ... s^4`.
     pub fn push_polynomial(&mut self, end: f64, coefficients: [f64; 5]) {
         if self.knots.last().is_some_and(|&last| end > last) {
             self.knots.push(end);
@@ -62,28 +62,28 @@ impl Trace {
         }
     }
 
-    /// The trace jumps to this value at its end.
+    /// Sets the value after a jump at the end of the trace.
     pub fn jump_at_end(&mut self, value: f64) {
         self.jumped = Some(value);
     }
 
-    /// Time at which the trace begins, s.
+    /// Returns the start time of the trace, s.
     pub fn start(&self) -> f64 {
         self.knots.first().copied().unwrap_or(0.0)
     }
 
-    /// Time at which the trace ends, s.
+    /// Returns the end time of the trace, s.
     pub fn end(&self) -> f64 {
         self.knots.last().copied().unwrap_or(0.0)
     }
 
-    /// Times at which segments begin and end, s.
+    /// Returns the start and end times of the segments, s.
     pub fn knots(&self) -> &[f64] {
         &self.knots
     }
 
-    /// This trace, seen later by `time` (s, not negative), up to the same end; what is seen of the time before its start goes on
-    /// from there with the slope and the curvature of the start.
+    /// Returns the trace delayed by `time` (s, not negative), with the same end. Before its start, the trace is extrapolated
+    /// with the first and second derivatives at the start.
     #[must_use]
     pub fn delayed(&self, time: f64) -> Self {
         let (start, end) = (self.start(), self.end());
@@ -111,18 +111,18 @@ impl Trace {
         late
     }
 
-    /// Whether the trace has no segment.
+    /// Returns true if the trace has no segment.
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()
     }
 
-    /// The value at time `t`; outside the trace, the value at the nearer end.
+    /// Returns the value at time `t`; outside the trace, the value at the nearer end.
     pub fn at(&self, t: f64) -> f64 {
         let segment = self.segment_at(t);
         self.value_on(segment, t)
     }
 
-    /// The values at increasing times, in one pass.
+    /// Returns the values at increasing times, in one pass.
     pub fn sample(&self, times: &[f64]) -> Vec<f64> {
         let mut segment = 0;
         times
@@ -136,17 +136,17 @@ impl Trace {
             .collect()
     }
 
-    /// The value at the start.
+    /// Returns the value at the start.
     pub fn first(&self) -> f64 {
         self.segments.first().map_or(f64::NAN, |c| c[0])
     }
 
-    /// The value at the end.
+    /// Returns the value at the end.
     pub fn last(&self) -> f64 {
         self.jumped.unwrap_or_else(|| self.segments.last().map_or(f64::NAN, |c| c.iter().sum()))
     }
 
-    /// Value, rate (per s) and curvature (per s^2) at the end, of the last segment.
+    /// Returns the value, first derivative (per s) and second derivative (per s^2) at the end of the last segment.
     pub fn motion_at_end(&self) -> [f64; 3] {
         let Some(c) = self.segments.last() else { return [f64::NAN; 3] };
         let h = self.knots[self.segments.len()] - self.knots[self.segments.len() - 1];
@@ -155,7 +155,7 @@ impl Trace {
         [c.iter().sum(), rate / h, curvature / (h * h)]
     }
 
-    /// The monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
+    /// Returns the monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
     pub fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::with_capacity(self.segments.len());
         for (segment, c) in self.segments.iter().enumerate() {
@@ -180,7 +180,7 @@ impl Trace {
         pieces
     }
 
-    /// The time within a monotone piece at which the trace crosses `level`; `None` if it does not.
+    /// Returns the time within a monotone piece at which the trace crosses `level`; `None` if it does not.
     pub fn crossing(&self, piece: &Piece, level: f64) -> Option<f64> {
         let [low, high] = piece.value;
         if (low - level) * (high - level) > 0.0 || low == high {
@@ -192,12 +192,12 @@ impl Trace {
         Some(t0 + s * (t1 - t0))
     }
 
-    /// The largest value, and the first time it is reached.
+    /// Returns the largest value, and the first time at which it is reached.
     pub fn maximum(&self) -> (f64, f64) {
         self.extremum(|new, old| new > old)
     }
 
-    /// The smallest value, and the first time it is reached.
+    /// Returns the smallest value, and the first time at which it is reached.
     pub fn minimum(&self) -> (f64, f64) {
         self.extremum(|new, old| new < old)
     }
@@ -217,7 +217,7 @@ impl Trace {
         }
     }
 
-    /// The first time at which the trace is at or beyond `level` in the direction `rising`.
+    /// Returns the first time at which the trace is at or beyond `level` in the direction `rising`.
     pub fn first_reaching(&self, level: f64, rising: bool) -> Option<f64> {
         let reached = |value: f64| if rising { value >= level } else { value <= level };
         for piece in self.pieces() {
@@ -231,8 +231,8 @@ impl Trace {
         None
     }
 
-    /// The integral of `f(t, y)` over the trace, by five-point Gauss-Legendre quadrature on each segment: exact for
-    /// `t^a y^b` with `a + 4 b <= 9`.
+    /// Returns the integral of `f(t, y)` over the trace, by five-point Gauss-Legendre quadrature on each segment. The
+    /// quadrature is exact for `t^a y^b` with `a + 4 b <= 9`.
     pub fn integral(&self, f: impl Fn(f64, f64) -> f64) -> f64 {
         let mut sum = 0.0;
         for (segment, c) in self.segments.iter().enumerate() {
@@ -242,8 +242,8 @@ impl Trace {
         sum
     }
 
-    /// The integral of `f(t, |y - level|)`: as [`Trace::integral`], with each segment split where the trace crosses
-    /// `level`, so that the kink of the absolute value costs no accuracy.
+    /// Returns the integral of `f(t, |y - level|)` by the quadrature of [`Trace::integral`]. Segments are split at crossings
+    /// of `level`, so that the kink of the absolute value costs no accuracy.
     pub fn integral_of_deviation(&self, level: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         let mut sum = 0.0;
         for piece in self.pieces() {
@@ -257,7 +257,7 @@ impl Trace {
         sum
     }
 
-    /// The derivative with respect to time, as a trace.
+    /// Returns the derivative with respect to time, as a trace.
     #[must_use]
     pub fn derivative(&self) -> Self {
         let segments = self
@@ -272,7 +272,7 @@ impl Trace {
         Self { knots: self.knots.clone(), segments, jumped: None }
     }
 
-    /// `y + distance tangent`, for a tangent on the same segments.
+    /// Returns `y + distance tangent`, for a tangent on the same segments.
     #[must_use]
     pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
         debug_assert_eq!(self.knots, tangent.knots, "a tangent has the segments of its trace");
@@ -282,7 +282,7 @@ impl Trace {
         Self { knots: self.knots.clone(), segments, jumped }
     }
 
-    /// The largest jump between consecutive segments, in absolute value.
+    /// Returns the largest jump between consecutive segments, in absolute value.
     pub fn largest_jump(&self) -> f64 {
         self.segments.windows(2).map(|s| (s[1][0] - s[0].iter().sum::<f64>()).abs()).fold(0.0, f64::max)
     }
@@ -305,7 +305,7 @@ fn polynomial(c: &[f64; 5], s: f64) -> f64 {
     (((c[4] * s + c[3]) * s + c[2]) * s + c[1]) * s + c[0]
 }
 
-/// The integral of `f` from `a` to `b` by the five-point Gauss-Legendre rule (degree 9).
+/// Returns the integral of `f` from `a` to `b` by the five-point Gauss-Legendre rule (degree 9).
 /// Source: M. Abramowitz, I. Stegun, Handbook of Mathematical Functions (1964), table 25.4.
 fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     const NODES: [(f64, f64); 3] = [
@@ -321,19 +321,19 @@ fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     sum * half
 }
 
-/// The roots of `c0 + c1 s + c2 s^2 + c3 s^3` strictly inside (0, 1), increasing.
+/// Returns the roots of `c0 + c1 s + c2 s^2 + c3 s^3` strictly inside (0, 1), increasing.
 ///
-/// Between the roots of its derivative a cubic is monotone, so that bisection there finds every sign change and needs
-/// no special case for vanishing leading coefficients.
+/// A cubic is monotone between the roots of its derivative. Bisection there finds every sign change and needs no special
+/// case for vanishing leading coefficients.
 fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
     let mut roots = [f64::NAN; 3];
     let inside = |roots: [f64; 3]| roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0);
-    // Most segments are short beside the curvature of the signal: their slope keeps its sign.
+    // Most segments are so short relative to the curvature of the signal that their derivative keeps its sign.
     if c[0].abs() > c[1].abs() + c[2].abs() + c[3].abs() {
         return inside(roots);
     }
     let f = |s: f64| ((c[3] * s + c[2]) * s + c[1]) * s + c[0];
-    // Roots of c1 + 2 c2 s + 3 c3 s^2, in the form that does not cancel.
+    // Roots of c1 + 2 c2 s + 3 c3 s^2, in the form without cancellation.
     let (qa, qb, qc) = (3.0 * c[3], c[2], c[1]);
     let discriminant = qb * qb - qa * qc;
     let mut turning = [1.0, 1.0];
@@ -352,8 +352,8 @@ fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
     inside(roots)
 }
 
-/// A zero of `f` between `a` and `b`, where `f` has opposite signs or is zero: the Illinois variant of false position,
-/// to the last bits. Source: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+/// Returns a zero of `f` between `a` and `b`, at which `f` has opposite signs or is zero. Uses the Illinois variant of false
+/// position, to the last bits. Source: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
 fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut fa, mut fb) = (f(a), f(b));
     if fa == 0.0 {
@@ -406,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_late_was_on_its_way_before_the_start() {
+    fn a_delayed_trace_is_extrapolated_before_its_start() {
         let parabola = |t: f64| 1.0 - 2.0 * t + 3.0 * t * t;
         let mut trace = Trace::starting_at(0.0, 2);
         trace.push_polynomial(0.4, [1.0, -0.8, 3.0 * 0.16, 0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! What a front tells a designer: what one criterion costs in terms of another, and which points are worth a look.
+//! Trade-offs along a Pareto front: prices of one criterion in units of another, knee and nearest point.
 
 use serde::Serialize;
 
@@ -7,87 +7,87 @@ use crate::evaluation::Evaluation;
 use crate::front;
 use crate::problem::Problem;
 
-/// Whether the result can be improved in one criterion without loss in another.
+/// Pareto optimality of a result: certified, not shown or refuted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pareto {
-    /// To first order no direction improves one criterion and worsens none.
+    /// Locally Pareto-optimal to first order: no direction improves one criterion without worsening another.
     CertifiedLocal,
-    /// Nothing was shown.
+    /// Not certified as Pareto-optimal.
     NotShown,
-    /// A direction that improves is known.
+    /// Not Pareto-optimal: an improving direction is known.
     No,
 }
 
-/// The block `trade_offs` of a result: beside the points of its `front`, in their order.
+/// Block `trade_offs` of a result, in addition to its `front`; points have the same order.
 #[derive(Debug, Clone, Serialize)]
 pub struct TradeOffs {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings as sentences; names are in backticks.
     pub words: Vec<String>,
-    /// The criteria that the front is of.
+    /// Criteria of the front.
     pub criteria: Vec<FrontCriterion>,
-    /// What is known of each point.
+    /// Properties of each point.
     pub points: Vec<FrontPoint>,
-    /// The rates between neighbours; of fronts of two criteria alone.
+    /// Trade-off rates between neighbours; only for fronts of two criteria.
     pub neighbours: Vec<Exchange>,
-    /// The point farthest from the plane through the ends of the front, by index; null where the front bulges away.
+    /// Knee: index of the point farthest from the plane through the ends of the front; null if the front is concave.
     pub knee: Option<usize>,
-    /// The point whose largest weighted scaled value is least, by index: nearest to what was demanded.
+    /// Index of the point with the smallest worst weighted scaled value, nearest to the demands.
     pub nearest: usize,
-    /// The volume that the front dominates, every criterion measured by its range over the front.
+    /// Hypervolume dominated by the front, each criterion normalised by its range over the front.
     pub hypervolume: f64,
-    /// The corner up to which that volume counts: as far beyond the worst value of every criterion as a tenth of its range.
+    /// Reference point of the hypervolume: beyond the worst value of every criterion by a tenth of its range.
     pub reference: Vec<f64>,
 }
 
 /// A criterion of a front.
 #[derive(Debug, Clone, Serialize)]
 pub struct FrontCriterion {
-    /// Its key in the points of the front, `case/criterion`.
+    /// Key in the points of the front, `case/criterion`.
     pub key: String,
     /// Unit of its values.
     pub unit: String,
-    /// The best value on the front.
+    /// Best value on the front.
     pub best: f64,
-    /// The worst value on the front.
+    /// Worst value on the front.
     pub worst: f64,
 }
 
-/// What is known of a point of a front.
+/// Properties of a point of a front.
 #[derive(Debug, Clone, Serialize)]
 pub struct FrontPoint {
-    /// The largest weighted scaled value.
+    /// Largest weighted scaled value.
     pub worst_scaled: f64,
-    /// Whether one criterion can be improved at no cost.
+    /// Pareto optimality of the point.
     pub pareto: Pareto,
-    /// What a unit of each criterion is worth here, from the multipliers of the point: to first order, along the front,
-    /// `sum_k weights_k dc_k = 0`. The price of a unit of criterion `i`, in units of criterion `j`, is `weights_i /
-    /// weights_j`. Scaled so that the weights times the ranges sum to 1; null where nothing was certified.
+    /// Price weight of each criterion at the point, from its multipliers: `sum_k weights_k dc_k = 0` along the front, to
+    /// first order. The price of a unit of criterion `i`, in units of criterion `j`, is `weights_i / weights_j`. Normalised
+    /// so that the weights times the ranges sum to 1; null if the point was not certified.
     pub weights: Option<Vec<f64>>,
 }
 
-/// What is exchanged between two neighbours of a front.
+/// Trade-off between two neighbours of a front.
 #[derive(Debug, Clone, Serialize)]
 pub struct Exchange {
-    /// The two points, by index.
+    /// Indices of the two points.
     pub between: [usize; 2],
     /// Change of the second criterion per unit of the first.
     pub rate: f64,
 }
 
-/// A point of a front with what was shown of it.
+/// A point of a front with its certification.
 #[derive(Debug, Clone)]
 pub struct Certified {
-    /// The point.
+    /// Evaluation of the point.
     pub at: Evaluation,
-    /// Whether one criterion can be improved at no cost.
+    /// Pareto optimality of the point.
     pub pareto: Pareto,
-    /// What a unit of each weighted scaled value is worth.
+    /// Price weight of each weighted scaled value.
     pub weights: Option<Vec<f64>>,
 }
 
 impl TradeOffs {
-    /// What the points of a front tell; `None` where there is no point, or one has no value.
+    /// Returns the trade-offs of the points of a front; `None` if there is no point, or if a point has no value.
     pub fn of(problem: &Problem, points: &[Certified]) -> Option<Self> {
         let study = problem.study();
         let shape = problem.shape();
@@ -104,7 +104,7 @@ impl TradeOffs {
         let worst = |i: usize| scaled[i * m..(i + 1) * m].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let nearest = (0..points.len()).min_by(|&a, &b| worst(a).total_cmp(&worst(b)))?;
         let ranges = front::ranges(&scaled, m);
-        // A scaled value, with its weight, per unit of the criterion: negative where more is better.
+        // Derivative of the weighted scaled value with respect to the criterion: negative if more is better.
         let slopes: Vec<f64> =
             rows.iter().map(|&row| study.rows[row].weight * study.rows[row].demand.slope()).collect();
         let spread: Vec<f64> =
@@ -153,5 +153,5 @@ impl TradeOffs {
     }
 }
 
-/// How far the reference point of the hypervolume lies beyond the worst values, in ranges.
+/// Distance of the reference point of the hypervolume beyond the worst values, in ranges.
 const BEYOND: f64 = 0.1;

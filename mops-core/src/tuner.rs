@@ -1,4 +1,4 @@
-//! Tuners: the quantities a study may change, and the unit box that solvers see of them.
+//! Tuners: the quantities a study may change, and their mapping to the unit box of the solvers.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,30 +7,30 @@ use crate::expression::Expression;
 use crate::math;
 use crate::unit::Unit;
 
-/// How the range of a tuner is spread over [0, 1].
+/// Mapping of the range of a tuner to [0, 1].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     #[default]
     Linear,
-    /// Evenly in the logarithm; the range lies on one side of zero.
+    /// Logarithmic; the range excludes zero.
     Log,
 }
 
 /// Values a tuner may take between its bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Grid {
-    /// Any.
+    /// Any value.
     Continuous,
-    /// Whole numbers.
+    /// Integers.
     Integer,
-    /// The values listed, increasing.
+    /// Listed values, in increasing order.
     List(Vec<f64>),
 }
 
 impl Grid {
-    /// Whether a value is one of its.
+    /// Returns true if the grid contains a value.
     pub fn has(&self, value: f64) -> bool {
         match self {
             Self::Continuous => true,
@@ -45,35 +45,35 @@ impl Grid {
 pub struct Tuner {
     /// Name in reports; `case/name` for a tuner of one case.
     pub name: String,
-    /// Name of the models' parameter it sets.
+    /// Name of the model parameter that the tuner sets.
     pub parameter: String,
-    /// Value at the start.
+    /// Initial guess.
     pub start: f64,
     /// Smallest and largest value.
     pub bounds: [f64; 2],
-    /// How the range is spread.
+    /// Mapping of the range to [0, 1].
     pub scale: Scale,
-    /// Values between the bounds.
+    /// Allowed values between the bounds.
     pub grid: Grid,
-    /// Unit of all of these.
+    /// Unit of the values and bounds.
     pub unit: Unit,
-    /// The case it belongs to, by index; `None` for the whole study.
+    /// Case to which the tuner belongs, by index; `None` for the whole study.
     pub case: Option<usize>,
-    /// Whether a solver may change it.
+    /// True if a solver may change the tuner.
     pub active: bool,
-    /// Where it follows from other tuners: the expression, and the indices of the tuners it names.
+    /// Tie to other tuners: the expression, and the indices of the tuners in it; `None` for an independent tuner.
     pub tie: Option<(Expression, Vec<usize>)>,
-    /// Whether the smallest and the largest value were read off data, as those of start values: guesses, not limits.
+    /// True for a lower and an upper bound guessed from data, as for initial states: such bounds are not limits.
     pub guessed: [bool; 2],
 }
 
 impl Tuner {
-    /// The value at `u` in [0, 1].
+    /// Returns the value at `u` in [0, 1].
     pub fn value_at(&self, u: f64) -> f64 {
         let [min, max] = self.bounds;
         let u = u.clamp(0.0, 1.0);
         let spread = |u: f64| match self.scale {
-            // The ends are met to the bit, whatever the rounding between them.
+            // The ends are exact to the bit, despite rounding between them.
             _ if u == 0.0 => min,
             _ if u == 1.0 => max,
             Scale::Linear => min + u * (max - min),
@@ -86,7 +86,7 @@ impl Tuner {
         }
     }
 
-    /// The derivative of [`Tuner::value_at`] where the value is `value`, for a continuous tuner.
+    /// Returns the derivative of [`Tuner::value_at`] at the value `value`, for a continuous tuner.
     pub fn slope_at(&self, value: f64) -> f64 {
         let [min, max] = self.bounds;
         match self.scale {
@@ -95,7 +95,7 @@ impl Tuner {
         }
     }
 
-    /// Where `value` lies in [0, 1]; outside the bounds, the nearer end.
+    /// Returns the position of `value` in [0, 1], clamped to the bounds.
     pub fn position_of(&self, value: f64) -> f64 {
         let [min, max] = self.bounds;
         let u = match (&self.grid, self.scale) {
@@ -112,7 +112,7 @@ impl Tuner {
         u.clamp(0.0, 1.0)
     }
 
-    /// Distance between neighbouring values in the unit box; 0 for a continuous tuner.
+    /// Returns the distance between neighbouring values in the unit box; 0 for a continuous tuner.
     #[allow(clippy::cast_precision_loss)]
     pub fn spacing(&self) -> f64 {
         match &self.grid {
@@ -127,7 +127,7 @@ impl Tuner {
         (u * (count - 1) as f64).round() as usize
     }
 
-    /// `lower` or `upper` where `value` is at that bound to within 1e-6 of the range.
+    /// Returns `lower` or `upper` if `value` is at that bound, to within 1e-6 of the range.
     pub fn at_bound(&self, value: f64) -> Option<&'static str> {
         match self.position_of(value) {
             u if u <= 1e-6 => Some("lower"),
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_at_its_bound_is_told() {
+    fn a_value_at_its_bound_is_reported() {
         let t = tuner(Scale::Linear, Grid::Continuous);
         assert_eq!((t.at_bound(0.1), t.at_bound(25.0), t.at_bound(50.0)), (Some("lower"), None, Some("upper")));
     }

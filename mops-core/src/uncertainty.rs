@@ -1,18 +1,18 @@
-//! What is told of the uncertainty of a calibration's estimates besides standard errors, as it stands in `result.json`.
+//! Uncertainty of a calibration's estimates in `result.json`: profiles, bootstrap and prediction bands.
 
 use serde::Serialize;
 
 /// Profiles, bootstrap and bands of a calibration.
 #[derive(Debug, Clone, Serialize)]
 pub struct UncertaintyReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// Confidence of all intervals.
+    /// Confidence level of all intervals.
     pub level: f64,
-    /// Profiles of the likelihood.
+    /// Likelihood profiles.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profiles: Vec<ProfileReport>,
-    /// The bootstrap.
+    /// Bootstrap results.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap: Option<BootstrapReport>,
     /// Bands around predictions.
@@ -20,59 +20,61 @@ pub struct UncertaintyReport {
     pub bands: Vec<BandReport>,
 }
 
-/// The profile of an estimate: the sum of squares with this parameter held, all others estimated again.
+/// Likelihood profile of an estimate: the sum of squares with this parameter fixed and all others re-estimated.
 #[derive(Debug, Clone, Serialize)]
 pub struct ProfileReport {
-    /// The parameter.
+    /// Name of the parameter.
     pub parameter: String,
-    /// Unit of its values.
+    /// Unit of the values.
     pub unit: String,
-    /// The estimate.
+    /// Estimate of the parameter.
     pub value: f64,
-    /// The interval within which the likelihood ratio stays below its limit; an end is null where the data set none.
+    /// Interval within which the likelihood ratio stays below its limit; an end is null if the data do not limit it.
     pub interval: [f64; 2],
-    /// What ends the interval below and above: `data`, `bound` (the profile meets a bound of the tuner first), or `open`
-    /// (the end was not found: simulations failed on the way to it, or the run was interrupted).
+    /// Reason for the lower and the upper end: `data`, `bound` (the profile reaches a bound of the tuner first), or
+    /// `open`.
+    ///
+    /// `open` means that the end was not found, because simulations failed on the way or the run was interrupted.
     pub ends: [&'static str; 2],
-    /// The interval to first order: estimate +- t quantile times standard error; null where the data do not determine the
+    /// First-order interval: estimate +- t quantile times standard error; null if the data do not determine the
     /// parameter.
     pub linear_interval: [f64; 2],
-    /// Value of the parameter, and the signed root of the likelihood ratio: `(S - S_min)^(1/2) / s`, negative below the
-    /// estimate; on a straight line where the model is linear.
+    /// Values of the parameter, with the signed root of the likelihood ratio: `(S - S_min)^(1/2) / s`, negative below
+    /// the estimate. The points lie on a straight line if the model is linear.
     pub points: Vec<(f64, f64)>,
-    /// The limit of that root: the t quantile.
+    /// Limit of that root: the t quantile.
     pub limit: f64,
 }
 
 /// Estimates over bootstrap replicates.
 #[derive(Debug, Clone, Serialize)]
 pub struct BootstrapReport {
-    /// Replicates that could be estimated.
+    /// Number of replicates that were estimated.
     pub replicates: usize,
-    /// Those that could not.
+    /// Number of replicates that failed.
     pub failed: usize,
-    /// Length of a block, in samples, of every measured channel.
+    /// Block length, in samples, of every measured channel.
     pub blocks: Vec<usize>,
-    /// Every estimate.
+    /// Results of every estimate.
     pub parameters: Vec<BootstrapParameter>,
 }
 
-/// An estimate over bootstrap replicates.
+/// Estimate over bootstrap replicates.
 #[derive(Debug, Clone, Serialize)]
 pub struct BootstrapParameter {
-    /// The parameter.
+    /// Name of the parameter.
     pub parameter: String,
     /// Unit of all numbers.
     pub unit: String,
-    /// The estimate from the data as measured.
+    /// Estimate from the measured data.
     pub value: f64,
-    /// Mean of the replicates less the estimate.
+    /// Mean of the replicates minus the estimate.
     pub bias: f64,
     /// Standard deviation of the replicates.
     pub std_error: f64,
     /// Percentile interval.
     pub interval: [f64; 2],
-    /// The replicates.
+    /// Estimates of the replicates.
     #[serde(skip)]
     pub draws: Vec<f64>,
 }
@@ -80,18 +82,18 @@ pub struct BootstrapParameter {
 /// Bands around the prediction of a measured channel, at some of its times.
 #[derive(Debug, Clone, Serialize)]
 pub struct BandReport {
-    /// The experiment.
+    /// Name of the experiment.
     pub experiment: String,
-    /// The channel.
+    /// Name of the channel.
     pub channel: String,
     /// Unit of all values.
     pub unit: String,
     /// Times, s.
     pub times: Vec<f64>,
-    /// The prediction.
+    /// Predicted values.
     pub value: Vec<f64>,
-    /// Half the width of the band in which the true response lies, point by point, as far as parameters are uncertain.
+    /// Half-width of the pointwise confidence band of the true response, due to parameter uncertainty.
     pub response: Vec<f64>,
-    /// Half the width of the band in which a new measurement lies, noise included.
+    /// Half-width of the pointwise prediction band of a new measurement, noise included.
     pub measurement: Vec<f64>,
 }

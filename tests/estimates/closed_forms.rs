@@ -231,10 +231,10 @@ fn a_shared_rate_has_the_error_of_the_estimator_and_words_on_what_equal_counts_w
     let parameter = &parameters(&outcome)[0];
     assert!((parameter.std_error / 0.0057 - 1.0).abs() < 0.1, "{parameter:?}");
     let words = words(&outcome);
-    assert!(words.contains("The records have 10 to 1000 samples. With every sample counted alike"), "{words}");
+    assert!(words.contains("The records have 10 to 1000 samples. With equal weight for every sample"), "{words}");
     assert!(words.contains("+- 0.0011 instead of"), "{words}");
     let even = super::models::words(&decays([100, 60], true, None).run(0));
-    assert!(!even.contains("counted alike"), "{even}");
+    assert!(!even.contains("equal weight"), "{even}");
 }
 
 #[test]

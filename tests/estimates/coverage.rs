@@ -114,5 +114,5 @@ fn correlated_noise_is_reported_beside_its_intervals() {
         assert!(hits as f64 > 0.6 * f64::from(count), "{name}: {hits}");
     }
     let words = words(&calibration.run(0));
-    assert!(words.contains("not white") && words.contains("hold the truth less often than they say"), "{words}");
+    assert!(words.contains("not white") && words.contains("cover the truth less often than stated"), "{words}");
 }

@@ -52,11 +52,8 @@ fn a_direction_below_the_noise_is_not_determined_and_has_no_interval() {
         let words = words(&outcome);
         assert_eq!(rank(&outcome), 1, "{soft}: {words}");
         assert!(words.contains("nly `a` + 1.00 `b` can be estimated"), "{soft}: {words}");
-        let why = if soft < 1e-6 {
-            "along 1 direction nothing changes"
-        } else {
-            "along 1 direction the change is below the noise"
-        };
+        let why =
+            if soft < 1e-6 { "no effect along 1 direction" } else { "a change below the noise along 1 direction" };
         assert!(words.contains(why), "{soft}: {words}");
         for parameter in parameters(&outcome) {
             assert!(

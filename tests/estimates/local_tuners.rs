@@ -73,6 +73,6 @@ fn a_local_tuner_that_no_criterion_shows_leaves_no_validation_error() {
     calibration.criteria = Box::new(move || vec![("a", of("a", Usage::Minimise)), ("b", of("b", Usage::Monitor))]);
     let outcome = calibration.run(0);
     assert!(error(&outcome, "b").is_nan() && error(&outcome, "a").is_finite());
-    let warned = outcome.warnings.iter().any(|w| w.contains("no criterion of `b` can tell `b/k`"));
+    let warned = outcome.warnings.iter().any(|w| w.contains("no criterion of `b` determines its local tuners `b/k`"));
     assert!(warned, "{:?}", outcome.warnings);
 }

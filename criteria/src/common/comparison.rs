@@ -1,34 +1,35 @@
-//! A simulated signal beside its measurement.
+//! Comparison of a simulated signal with its measurement.
 
 use mops_core::{Analysis, Case, Channel};
 
 use super::trace;
 
-/// A measured channel, and how far the simulation is from it.
+/// Measured channel and the deviation of the simulation from it.
 pub struct Comparison<'a> {
-    /// What was measured.
+    /// Measured channel.
     pub channel: &'a Channel,
-    /// Simulated minus measured, at each sample.
+    /// Simulated minus measured value of each sample.
     pub differences: Vec<f64>,
 }
 
 impl Comparison<'_> {
-    /// Number of samples.
+    /// Returns the number of samples.
     #[allow(clippy::cast_precision_loss)]
     pub fn count(&self) -> f64 {
         self.differences.len() as f64
     }
 
-    /// Sum of the squares of the differences.
+    /// Returns the sum of the squares of the differences.
     pub fn sum_of_squares(&self) -> f64 {
         self.differences.iter().map(|d| d * d).sum()
     }
 }
 
-/// The derivative of the differences of [`compare`], which must have succeeded, along a tangent of the simulation.
+/// Returns the derivative of the differences of [`compare`] along a tangent of the simulation; `compare` must have
+/// succeeded.
 pub fn compared_slopes<'a>(case: &'a Case, along: &Analysis, signal: &str) -> Result<(&'a Channel, Vec<f64>), String> {
     let experiment = case.experiment.as_ref();
-    let channel = experiment.and_then(|experiment| experiment.channel(signal)).expect("compare has found the channel");
+    let channel = experiment.and_then(|experiment| experiment.channel(signal)).expect("`compare` finds the channel");
     let slopes = along.trace(signal).sample(&channel.times);
     if slopes.iter().all(|slope| slope.is_finite()) {
         Ok((channel, slopes))
@@ -37,7 +38,7 @@ pub fn compared_slopes<'a>(case: &'a Case, along: &Analysis, signal: &str) -> Re
     }
 }
 
-/// The simulated signal at the times of its measurement.
+/// Compares the simulated signal with its measurement at the sample times.
 pub fn compare<'a>(case: &'a Case, analysis: &Analysis, signal: &str) -> Result<Comparison<'a>, String> {
     let experiment = case.experiment.as_ref();
     let channel = experiment
@@ -47,7 +48,7 @@ pub fn compare<'a>(case: &'a Case, analysis: &Analysis, signal: &str) -> Result<
     let (Some(first), Some(last)) = (channel.times.first(), channel.times.last()) else {
         return Err(format!("the measurement of `{signal}` has no samples"));
     };
-    // Beyond its ends a trace has no values; times that agree up to rounding are the same.
+    // A trace has no values beyond its ends; times that agree up to rounding count as equal.
     let rounding = 1e-9 * (simulated.end() - simulated.start());
     if *first < simulated.start() - rounding || *last > simulated.end() + rounding {
         return Err(format!(

@@ -1,10 +1,10 @@
-//! The integral criteria of the control error: they differ in the integrand only.
+//! Integral criteria of the control error, which differ in the integrand only.
 
 use mops_core::{Analysis, Case, Criterion, Mistake, Sense, Unit, Value, Variable};
 
 use super::{NOT_NEGATIVE, Step, StepOptions};
 
-/// `integral f(t, |e|) dt` from the step to the end, with `e = y - target` and `t` counted from the step.
+/// Integral `integral f(t, |e|) dt` from the step to the end, with `e = y - target` and `t` counted from the step.
 pub struct ErrorIntegral {
     step: Step,
     unit: Unit,
@@ -12,7 +12,7 @@ pub struct ErrorIntegral {
 }
 
 impl ErrorIntegral {
-    /// The criterion with this integrand; its value has the unit `signal^powers[0] s^powers[1]`.
+    /// Creates the criterion with this integrand; its value has the unit `signal^powers[0] s^powers[1]`.
     pub fn bind(
         signals: &[Variable],
         options: &StepOptions<'_>,

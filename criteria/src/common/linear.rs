@@ -1,37 +1,37 @@
-//! What criteria of linear systems share: the channel they read, and a value computed from it.
+//! Common parts of criteria of linear systems: channel, value type, criterion.
 
 use mops_core::linear::Loop;
 use mops_core::{Analysis, Case, Criterion, Interface, Mistake, Sense, StateSpace, Unit, Value, Variable, suggestion};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Which poles or gains are looked at.
+/// System whose poles or gains are evaluated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Of {
-    /// Those of the system itself.
+    /// The system itself.
     #[default]
     System,
-    /// Those of the closed loop with unity feedback, of which the system is the loop transfer function.
+    /// The closed loop with unity feedback, with the system as loop transfer function.
     ClosedLoop,
 }
 
-/// The input and the output that a criterion looks at.
+/// Input and output of a criterion.
 #[derive(Debug, Clone)]
 pub struct Channel {
     /// Indices in the system.
     input: usize,
     output: usize,
-    /// Unit of the output over that of the input.
+    /// Unit of the output divided by that of the input.
     pub unit: Unit,
     /// Names and units of the input and the output.
     ends: [Variable; 2],
-    /// Factor of the output: 1 but for a loop whose ends have different units of one dimension.
+    /// Factor of the output: 1 except for a loop whose ends have different units of one dimension.
     factor: f64,
 }
 
 impl Channel {
-    /// The channel of these names; they may be left out where the model has one input, or one output.
+    /// Selects the channel by names, which may be omitted if the model has one input, or one output.
     pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, Mistake> {
         let input = pick("input", input, &model.inputs)?;
         let output = pick("output", output, &model.signals)?;
@@ -45,11 +45,11 @@ impl Channel {
         Ok(Self { input, output, unit, ends, factor: 1.0 })
     }
 
-    /// The channel as a loop transfer function: the output is fed back to the input, so that it is counted in the unit of the
-    /// input.
+    /// Converts the channel to a loop transfer function: the output is fed back to the input, hence expressed in its
+    /// unit.
     ///
     /// # Errors
-    /// An output that has not the dimension of the input.
+    /// If the output does not have the dimension of the input.
     pub fn in_loop(self) -> Result<Self, Mistake> {
         let [from, to] = &self.ends;
         if !to.unit.is_compatible(&from.unit) {
@@ -58,15 +58,15 @@ impl Channel {
                 from.name, from.unit, to.name, to.unit
             );
             return Err(Mistake::here(fact).with_help(
-                "a loop begins and ends in the same dimension: add the controller and the sensor to the model, or read \
-                 another input or output",
+                "input and output of a loop need the same dimension: add the controller and the sensor to the model, or \
+                 use another input or output",
             ));
         }
         let factor = to.unit.factor() / from.unit.factor();
         Ok(Self { factor, ..self })
     }
 
-    /// The channel as a system, or as a loop transfer function.
+    /// Returns the channel as a system, or as a loop transfer function.
     ///
     /// # Errors
     /// See [`Channel::in_loop`].
@@ -77,7 +77,7 @@ impl Channel {
         }
     }
 
-    /// The system from the input to the output.
+    /// Returns the system from the input to the output.
     pub fn system(&self, analysis: &Analysis) -> StateSpace {
         let linear = analysis.linear().expect("checked when the study is built");
         let mut system = linear.channel(self.input, self.output);
@@ -99,16 +99,13 @@ fn pick(key: &str, name: Option<&String>, known: &[Variable]) -> Result<usize, M
         None if known.len() == 1 => Ok(0),
         None => {
             let names: Vec<&str> = names().collect();
-            Err(Mistake::here(format!(
-                "the model has {} {key}s, and the criterion does not say which it reads",
-                known.len()
-            ))
-            .with_help(format!("add {key} = one of {}", names.join(", "))))
+            Err(Mistake::here(format!("the model has {} {key}s, and the criterion names none", known.len()))
+                .with_help(format!("add {key} = one of {}", names.join(", "))))
         }
     }
 }
 
-/// What the values of a criterion are.
+/// Unit, sense and range of the values of a criterion.
 #[derive(Debug, Clone)]
 pub struct Values {
     unit: Unit,
@@ -117,27 +114,27 @@ pub struct Values {
 }
 
 impl Values {
-    /// Values of which any number is possible.
+    /// Creates values that may be any number.
     pub fn of(unit: Unit, sense: Sense) -> Self {
         Self { unit, sense, range: [f64::NEG_INFINITY, f64::INFINITY] }
     }
 
-    /// Only values from `low` to `high` are possible.
+    /// Limits the values to the range from `low` to `high`.
     pub fn within(self, low: f64, high: f64) -> Self {
         Self { range: [low, high], ..self }
     }
 }
 
-/// A criterion that is computed from one channel of a linear system.
+/// Criterion computed from one channel of a linear system.
 pub struct LinearCriterion<F> {
     channel: Channel,
     values: Values,
-    /// The value for the system of the channel.
+    /// Function from the system of the channel to the value.
     value: F,
 }
 
 impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync + 'static> LinearCriterion<F> {
-    /// The criterion, ready to be given away.
+    /// Creates the boxed criterion.
     pub fn boxed(channel: Channel, values: Values, value: F) -> Box<dyn Criterion> {
         Box::new(Self { channel, values, value })
     }
@@ -165,12 +162,12 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
     }
 }
 
-/// A margin, which may be infinite: then `most` stands for it, with a word on it.
+/// Returns a margin, limited to `most` and then noted.
 pub fn capped(margin: f64, most: f64) -> Value {
-    if margin > most { Value::noted(most, "infinite, or as good as") } else { margin.into() }
+    if margin > most { Value::noted(most, "infinite or above the limit") } else { margin.into() }
 }
 
-/// The poles that are looked at, for criteria of all poles.
+/// Returns the poles of the system or of the closed loop.
 pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_core::linear::Complex>, String> {
     let poles = match of {
         Of::System => system.poles()?,
@@ -179,7 +176,7 @@ pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_core::linear::Compl
     if poles.is_empty() { Err("the system has no poles".to_owned()) } else { Ok(poles) }
 }
 
-/// The loop with this transfer function.
+/// Returns the loop with this transfer function.
 pub fn feedback(system: StateSpace) -> Result<Loop, String> {
     Loop::new(system)
 }

@@ -1,4 +1,4 @@
-//! What several criteria share: reading options, the step a response answers, the measurement it is compared with.
+//! Common parts of criteria: option parsing, the step of a response, the comparison with a measurement.
 
 mod comparison;
 mod error_integral;
@@ -16,10 +16,10 @@ pub use linear::{Channel, LinearCriterion, Of, Values, capped, feedback, poles};
 pub use part::part;
 pub use step::{Step, StepOptions};
 
-/// The range of values that are never negative.
+/// Range of nonnegative values.
 pub const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
-/// The signal of that name.
+/// Returns the signal of that name.
 pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, Mistake> {
     signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
         Mistake::new("signal", format!("the model has no signal `{name}`"))
@@ -27,7 +27,7 @@ pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, M
     })
 }
 
-/// An option as a number in `unit`.
+/// Returns an option as a number in `unit`.
 pub fn number(key: &str, option: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
     let number = option.to(unit).map_err(|why| Mistake::new(key, why))?;
     if number.is_finite() {
@@ -37,12 +37,12 @@ pub fn number(key: &str, option: &Quantity, unit: &Unit) -> Result<f64, Mistake>
     }
 }
 
-/// An option that may be absent, as a number in `unit`.
+/// Returns an optional option as a number in `unit`.
 pub fn optional(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
     option.map(|option| number(key, option, unit)).transpose()
 }
 
-/// An option that may be absent and must be positive, as a number in `unit`; a temperature is a difference.
+/// Returns an optional positive option as a number in `unit`; a temperature is a difference.
 pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
     match optional(key, option, &unit.difference())? {
         Some(number) if number <= 0.0 => {
@@ -52,26 +52,26 @@ pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Opt
     }
 }
 
-/// The time of the step, s; 0 where absent.
+/// Returns the time of the step, s; 0 if absent.
 pub fn step_time(option: Option<&Quantity>) -> Result<f64, Mistake> {
     match optional("step-time", option, &second())? {
         Some(time) if time < 0.0 => {
-            Err(Mistake::new("step-time", format!("a step at {time} s lies before the simulation begins")))
+            Err(Mistake::new("step-time", format!("the step at {time} s is before the start of the simulation")))
         }
         time => Ok(time.unwrap_or(0.0)),
     }
 }
 
-/// The unit of time.
+/// Returns the unit of time.
 pub fn second() -> Unit {
     Unit::known("s")
 }
 
-/// The trace of a signal, finite throughout: a comparison would pass over a NaN in silence.
+/// Returns the trace of a signal, or an error if it is not finite, because comparisons ignore NaN silently.
 pub fn trace<'a>(analysis: &'a Analysis, signal: &str) -> Result<&'a Trace, String> {
     let trace = analysis.trace(signal);
     if trace.is_empty() {
-        return Err(format!("the simulation of `{signal}` has no length"));
+        return Err(format!("the simulation of `{signal}` has zero length"));
     }
     // 0 y is 0, or NaN where y is not finite.
     if trace.integral(|_, y| 0.0 * y) == 0.0 { Ok(trace) } else { Err(format!("`{signal}` is not finite throughout")) }

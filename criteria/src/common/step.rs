@@ -1,4 +1,4 @@
-//! The step that a response answers: where it comes from, where it should go, and when.
+//! Step of a response: initial value, target and time.
 
 use std::borrow::Cow;
 
@@ -9,10 +9,10 @@ use super::{optional, part, signal, step_time, trace};
 /// Share of a step that counts as near a level.
 const NEAR: f64 = 0.01;
 
-/// Share of a band below which a motion is no turn.
+/// Share of a band below which a reversal of motion is ignored.
 const TURN: f64 = 1e-3;
 
-/// The options that say which step is looked at.
+/// Options that define the step.
 pub struct StepOptions<'a> {
     pub signal: &'a str,
     pub target: Option<&'a Quantity>,
@@ -20,7 +20,7 @@ pub struct StepOptions<'a> {
     pub step_time: Option<&'a Quantity>,
 }
 
-/// The same, checked.
+/// Checked options of the step.
 pub struct Step {
     pub signal: String,
     pub unit: Unit,
@@ -29,17 +29,17 @@ pub struct Step {
     time: f64,
 }
 
-/// The response from the step on.
+/// Response from the step on.
 pub struct Answer<'a> {
-    /// The signal from the time of the step on.
+    /// Signal from the time of the step on.
     pub trace: Cow<'a, Trace>,
     /// Value before the step.
     pub from: f64,
-    /// Value it should settle at.
+    /// Value at which the signal should settle.
     pub target: f64,
     /// Time of the step, s.
     pub time: f64,
-    /// Whether the target is the last value, as none was given.
+    /// True if the target is the last value because none was given.
     pub is_assumed: bool,
 }
 
@@ -53,25 +53,28 @@ impl StepOptions<'_> {
         if let (Some(target), Some(from)) = (target, from)
             && target == from
         {
-            return Err(Mistake::new("target", format!("a step from {} to the same value is none", unit.amount(from))));
+            return Err(Mistake::new(
+                "target",
+                format!("the step has no height: `from` and `target` are both {}", unit.amount(from)),
+            ));
         }
         Ok(Step { signal: self.signal.to_owned(), unit, target, from, time })
     }
 }
 
 impl Step {
-    /// What is assumed of the target where the study gives none.
+    /// Returns the assumption on the target if the study gives none.
     pub fn assumption(&self) -> Option<String> {
-        let text = "no `target` is given: the value of the signal at the end of the simulation counts as the target";
+        let text = "no `target` given: the value of the signal at the end of the simulation is used";
         self.target.is_none().then(|| text.to_owned())
     }
 
-    /// The response to the step.
+    /// Returns the response to the step.
     pub fn answer<'a>(&self, analysis: &'a Analysis) -> Result<Answer<'a>, String> {
         let whole = trace(analysis, &self.signal)?;
         let (time, end) = (self.time, whole.end());
         if time >= end {
-            return Err(format!("the step at {time} s lies after the end of the simulation at {end} s"));
+            return Err(format!("the step at {time} s is after the end of the simulation at {end} s"));
         }
         Ok(Answer {
             trace: if time <= whole.start() {
@@ -86,52 +89,53 @@ impl Step {
         })
     }
 
-    /// A level of the signal, to draw.
+    /// Returns a level of the signal to be plotted.
     pub fn mark(&self, label: &str, level: f64) -> Vec<Mark> {
         vec![Mark { signal: self.signal.clone(), label: label.to_owned(), level }]
     }
 }
 
 impl Answer<'_> {
-    /// Height of the step, `target - from`, not zero.
+    /// Returns the height of the step, `target - from`, not zero.
     pub fn height(&self) -> Result<f64, String> {
         let height = self.target - self.from;
-        // A height of nothing but rounding would be divided by all the same.
+        // A height at rounding level counts as zero.
         if height.abs() > 1e-12 * self.target.abs().max(self.from.abs()) {
             Ok(height)
         } else {
-            Err(format!("the step from {} to {} has no height to compare with", self.from, self.target))
+            Err(format!("the step from {} to {} has no height", self.from, self.target))
         }
     }
 
-    /// Whether the response should rise; a step of no height counts as one up.
+    /// Returns true if the response should rise; a step of zero height counts as upwards.
     fn rises(&self) -> bool {
         self.target >= self.from
     }
 
-    /// A difference counted in the direction of the step.
+    /// Returns a difference relative to the direction of the step.
     pub fn upwards(&self, difference: f64) -> f64 {
         if self.rises() { difference } else { -difference }
     }
 
-    /// The value farthest in the direction of the step.
+    /// Returns the value farthest in the direction of the step.
     pub fn farthest_ahead(&self) -> f64 {
         if self.rises() { self.trace.maximum().0 } else { self.trace.minimum().0 }
     }
 
-    /// The value farthest against the direction of the step.
+    /// Returns the value farthest against the direction of the step.
     pub fn farthest_behind(&self) -> f64 {
         if self.rises() { self.trace.minimum().0 } else { self.trace.maximum().0 }
     }
 
-    /// Time from the step to the first moment at which the response has come `fraction` of the way.
+    /// Returns the time from the step until the response first reaches `fraction` of the step.
     pub fn first_reaching(&self, fraction: f64) -> Result<Option<f64>, String> {
         let level = self.from + fraction * self.height()?;
         Ok(self.trace.first_reaching(level, self.rises()).map(|t| t - self.time))
     }
 
-    /// What was asked for was never reached: the signal should have been at `level`, within `near` of it, in the last tenth of
-    /// the time from the step to the end.
+    /// Returns the value of a missed event, which requires the signal within `near` of `level`.
+    ///
+    /// The distance is the mean deviation from `level` in the last tenth of the time from the step to the end.
     pub fn missed(&self, horizon: f64, level: f64, near: f64, note: &'static str) -> Value {
         let end = self.trace.end();
         let tenth = 0.1 * self.length();
@@ -140,13 +144,14 @@ impl Answer<'_> {
         Value::missed(Some(horizon), distance, near, note)
     }
 
-    /// As [`Answer::missed`], where the signal should have come at least `fraction` of the way: near is 1 % of the step.
+    /// Returns the value of a level, `fraction` of the step, that was never reached; near is 1 % of the step. See
+    /// [`Answer::missed`].
     pub fn not_reached(&self, horizon: f64, fraction: f64, note: &'static str) -> Result<Value, String> {
         let height = self.height()?;
         Ok(self.missed(horizon, self.from + fraction * height, NEAR * height.abs(), note))
     }
 
-    /// The last time at which the response is not within `band` of the target; `None` if it always is.
+    /// Returns the last time at which the response is not within `band` of the target; `None` if it always is.
     pub fn last_outside(&self, band: f64) -> Option<f64> {
         let (low, high) = (self.target - band, self.target + band);
         let is_outside = |y: f64| y < low || y > high;
@@ -155,16 +160,17 @@ impl Answer<'_> {
         if is_outside(last.value[1]) {
             return Some(last.time[1]);
         }
-        // The piece is monotone: it comes in across the edge it was beyond.
+        // The piece is monotone: it enters across the edge beyond which it starts.
         let edge = if last.value[0] > high { high } else { low };
         Some(self.trace.crossing(last, edge).unwrap_or(last.time[0]))
     }
 
-    /// Whether the response, which is within `band` of the target since `time` (s), looks as if it stayed there after the end.
+    /// Returns true if the response, within `band` of the target since `time` (s), appears to stay there after the end.
     ///
-    /// It does where it has turned since then, or would not leave the band at its final rate within as much time as was
-    /// simulated, or slows down to a value within: with the rate and the curvature of the end an exponential approach ends at
-    /// `y - y'^2/y''`. What it does not do is cross the band when the simulation ends.
+    /// This is the case if the response has reversed since `time`. The response also stays if at its final rate it
+    /// would not leave the band within the simulated time. The third case is a response that slows down to a value
+    /// within the band. With the final rate and curvature, an exponential approach ends at `y - y'^2/y''`. Otherwise
+    /// the response crosses the band when the simulation ends.
     pub fn stays_within(&self, band: f64, time: f64) -> bool {
         let [value, rate, curvature] = self.trace.motion_at_end();
         let is_within = |y: f64| (y - self.target).abs() <= band;
@@ -175,14 +181,15 @@ impl Answer<'_> {
         }
         let moves = self.trace.pieces().into_iter().filter(|piece| piece.time[1] > time).map(|piece| {
             let [from, to] = piece.value;
-            // What is left of a turn by rounding is none.
+            // A reversal at rounding level is ignored.
             if (to - from).abs() <= TURN * band { 0.0 } else { (to - from).signum() }
         });
         let moves: Vec<f64> = moves.filter(|direction| *direction != 0.0).collect();
         moves.windows(2).any(|pair| pair[0] != pair[1])
     }
 
-    /// A note where the target is the last value, and the response does not look as if it stayed within 2 % of the step there.
+    /// Adds a note if the target is the last value and the response does not appear to stay within 2 % of the step
+    /// there.
     pub fn note(&self, value: Value) -> Value {
         let moves = || {
             let band = 0.02 * self.height().unwrap_or(0.0).abs();
@@ -192,7 +199,7 @@ impl Answer<'_> {
         Value { note: value.note.or(note), ..value }
     }
 
-    /// Time from the step to the end of the simulation, s.
+    /// Returns the time from the step to the end of the simulation, s.
     pub fn length(&self) -> f64 {
         self.trace.end() - self.time
     }
@@ -213,21 +220,21 @@ mod tests {
         unknown.signal = "phii".into();
         assert_eq!(mistake(&unknown), "signal: the model has no signal `phii`; did you mean `phi`?");
         let seconds = Overshoot { target: Some(quantity("3 s")), ..overshoot() };
-        assert_eq!(mistake(&seconds), "target: a quantity in `s` stands where one in `m` is expected");
+        assert_eq!(mistake(&seconds), "target: expected a quantity in `m`, found `s`");
         let infinite = Overshoot { target: Some(f64::INFINITY.into()), ..overshoot() };
         assert_eq!(mistake(&infinite), "target: `target` must be finite, not inf");
         let none = Overshoot { target: Some(2.0.into()), from: Some(2.0.into()), ..overshoot() };
-        assert_eq!(mistake(&none), "target: a step from 2 m to the same value is none");
+        assert_eq!(mistake(&none), "target: the step has no height: `from` and `target` are both 2 m");
         let early = Overshoot { step_time: Some((-1.0).into()), ..overshoot() };
-        assert_eq!(mistake(&early), "step-time: a step at -1 s lies before the simulation begins");
+        assert_eq!(mistake(&early), "step-time: the step at -1 s is before the start of the simulation");
     }
 
     #[test]
     fn a_response_without_a_step_has_no_value() {
         let still = simulated(2.0, |_| 3.0);
-        assert_eq!(undefined(&overshoot(), &still), "the step from 3 to 3 has no height to compare with");
+        assert_eq!(undefined(&overshoot(), &still), "the step from 3 to 3 has no height");
         let late = Overshoot { step_time: Some(5.0.into()), ..overshoot() };
-        assert_eq!(undefined(&late, &still), "the step at 5 s lies after the end of the simulation at 2 s");
+        assert_eq!(undefined(&late, &still), "the step at 5 s is after the end of the simulation at 2 s");
     }
 
     #[test]

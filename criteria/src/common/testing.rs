@@ -7,12 +7,12 @@ use mops_core::{
     Trace, Value, Variable,
 };
 
-/// Signals of the model of all tests.
+/// Returns the signals of the model of all tests.
 pub fn signals() -> Vec<Variable> {
     [("y", "m"), ("u", "V"), ("phi", "rad")].map(|(name, unit)| Variable::new(name, unit, "")).to_vec()
 }
 
-/// The model of all tests of a criterion: signals over time, or a system from `u` in V to `y` in V.
+/// Returns the model of all tests of a criterion: signals over time, or a system from `u` in V to `y` in V.
 fn model(reads: AnalysisKind) -> Interface {
     match reads {
         AnalysisKind::Time => Interface { signals: signals(), ..Interface::default() },
@@ -20,7 +20,7 @@ fn model(reads: AnalysisKind) -> Interface {
     }
 }
 
-/// A linear model from `u` to `y`, in these units.
+/// Returns a linear model from `u` to `y`, in these units.
 pub fn channel(from: &str, to: &str) -> Interface {
     Interface {
         signals: vec![Variable::new("y", to, "")],
@@ -30,18 +30,18 @@ pub fn channel(from: &str, to: &str) -> Interface {
     }
 }
 
-/// A linear system by its transfer function, coefficients of falling powers.
+/// Returns a linear system given by its transfer function, coefficients of descending powers.
 pub fn linear(numerator: &[f64], denominator: &[f64]) -> Analysis {
     linear_delayed(numerator, denominator, 0.0)
 }
 
-/// The same with a delay.
+/// Returns a linear system with a delay, given by its transfer function.
 pub fn linear_delayed(numerator: &[f64], denominator: &[f64], delay: f64) -> Analysis {
     let function = TransferFunction { numerator: numerator.to_vec(), denominator: denominator.to_vec(), delay };
     Analysis::Linear(function.state_space().expect("it is a system"))
 }
 
-/// A function over [0, `end`] as a trace of `segments` equal segments.
+/// Returns a function over [0, `end`] as a trace of `segments` equal segments.
 pub fn sampled(end: f64, segments: u32, f: impl Fn(f64) -> f64) -> Trace {
     let mut trace = Trace::starting_at(0.0, segments as usize);
     let knot = |i: u32| end * f64::from(i) / f64::from(segments);
@@ -52,19 +52,19 @@ pub fn sampled(end: f64, segments: u32, f: impl Fn(f64) -> f64) -> Trace {
     trace
 }
 
-/// An analysis in which every signal has this trace.
+/// Returns an analysis in which every signal has this trace.
 pub fn analysis(trace: &Trace) -> Analysis {
     let traces = signals().into_iter().map(|signal| (signal.name, trace.clone())).collect();
     Analysis::Time(Response { traces, ..Response::default() })
 }
 
-/// A function over [0, `end`] as an analysis, in segments of about 0.01 s.
+/// Returns a function over [0, `end`] as an analysis, in segments of about 0.01 s.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn simulated(end: f64, f: impl Fn(f64) -> f64) -> Analysis {
     analysis(&sampled(end, (end / 0.01).ceil() as u32, f))
 }
 
-/// Step response of `1/(s^2 + 2 damping s + 1)`, underdamped.
+/// Returns the step response of `1/(s^2 + 2 damping s + 1)`, underdamped.
 pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
     let frequency = (1.0 - damping * damping).sqrt();
     move |t| {
@@ -73,7 +73,7 @@ pub fn second_order(damping: f64) -> impl Fn(f64) -> f64 {
     }
 }
 
-/// A case in which `y` was measured.
+/// Returns a case with a measurement of `y`.
 pub fn measured(times: &[f64], values: &[f64], noise: Option<f64>) -> Case {
     let channel = Channel { signal: "y".into(), times: times.to_vec(), values: values.to_vec(), noise };
     Case {
@@ -82,42 +82,42 @@ pub fn measured(times: &[f64], values: &[f64], noise: Option<f64>) -> Case {
     }
 }
 
-/// A quantity as a user writes it.
+/// Returns a quantity as written by a user.
 pub fn quantity(text: &str) -> Quantity {
     Quantity::parse(text).expect("a quantity")
 }
 
-/// The criterion, bound to the model of all tests.
+/// Binds the criterion to the model of all tests.
 pub fn bound(spec: &dyn CriterionSpec) -> Box<dyn Criterion> {
     spec.bind(&model(spec.reads())).expect("the options are right")
 }
 
-/// The value of a criterion.
+/// Returns the value of a criterion.
 pub fn value(spec: &dyn CriterionSpec, analysis: &Analysis) -> Value {
     value_in(&Case::default(), spec, analysis)
 }
 
-/// The value of a criterion in a case.
+/// Returns the value of a criterion in a case.
 pub fn value_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) -> Value {
     bound(spec).value(case, analysis).expect("it is defined")
 }
 
-/// Why a criterion has no value.
+/// Returns the reason why a criterion has no value.
 pub fn undefined(spec: &dyn CriterionSpec, analysis: &Analysis) -> String {
     undefined_in(&Case::default(), spec, analysis)
 }
 
-/// Why a criterion has no value in a case.
+/// Returns the reason why a criterion has no value in a case.
 pub fn undefined_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) -> String {
     bound(spec).value(case, analysis).expect_err("it is not defined")
 }
 
-/// The mistake in the options of a criterion.
+/// Returns the mistake in the options of a criterion.
 pub fn mistake(spec: &dyn CriterionSpec) -> String {
     spec.bind(&model(spec.reads())).err().expect("the options are wrong").to_string()
 }
 
-/// Two numbers agree within `tolerance`.
+/// Asserts that two numbers agree within `tolerance`.
 #[track_caller]
 pub fn assert_near(number: f64, expected: f64, tolerance: f64) {
     assert!((number - expected).abs() <= tolerance, "{number} is not {expected} within {tolerance}");

@@ -1,4 +1,4 @@
-//! Reads CSV: a header with names and units, and rows of numbers.
+//! CSV reader: a header with names and units, and rows of numbers.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,18 +10,18 @@ use super::Variable;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::unit::Unit;
 
-/// Where the cells stand in the text.
+/// Positions of the cells in the text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Layout {
     separator: u8,
     /// First byte of each row.
     rows: Vec<usize>,
-    /// For each variable, which cell of a row it is.
+    /// Index of the cell in a row for each variable.
     cells: Vec<usize>,
 }
 
 impl Layout {
-    /// Bytes of the cell of `variable` in `row`.
+    /// Returns the byte range of the cell of `variable` in `row`.
     pub fn span(&self, text: &str, variable: usize, row: usize) -> Option<Range<usize>> {
         self.cell(text, *self.cells.get(variable)?, row)
     }
@@ -31,27 +31,28 @@ impl Layout {
     }
 }
 
-/// Reads every column that holds a number or only gaps: the variables, what was skipped, and where the cells are.
+/// Reads every column that contains numbers or only gaps. Returns the variables, the skipped columns and the cell
+/// positions.
 ///
 /// # Errors
-/// When there is no header, row or column of numbers, when a name comes twice, when a row has not as many cells as the
-/// header, when a column has numbers and text, or an infinite number.
+/// If there is no header, no row or no column of numbers, or if a name is repeated. If a row has a different number of
+/// cells than the header. If a column mixes numbers and text, or contains an infinite number.
 pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, Layout), Diagnostic> {
     let header = Header::read(source)?;
     let mut layout = Layout { separator: header.separator, ..Layout::default() };
     let columns = read_rows(source, &header, &mut layout)?;
     let mistakes = columns.iter().enumerate().filter_map(|(cell, column)| Some((column.mistake()?, cell)));
     if let Some((row, cell)) = mistakes.min() {
-        let span = layout.cell(&source.text, cell, row).expect("the row was read");
+        let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
         return Err(not_a_number(source, span, &header.names[cell].0));
     }
     let (mut variables, mut skipped) = (Vec::new(), Vec::new());
     for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
         if let Some(row) = column.bad {
-            let span = layout.cell(&source.text, cell, row).expect("the row was read");
+            let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
             skipped.push(format!("{name}: text (`{}`)", shortened(&source.text[span])));
         } else if cell + 1 == header.names.len() && is_unnamed(&header, source) && !column.has_numbers {
-            // What a separator at the end of the header begins.
+            // A separator at the end of the header starts no column.
         } else {
             layout.cells.push(cell);
             let (name, unit, rows) = (name.clone(), unit.clone(), column.values.len());
@@ -59,14 +60,14 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
         }
     }
     if variables.is_empty() {
-        return Err(Diagnostic::new("no column of the file holds numbers")
+        return Err(Diagnostic::new("no column of the file contains numbers")
             .with_help("separate the cells by commas, semicolons or tabs")
             .at(source, header.span));
     }
     Ok((variables, skipped, layout))
 }
 
-/// Whether the last cell of the header is empty.
+/// Returns true if the last cell of the header is empty.
 fn is_unnamed(header: &Header, source: &Arc<Source>) -> bool {
     header.names.len() > 1 && source.text[header.span.clone()].ends_with(char::from(header.separator))
 }
@@ -76,7 +77,7 @@ struct Header {
     /// Name and unit of each column.
     names: Vec<(String, Option<String>)>,
     span: Range<usize>,
-    /// Where the rows begin.
+    /// First byte of the rows.
     body: usize,
 }
 
@@ -106,7 +107,7 @@ impl Header {
     }
 }
 
-/// Where the first line starts that is neither blank nor a `#` comment.
+/// Returns the start of the first line that is neither blank nor a `#` comment.
 fn first_line(text: &str) -> Option<usize> {
     let mut start = 0;
     for line in text.split_inclusive(['\n', '\r']) {
@@ -118,30 +119,30 @@ fn first_line(text: &str) -> Option<usize> {
     None
 }
 
-/// The semicolon if the line has one, else the tab, else the comma.
+/// Returns the separator: a semicolon if the line contains one, else a tab, else a comma.
 fn separator(text: &str, start: usize) -> u8 {
     let separates = |separator: u8| cells(text, start, separator).nth(1).is_some();
     [b';', b'\t'].into_iter().find(|separator| separates(*separator)).unwrap_or(b',')
 }
 
-/// The name and the unit of a label: `u [N*m]`, or `u (N*m)` where the parentheses hold a unit.
+/// Splits a label into name and unit: `u [N*m]`, or `u (N*m)` if the parentheses contain a unit.
 pub(super) fn label(text: &str) -> Option<(&str, &str)> {
     let text = text.trim();
     let within = |open: char, close: char| {
         let (name, unit) = text.strip_suffix(close)?.rsplit_once(open)?;
         Some((name.trim(), unit.trim()))
     };
-    // `trial (2)` and `motor (left)` have none.
+    // `trial (2)` and `motor (left)` have no unit.
     let is_unit = |text: &str| text.contains(|c: char| c.is_alphabetic() || c == '%') && Unit::parse(text).is_ok();
     within('[', ']').or_else(|| within('(', ')').filter(|(name, unit)| !name.is_empty() && is_unit(unit)))
 }
 
-/// A label, as [`label`] reads it.
+/// Formats a label that [`label`] can read.
 pub(super) fn labelled(name: &str, unit: &str) -> String {
     format!("{name} ({unit})")
 }
 
-/// A cell of the header as name and unit; a column without a name is called by its number.
+/// Splits a cell of the header into name and unit; an unnamed column gets its number as name.
 fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
     let cell = cell.trim();
     let unquoted = cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"'));
@@ -152,7 +153,7 @@ fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
     (name, (!unit.is_empty()).then(|| unit.to_owned()))
 }
 
-/// Columns such as `motor (V)` and `motor (A)`, which only their units tell apart, are called by the whole label.
+/// Uses the whole label as name for columns that differ only in their units, such as `motor (V)` and `motor (A)`.
 fn keep_labels_that_differ(names: &mut [(String, Option<String>)]) {
     let differs = |(name, unit): &(String, Option<String>)| {
         let count = |unit: Option<&String>| {
@@ -177,8 +178,8 @@ fn refuse_duplicates(
     let mut seen = HashMap::new();
     for (k, (name, _)) in names.iter().enumerate() {
         if let Some(first) = seen.insert(name, k) {
-            return Err(Diagnostic::new(format!("two columns are called `{name}`: {} and {}", first + 1, k + 1))
-                .with_label("the second one")
+            return Err(Diagnostic::new(format!("columns {} and {} have the same name `{name}`", first + 1, k + 1))
+                .with_label("second column")
                 .with_help("rename one of them in the header")
                 .at(source, spans[k].clone()));
         }
@@ -186,11 +187,11 @@ fn refuse_duplicates(
     Ok(())
 }
 
-/// A column while it is read.
+/// Column during reading.
 #[derive(Clone, Default)]
 struct Reading {
     values: Vec<f64>,
-    /// First row with what is not a finite number.
+    /// First row with a cell that is not a finite number.
     bad: Option<usize>,
     has_numbers: bool,
 }
@@ -205,7 +206,7 @@ impl Reading {
         }
     }
 
-    /// The bad row of a column of numbers; a column of nothing but text is no mistake.
+    /// Returns the first bad row of a column that contains numbers; a column of text only has none.
     fn mistake(&self) -> Option<usize> {
         self.bad.filter(|_| self.has_numbers)
     }
@@ -222,20 +223,20 @@ fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Resu
     let mut record = ByteRecord::new();
     let mut marks = DecimalMarks::of(header.separator);
     while reader.read_byte_record(&mut record).expect("reading from memory does not fail") {
-        let start = record.position().expect("a record that was read has a position").byte() as usize + header.body;
-        // N.B.: the position may lie before the line feeds that the reader skipped.
+        let start = record.position().expect("the reader sets the position").byte() as usize + header.body;
+        // N.B.: the position may be before line feeds that the reader skipped.
         let start = start + text[start..].len() - text[start..].trim_start_matches(['\n', '\r']).len();
         refuse_long_quotes(source, start, header.separator)?;
         if record.len() == 1 && columns.len() > 1 && record[0].trim_ascii().is_empty() {
             continue;
         }
-        // A separator at the end of a row begins no cell.
+        // A separator at the end of a row starts no cell.
         let ends_with_separator = record.len() == columns.len() + 1 && record[columns.len()].trim_ascii().is_empty();
         if record.len() != columns.len() && !ends_with_separator {
             return Err(uneven(source, start, record.len(), header));
         }
         if columns.len() == 1 {
-            // The reader skips blank lines, but in the only column they are empty cells.
+            // The reader skips blank lines, but in a single column they are empty cells.
             let last = layout.rows.last().copied().unwrap_or(header.body);
             for blank in blank_lines(text, last..start) {
                 layout.rows.push(blank);
@@ -256,40 +257,40 @@ fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Resu
     Ok(columns)
 }
 
-/// Where the blank lines start between a row and the next one.
+/// Returns the starts of the blank lines within a range of bytes.
 fn blank_lines(text: &str, between: Range<usize>) -> impl Iterator<Item = usize> {
     let ends = text[between.clone()].match_indices('\n').map(move |(end, _)| between.start + end + 1);
     let mut ends = ends.peekable();
     std::iter::from_fn(move || ends.next().filter(|_| ends.peek().is_some()))
 }
 
-/// Refuses a cell whose quotation mark never closes, or closes behind further rows: what it swallows would be lost without a
-/// word. A text of several lines is none of them.
+/// Refuses a cell whose quotation mark is unclosed, or closed after further rows, because the enclosed rows would be
+/// lost silently. Multi-line text is accepted.
 fn refuse_long_quotes(source: &Arc<Source>, start: usize, separator: u8) -> Result<(), Diagnostic> {
     let text = &source.text;
     let row: Vec<Range<usize>> = cells(text, start, separator).collect();
     let Some(cell) = row.iter().find(|cell| text[(*cell).clone()].contains(['\n', '\r'])) else { return Ok(()) };
     let inside = &text[cell.clone()];
     let quotes = inside.bytes().filter(|&byte| byte == b'"').count();
-    // Between two stray marks in one column stand as many separators as a row has.
+    // Two stray marks in one column enclose as many separators as a row has.
     let swallows_a_row = inside.bytes().filter(|&byte| byte == separator).count() + 1 >= row.len();
     let fact = if quotes % 2 == 1 {
-        "the quotation mark that opens here does not close"
+        "unclosed quotation mark"
     } else if swallows_a_row {
-        "the quotation mark that opens here closes behind another row"
+        "quotation mark closed in another row"
     } else {
         return Ok(());
     };
     let line = inside.find(['\n', '\r']).expect("the cell has a line break");
     Err(Diagnostic::new(fact)
-        .with_label("opens here")
-        .with_help("remove the quotation mark, or close it on its line")
+        .with_label("opened here")
+        .with_help("remove the quotation mark, or close it in the same line")
         .at(source, cell.start..cell.start + line))
 }
 
-/// The decimal marks of a file whose cells no comma separates: `1,234` beside `1.5` may be a thousand or one and a bit.
+/// Decimal marks of a file whose cells are not separated by commas, where `1,234` and `1.5` together are ambiguous.
 struct DecimalMarks {
-    /// Whether a comma may stand in a number.
+    /// True if numbers may contain a comma.
     with_commas: bool,
     point: bool,
     comma: bool,
@@ -300,7 +301,7 @@ impl DecimalMarks {
         Self { with_commas: separator != b',', point: false, comma: false }
     }
 
-    /// Refuses a number with another decimal mark than those before it.
+    /// Refuses a number whose decimal mark differs from that of earlier numbers.
     fn refuse_both(
         &mut self,
         source: &Arc<Source>,
@@ -315,13 +316,13 @@ impl DecimalMarks {
         if !(self.point && self.comma) {
             return Ok(());
         }
-        Err(Diagnostic::new("a decimal point and a decimal comma stand in one file")
-            .with_help("write all numbers with the same mark, and without marks between thousands")
+        Err(Diagnostic::new("decimal points and decimal commas are mixed")
+            .with_help("use one decimal mark, and no thousands separators")
             .at(source, span().unwrap_or(0..0)))
     }
 }
 
-/// The number in a cell, NaN for a gap, none for text.
+/// Returns the number in a cell, NaN for a gap, or `None` for text.
 fn number(cell: &[u8], separator: u8) -> Option<f64> {
     let cell = str::from_utf8(cell.trim_ascii()).ok()?;
     match cell {
@@ -331,7 +332,7 @@ fn number(cell: &[u8], separator: u8) -> Option<f64> {
     }
 }
 
-/// The cells of the row that starts at `start`, with their quotes.
+/// Returns the cells of the row that starts at `start`, with their quotes.
 fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<usize>> {
     let bytes = text.as_bytes();
     let mut next = Some(start);
@@ -351,7 +352,7 @@ fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<
     })
 }
 
-/// Where in a cell we are: a quote opens the cell at its first byte only, and is doubled to stand inside.
+/// Parser state within a cell: a quote opens the cell at its first byte only, and is doubled inside.
 #[derive(Clone, Copy, PartialEq)]
 enum Quotes {
     Before,
@@ -384,8 +385,8 @@ fn uneven(source: &Arc<Source>, start: usize, count: usize, header: &Header) -> 
     let span = start..cells(&source.text, start, header.separator).last().map_or(start, |cell| cell.end);
     let columns = header.names.len();
     let help = match header.separator {
-        b',' if count > columns => "give every row as many cells; numbers with a decimal comma need `;` between cells",
-        _ => "give every row as many cells, an empty one for a gap",
+        b',' if count > columns => "write the same number of cells in every row; decimal commas need `;` as separator",
+        _ => "write the same number of cells in every row, an empty one for a gap",
     };
     Diagnostic::new(format!("the row has {}, the first line has {columns}", plural(count)))
         .with_label(plural(count))

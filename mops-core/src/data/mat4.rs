@@ -1,12 +1,12 @@
-//! Reads MATLAB level 4: matrices one after the other, each with a header of five 32-bit integers.
+//! MATLAB level 4 reader: consecutive matrices, each with a header of five 32-bit integers.
 
 use super::matlab::{Contents, Cursor, Kind, cut_off};
 use crate::diagnostic::Diagnostic;
 
-/// The header: `type = 1000 M + 100 O + 10 P + T` (M: byte order, O: 0, P: kind of number, T: kind of matrix), rows,
-/// columns, whether there is an imaginary part, length of the name with its final zero.
+/// Matrix header: type, rows, columns, imaginary flag, length of the name with its final zero.
 ///
-/// Source: MathWorks, MAT-File Format (2015), chapter 2, "Level 4 MAT-Files".
+/// The type is `1000 M + 100 O + 10 P + T` (M: byte order, O: 0, P: number format, T: matrix kind). Source: MathWorks,
+/// MAT-File Format (2015), chapter 2, "Level 4 MAT-Files".
 struct Header {
     kind: Kind,
     matrix: u32,
@@ -20,9 +20,9 @@ impl Header {
     const TEXT: u32 = 1;
     const SPARSE: u32 = 2;
 
-    /// The header at `cursor`, whose byte order is set by it; none if there is none.
+    /// Reads the header at `cursor` and sets the cursor's byte order; `None` if there is no header.
     fn read(cursor: &mut Cursor<'_>) -> Option<Self> {
-        // The type is below 5000 in one of the two byte orders only, and M says which.
+        // The type is below 5000 in exactly one of the two byte orders, which M states.
         cursor.big_endian = u32::from_le_bytes(*cursor.rest.first_chunk()?) >= 5000;
         let code = cursor.u32()?;
         let [rows, columns, imaginary, name_length] = [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
@@ -42,22 +42,22 @@ impl Header {
         })
     }
 
-    /// Bytes of the numbers after the name.
+    /// Returns the number of bytes of the numbers after the name.
     fn size(&self) -> Option<usize> {
         let parts = if self.complex { 2 } else { 1 };
         self.rows.checked_mul(self.columns)?.checked_mul(self.kind.size())?.checked_mul(parts)
     }
 }
 
-/// Whether the file starts as one of level 4 does. Text never does: two of its first four bytes would be zero.
+/// Returns true if the file starts like a level 4 file. Text never does: two of its first four bytes would be zero.
 pub(super) fn recognises(bytes: &[u8]) -> bool {
     Header::read(&mut Cursor { rest: bytes, big_endian: false }).is_some()
 }
 
-/// Reads every real matrix of numbers.
+/// Reads every real numeric matrix.
 ///
 /// # Errors
-/// When the file ends too early or holds what is not a header where a header must be.
+/// If the file ends too early, or lacks a header where one is required.
 pub(super) fn read(bytes: &[u8]) -> Result<Contents, Diagnostic> {
     let mut contents = Contents::default();
     let mut cursor = Cursor { rest: bytes, big_endian: false };
@@ -75,7 +75,7 @@ fn read_matrix(cursor: &mut Cursor<'_>, variable: usize, contents: &mut Contents
         return Err(cut_off(variable));
     }
     let header = Header::read(cursor).ok_or_else(|| {
-        Diagnostic::new(format!("variable {variable} of the file has no MATLAB level 4 header: the file is damaged"))
+        Diagnostic::new(format!("the file is damaged: variable {variable} has no MATLAB level 4 header"))
             .with_help("copy it again, or save it again")
     })?;
     let name = cursor.take(header.name_length).ok_or_else(|| cut_off(variable))?;
@@ -87,7 +87,7 @@ fn read_matrix(cursor: &mut Cursor<'_>, variable: usize, contents: &mut Contents
         Header::SPARSE => contents.skip(&name, "a sparse matrix"),
         0 if header.complex => contents.skip(&name, "complex numbers"),
         0 => contents.push(name, header.rows, header.columns, header.kind.numbers(numbers, cursor.big_endian)),
-        other => contents.skip(&name, &format!("a matrix of the unknown kind {other}")),
+        other => contents.skip(&name, &format!("a matrix of unknown kind {other}")),
     }
     Ok(())
 }

@@ -1,10 +1,10 @@
-//! Reads MATLAB level 5: elements with a tag of type and size, plain or compressed, arrays inside cell arrays.
+//! MATLAB level 5 reader: elements with a tag of type and size, plain or compressed, and arrays in cell arrays.
 
 use super::Variable;
 use super::matlab::{Contents, Cursor, Kind, cut_off};
 use crate::diagnostic::Diagnostic;
 
-// Types of elements and classes of arrays. Source: MathWorks, MAT-File Format (2015), chapter 1, tables 1-1 and 1-3.
+// Element types and array classes. Source: MathWorks, MAT-File Format (2015), chapter 1, tables 1-1 and 1-3.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 const CELL: u32 = 1;
@@ -15,16 +15,18 @@ const COMPLEX: u32 = 0x0800;
 
 /// Length of text, version and byte order before the first element, in bytes.
 const HEADER: usize = 128;
-/// Bytes that a small file may grow to when it is decompressed and its numbers become `f64`.
+/// Largest number of bytes for decompressed data and numbers of a small file.
 const GROWTH: usize = 1 << 30;
-/// MATLAB's own names have 63 characters at most; a cell repeats the name once per element.
+/// Longest name of a variable, in bytes. MATLAB names have at most 63 characters; a cell repeats the name once per
+/// element.
 const LONGEST_NAME: usize = 255;
-/// Cells inside cells, a bound for the recursion.
+/// Largest nesting depth of cells, a bound for the recursion.
 const DEEPEST: usize = 32;
 
 const DAMAGED: &str = "damaged";
 
-/// Whether the file starts as one of level 5 does: version 1 and `MI` in the writer's byte order end the header.
+/// Returns true if the file starts like a level 5 file: the header ends with version 1 and `MI` in the writer's byte
+/// order.
 pub(super) fn recognises(bytes: &[u8]) -> bool {
     match bytes.get(124..HEADER) {
         Some(end) => end == b"\x00\x01IM" || end == b"\x01\x00MI",
@@ -32,15 +34,15 @@ pub(super) fn recognises(bytes: &[u8]) -> bool {
     }
 }
 
-/// Reads every real matrix of numbers, also those in cell arrays. What cannot be read does not spoil the others.
+/// Reads every real numeric matrix, including those in cell arrays. Unreadable variables are skipped.
 ///
 /// # Errors
-/// When the file ends too early.
+/// If the file ends too early.
 pub(super) fn read(bytes: &[u8]) -> Result<Contents, Diagnostic> {
     read_within(bytes, GROWTH.max(bytes.len().saturating_mul(8)))
 }
 
-/// [`read`] with the bytes that may be allocated for what is inflated and for numbers.
+/// Reads like [`read`], with a budget in bytes for decompressed data and numbers.
 pub(super) fn read_within(bytes: &[u8], budget: usize) -> Result<Contents, Diagnostic> {
     let rest = bytes.get(HEADER..).ok_or_else(|| cut_off(1))?;
     let mut cursor = Cursor { rest, big_endian: bytes[HEADER - 2..].starts_with(b"MI") };
@@ -65,7 +67,7 @@ impl Reader {
         let done = match tag {
             MATRIX => self.array(data, place, 0),
             COMPRESSED => self.compressed(data, place),
-            other => Err(format!("an element of the unknown type {other}")),
+            other => Err(format!("an element of unknown type {other}")),
         };
         done.unwrap_or_else(|reason| self.contents.skip(place, &reason));
     }
@@ -79,14 +81,14 @@ impl Reader {
         }
     }
 
-    /// Adds the array; `place` is its name when it is in a cell (`depth > 0`), else what to call it if it has none.
+    /// Adds an array. `place` is its name in a cell (`depth > 0`), otherwise the name for an unnamed array.
     fn array(&mut self, data: Cursor<'_>, place: &str, depth: usize) -> Result<(), String> {
         if data.rest.is_empty() {
             return Err("empty".to_owned());
         }
         let array = Array::read(data).ok_or(DAMAGED)?;
         if depth == 0 && array.name.is_empty() {
-            // What MATLAB keeps for its own objects has no name.
+            // Internal arrays of MATLAB objects have no name.
             return Ok(());
         }
         let name = if depth == 0 { &array.name } else { place };
@@ -108,7 +110,7 @@ impl Reader {
         };
         let mut data = array.data;
         let (tag, numbers) = element(&mut data).ok_or(DAMAGED)?;
-        let kind = kind_of(tag).ok_or_else(|| format!("numbers of the unknown type {tag}"))?;
+        let kind = kind_of(tag).ok_or_else(|| format!("numbers of unknown type {tag}"))?;
         let count = rows.checked_mul(columns).ok_or(DAMAGED)?;
         if count.checked_mul(kind.size()) != Some(numbers.len()) {
             return Err(DAMAGED.to_owned());
@@ -131,7 +133,7 @@ impl Reader {
             let Some((MATRIX, cell)) = element(&mut data) else {
                 return Err(format!("damaged from element {k} on"));
             };
-            // A few inflated bytes are a cell, but each costs a name and time.
+            // A cell takes few compressed bytes, but each costs a name and time.
             self.charge(size_of::<Variable>())?;
             let name = format!("{name}{{{k}}}");
             let done = self.array(Cursor { rest: cell, ..data }, &name, depth + 1);
@@ -141,12 +143,12 @@ impl Reader {
     }
 
     fn charge(&mut self, bytes: usize) -> Result<(), String> {
-        self.budget = self.budget.checked_sub(bytes).ok_or("too large when it is read")?;
+        self.budget = self.budget.checked_sub(bytes).ok_or("too large in memory")?;
         Ok(())
     }
 }
 
-/// An array up to where its data begin.
+/// Array up to the start of its data.
 struct Array<'a> {
     class: u32,
     complex: bool,
@@ -160,7 +162,7 @@ impl<'a> Array<'a> {
         let (_, flags) = element(&mut data)?;
         let flags = Cursor { rest: flags, ..data }.u32()?;
         let class = flags & 0xff;
-        // N.B.: an opaque object has no sizes, its name comes at once.
+        // N.B.: an opaque object has no sizes; its name follows directly.
         let sizes = if class == OPAQUE { Vec::new() } else { sizes(&mut data)? };
         let (_, name) = element(&mut data)?;
         if name.len() > LONGEST_NAME {
@@ -177,7 +179,7 @@ fn sizes(data: &mut Cursor<'_>) -> Option<Vec<usize>> {
     std::iter::from_fn(|| sizes.u32()).map(|size| usize::try_from(size).ok()).collect()
 }
 
-/// Type and data of the next element; none if it is longer than what is left.
+/// Returns type and data of the next element, or `None` if it exceeds the remaining bytes.
 fn element<'a>(cursor: &mut Cursor<'a>) -> Option<(u32, &'a [u8])> {
     let word = cursor.u32()?;
     if word >> 16 != 0 {
@@ -188,7 +190,7 @@ fn element<'a>(cursor: &mut Cursor<'a>) -> Option<(u32, &'a [u8])> {
     let size = usize::try_from(cursor.u32()?).ok()?;
     let data = cursor.take(size)?;
     if word != COMPRESSED {
-        // N.B.: the padding of the last element is missing in some files.
+        // N.B.: some files omit the padding of the last element.
         let padding = (8 - size % 8) % 8;
         cursor.take(padding.min(cursor.rest.len()));
     }
@@ -219,11 +221,11 @@ fn what_is(class: u32) -> String {
         5 => "a sparse matrix".to_owned(),
         16 => "a function".to_owned(),
         OPAQUE => "an object (table, string, datetime or the like)".to_owned(),
-        other => format!("an array of the unknown class {other}"),
+        other => format!("an array of unknown class {other}"),
     }
 }
 
-/// The decompressed bytes, at most one more than `limit`; or why there are none.
+/// Decompresses at most `limit + 1` bytes.
 #[cfg(feature = "compressed-mat")]
 fn inflated(compressed: &[u8], limit: usize) -> Result<Vec<u8>, String> {
     use std::io::Read;
@@ -232,7 +234,7 @@ fn inflated(compressed: &[u8], limit: usize) -> Result<Vec<u8>, String> {
     let mut decoder = flate2::read::ZlibDecoder::new(compressed).take((limit as u64).saturating_add(1));
     match decoder.read_to_end(&mut inflated) {
         Ok(_) => Ok(inflated),
-        Err(error) => Err(format!("damaged, it cannot be decompressed ({error})")),
+        Err(error) => Err(format!("damaged: decompression failed ({error})")),
     }
 }
 

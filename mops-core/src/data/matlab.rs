@@ -1,9 +1,10 @@
-//! What the readers of both MATLAB levels share: bytes with an order, kinds of numbers, the variables found.
+//! Common parts of the readers of both MATLAB levels: byte order, number formats, variables.
 
 use super::Variable;
 use crate::diagnostic::Diagnostic;
 
-/// The HDF5 signature stands at the start or after the 512 bytes that MATLAB puts before it; those end with version 2.
+/// Returns true for a level 7.3 (HDF5) file. The HDF5 signature is at the start, or after the 512 bytes that MATLAB
+/// adds, which end with version 2.
 pub(super) fn is_level_7_3(bytes: &[u8]) -> bool {
     let signature = b"\x89HDF\r\n\x1a\n";
     let text = b"MATLAB 7.3 MAT-file";
@@ -13,7 +14,7 @@ pub(super) fn is_level_7_3(bytes: &[u8]) -> bool {
         || bytes.get(124..128).is_some_and(|end| end == b"\x00\x02IM" || end == b"\x02\x00MI")
 }
 
-/// What is left to read, and the order of the bytes in it.
+/// Remaining bytes and their byte order.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cursor<'a> {
     pub rest: &'a [u8],
@@ -21,7 +22,7 @@ pub(super) struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// The next `count` bytes, if there are as many.
+    /// Returns the next `count` bytes, or `None` if fewer remain.
     pub fn take(&mut self, count: usize) -> Option<&'a [u8]> {
         let (head, tail) = self.rest.split_at_checked(count)?;
         self.rest = tail;
@@ -29,12 +30,12 @@ impl<'a> Cursor<'a> {
     }
 
     pub fn u32(&mut self) -> Option<u32> {
-        let bytes = self.take(4)?.try_into().expect("four bytes were taken");
+        let bytes = self.take(4)?.try_into().expect("`take` returns four bytes");
         Some(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
     }
 }
 
-/// How a number is stored.
+/// Storage format of numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Kind {
     I8,
@@ -50,7 +51,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Bytes of one number.
+    /// Returns the number of bytes of one number.
     pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -87,7 +88,7 @@ fn decode<const N: usize>(bytes: &[u8], big_endian: bool, little: impl Fn([u8; N
     numbers.iter().copied().map(read).collect()
 }
 
-/// What was found in a file.
+/// Contents of a file.
 #[derive(Debug, Default)]
 pub(super) struct Contents {
     variables: Vec<Variable>,
@@ -96,10 +97,10 @@ pub(super) struct Contents {
 }
 
 impl Contents {
-    /// More are only counted: a small file can hold very many empty cells.
+    /// Largest number of skipped variables listed by name, since a small file can contain very many empty cells.
     const SKIPPED_BY_NAME: usize = 1000;
 
-    /// Adds a matrix, samples down.
+    /// Adds a matrix; each row is a sample.
     pub fn push(&mut self, name: String, rows: usize, columns: usize, values: Vec<f64>) {
         if values.is_empty() {
             self.skip(&name, "empty");
@@ -119,7 +120,7 @@ impl Contents {
         }
     }
 
-    /// The variables, and what was skipped with its reason.
+    /// Returns the variables, and the skipped ones with reasons.
     pub fn finish(mut self) -> (Vec<Variable>, Vec<String>) {
         if self.skipped_unnamed > 0 {
             self.skipped.push(format!("and {} more", self.skipped_unnamed));
@@ -128,7 +129,7 @@ impl Contents {
     }
 }
 
-/// The file is shorter than it says, or what it says is no size at all.
+/// Returns the error for a file that is shorter than its sizes state, or for an invalid size.
 pub(super) fn cut_off(variable: usize) -> Diagnostic {
     Diagnostic::new(format!("the file ends inside variable {variable}: it is cut off or damaged"))
         .with_help("copy it again, or save it again")

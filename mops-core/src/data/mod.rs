@@ -1,4 +1,4 @@
-//! Measured data: reads a file into named columns of numbers.
+//! Measured data: readers that convert a file to named columns of numbers.
 
 mod csv;
 mod mat4;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::unit::Unit;
 
-/// What kind of file it is.
+/// File format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Text with a comma, a semicolon or a tab between cells.
@@ -39,57 +39,57 @@ impl fmt::Display for Format {
     }
 }
 
-/// A numeric variable: a CSV column, or a MATLAB matrix.
+/// Numeric variable: a CSV column, or a MATLAB matrix.
 ///
-/// A sample is a row: a MATLAB matrix that is wider than high (1 x n, 2 x n) is turned when it is read. Integers beyond
-/// 2^53 are rounded to the nearest `f64`.
+/// Each row is a sample; a MATLAB matrix with more columns than rows (1 x n, 2 x n) is transposed. Integers beyond 2^53
+/// are rounded to the nearest `f64`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variable {
     /// Name in the file, without the unit; `Y{2}` is the second element of the cell array `Y`.
     pub name: String,
-    /// Unit as the header of a CSV file writes it in brackets.
+    /// Unit as given in the header of a CSV file.
     pub unit: Option<String>,
     /// Number of samples.
     pub rows: usize,
     /// Number of signals; 1 for CSV.
     pub columns: usize,
-    /// The numbers column by column, `rows * columns` of them; NaN is a gap.
+    /// Values column by column, `rows * columns` of them; NaN is a gap.
     pub values: Vec<f64>,
 }
 
-/// A data file, read whole.
+/// Data file in memory.
 #[derive(Debug, Clone)]
 pub struct DataFile {
-    /// Its path and, for CSV, its text without the byte order mark.
+    /// Path and, for CSV, the text without the byte order mark.
     pub source: Arc<Source>,
-    /// What kind of file it is, found out from its content.
+    /// Format, detected from the content.
     pub format: Format,
-    /// What is numeric, in the order of the file.
+    /// Numeric variables, in the order of the file.
     pub variables: Vec<Variable>,
-    /// What is not, as `name: reason`.
+    /// Other variables, as `name: reason`.
     pub skipped: Vec<String>,
     layout: csv::Layout,
-    /// Variables by their names.
+    /// Index of each variable by name.
     index: HashMap<String, usize>,
 }
 
-/// One column of numbers.
+/// Column of numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column<'a> {
-    /// The name it was asked for by.
+    /// Name used in the request.
     pub name: String,
-    /// Unit as the file gives it.
+    /// Unit as given in the file.
     pub unit: Option<&'a str>,
     /// One value per sample, finite or NaN; NaN is a gap.
     pub values: &'a [f64],
 }
 
 impl DataFile {
-    /// Reads the file at `path`; its format is told by its content, not by its extension.
+    /// Reads the file at `path`; the format is detected from the content, not from the extension.
     ///
     /// # Errors
-    /// When the file cannot be read, is of another format, is damaged, or holds no numbers; for CSV also when a cell in
-    /// a column of numbers is neither a finite number nor a gap, when rows differ in length, or when names repeat.
+    /// If the file cannot be read, has another format, is damaged, or contains no numbers. For CSV also if rows differ
+    /// in length, if names repeat, or if a cell in a numeric column is neither a finite number nor a gap.
     pub fn read(path: &Path) -> Result<Self, Diagnostic> {
         let name = path.display().to_string();
         match read_regular(path) {
@@ -97,10 +97,10 @@ impl DataFile {
             Err(error) => {
                 let source = Arc::new(Source { name, text: String::new() });
                 let (fact, way_out) = match error.kind() {
-                    ErrorKind::NotFound => ("there is no such file".to_owned(), "check the path"),
-                    ErrorKind::IsADirectory => ("this is a folder".to_owned(), "name a file in it"),
+                    ErrorKind::NotFound => ("the file does not exist".to_owned(), "check the path"),
+                    ErrorKind::IsADirectory => ("the path is a folder".to_owned(), "name a file in it"),
                     ErrorKind::InvalidInput => {
-                        (error.to_string(), "name a file; what a pipe gives can be saved in one")
+                        (error.to_string(), "name a file; save the output of a pipe to a file first")
                     }
                     _ => (format!("the file cannot be read: {error}"), "check its permissions"),
                 };
@@ -109,10 +109,10 @@ impl DataFile {
         }
     }
 
-    /// Reads the content of a file; `name` is what messages call it.
+    /// Parses the content of a file; messages use `name` for it.
     ///
     /// # Errors
-    /// As [`Self::read`], but for the file itself.
+    /// See [`Self::read`], except for errors of file access.
     pub fn parse(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
         let (format, read): (_, fn(&[u8]) -> _) = if mat5::recognises(&bytes) {
             (Format::Mat5, mat5::read)
@@ -127,8 +127,8 @@ impl DataFile {
         if variables.is_empty() {
             let found = skipped.iter().take(5).map(String::as_str).collect::<Vec<_>>().join(", ");
             let found = if found.is_empty() { "nothing".to_owned() } else { found };
-            return Err(Diagnostic::new(format!("the {format} file holds no matrix of numbers (found: {found})"))
-                .with_help("save real, full matrices as variables of their own")
+            return Err(Diagnostic::new(format!("the {format} file contains no numeric matrix (found: {found})"))
+                .with_help("save real, full matrices as separate variables")
                 .at(&source, 0..0));
         }
         let index = index_of(&variables);
@@ -139,7 +139,7 @@ impl DataFile {
         let source = text_source(name, bytes)?;
         let read = csv::read(&source);
         if read.is_err() && name.to_lowercase().ends_with(".mat") {
-            return Err(Diagnostic::new("the file is not MATLAB, in spite of its name")
+            return Err(Diagnostic::new("the file is not in MATLAB format, despite its extension")
                 .with_help("copy it again, or save it again with `save -v7`")
                 .at(&source, 0..0));
         }
@@ -148,8 +148,8 @@ impl DataFile {
         Ok(Self { source, format: Format::Csv, variables, skipped, layout, index })
     }
 
-    /// The column that is the time where nobody says which: the one called `t`, or `time` in any case; or `T` if its unit is one
-    /// of time, as a temperature has this name too.
+    /// Returns the default time column: `t`, or `time` in any case, or `T` with a time unit (without one, `T` may be a
+    /// temperature).
     pub fn time_column(&self) -> Option<String> {
         let names = self.column_names();
         let is_time = |name: &&String| name.as_str() == "t" || name.eq_ignore_ascii_case("time");
@@ -160,24 +160,26 @@ impl DataFile {
         names.iter().find(is_time).or_else(|| names.iter().find(in_seconds)).cloned()
     }
 
-    /// The column called `name`: a vector by its name, column k (from 1) of a matrix as `Data:3`, an element of a cell
-    /// array as `Y{2}` and its column as `Y{2}:1`.
+    /// Returns the column called `name`.
+    ///
+    /// A vector has its own name, column k (from 1) of a matrix is `Data:3`. An element of a cell array is `Y{2}`, and
+    /// its column `Y{2}:1`.
     ///
     /// # Errors
-    /// When there is no such column, or when it holds an infinite value. The message names the file and has no place,
-    /// so that whoever wrote the name can point at it.
+    /// If there is no such column, or if it contains an infinite value. The message names the file but has no location,
+    /// so that the caller can point to the name.
     pub fn column(&self, name: &str) -> Result<Column<'_>, Diagnostic> {
         let (variable, k) = self.find(name).ok_or_else(|| self.unknown(name))?;
         let Variable { unit, rows, values, .. } = &self.variables[variable];
         let values = &values[k * rows..(k + 1) * rows];
         if let Some(row) = values.iter().position(|value| value.is_infinite()) {
             let fact = format!("column `{name}` of {} is infinite in row {}", self.source.name, row + 1);
-            return Err(Diagnostic::new(fact).with_help("make it NaN, which is a gap"));
+            return Err(Diagnostic::new(fact).with_help("write NaN for a gap"));
         }
         Ok(Column { name: name.to_owned(), unit: unit.as_deref(), values })
     }
 
-    /// Every name that [`Self::column`] accepts, in the order of the file.
+    /// Returns every name that [`Self::column`] accepts, in the order of the file.
     pub fn column_names(&self) -> Vec<String> {
         let names = |Variable { name, columns, .. }: &Variable| match columns {
             1 => vec![name.clone()],
@@ -186,19 +188,19 @@ impl DataFile {
         self.variables.iter().flat_map(names).collect()
     }
 
-    /// Bytes of a cell in the text of a CSV file, `row` from 0 as in [`Column::values`]; `0..0` for MATLAB files and
-    /// for what is not there.
+    /// Returns the byte range of a cell in the text of a CSV file, `row` from 0 as in [`Column::values`]. Returns
+    /// `0..0` for MATLAB files and for missing cells.
     pub fn span_of(&self, column: &str, row: usize) -> Range<usize> {
         self.find(column).and_then(|(variable, _)| self.layout.span(&self.source.text, variable, row)).unwrap_or(0..0)
     }
 
-    /// Index of the variable and of the column in it.
+    /// Returns the indices of the variable and of its column.
     fn find(&self, name: &str) -> Option<(usize, usize)> {
         let index_of = |name: &str| self.index.get(name).copied();
         if let Some(variable) = index_of(name).filter(|&i| self.variables[i].columns == 1) {
             return Some((variable, 0));
         }
-        // The label of a column, as it stands in the header: `t [ms]`.
+        // Label of a column as in the header: `t [ms]`.
         let labelled = csv::label(name).and_then(|(name, unit)| {
             let has_unit =
                 |&i: &usize| self.variables[i].columns == 1 && self.variables[i].unit.as_deref() == Some(unit);
@@ -230,22 +232,22 @@ impl DataFile {
     }
 }
 
-/// The bytes of a regular file.
+/// Returns the bytes of a regular file.
 ///
 /// # Errors
-/// The file cannot be read. A device or a pipe, which may have no end or nobody at its other end, is `InvalidInput`.
+/// If the file cannot be read. A device or a pipe, which may be endless or have no writer, is `InvalidInput`.
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     let kind = fs::metadata(path)?;
     if kind.is_dir() {
         return Err(ErrorKind::IsADirectory.into());
     }
     if !kind.is_file() {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "this is a device or a pipe, not a file"));
+        return Err(io::Error::new(ErrorKind::InvalidInput, "the path is a device or a pipe, not a file"));
     }
     fs::read(path)
 }
 
-/// Variables by their names; of several with one name the first.
+/// Returns the indices of variables by name; the first of several with the same name.
 fn index_of(variables: &[Variable]) -> HashMap<String, usize> {
     let mut index = HashMap::with_capacity(variables.len());
     for (i, variable) in variables.iter().enumerate() {
@@ -254,7 +256,7 @@ fn index_of(variables: &[Variable]) -> HashMap<String, usize> {
     index
 }
 
-/// MATLAB, too, lets the last of several variables with one name win.
+/// Keeps the last of several variables with the same name, as MATLAB does.
 fn keep_last_of_each_name(variables: &mut Vec<Variable>) {
     variables.reverse();
     let mut seen = HashSet::new();
@@ -262,11 +264,11 @@ fn keep_last_of_each_name(variables: &mut Vec<Variable>) {
     variables.reverse();
 }
 
-/// The file as text, or why it is none.
+/// Returns the file as text, or an error if it is not text.
 fn text_source(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
     let whole = Arc::new(Source { name: name.to_owned(), text: String::new() });
     if matlab::is_level_7_3(&bytes) {
-        return Err(Diagnostic::new("the file is MATLAB level 7.3 (HDF5), which is not read")
+        return Err(Diagnostic::new("MATLAB level 7.3 (HDF5) is not supported")
             .with_help("save it in MATLAB with `save -v7`")
             .at(&whole, 0..0));
     }
@@ -279,7 +281,7 @@ fn text_source(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
     if !utf16 && bytes.contains(&0) {
         return Err(binary());
     }
-    // A text in another encoding has letters that are not UTF-8, but no control characters.
+    // Text in another encoding has letters that are not UTF-8, but no control characters.
     let controls = bytes.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
     match Source::from_bytes(name, bytes) {
         Ok(source) => Ok(Arc::new(source)),

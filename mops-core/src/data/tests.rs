@@ -1,4 +1,4 @@
-//! Reads what small independent writers wrote, and what they did not.
+//! Tests of the readers with files from small independent writers, and with damaged files.
 
 use std::io::Write;
 
@@ -13,7 +13,7 @@ fn read(bytes: impl Into<Vec<u8>>) -> DataFile {
     DataFile::parse("data", bytes.into()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The error as the user sees it, and the marked text.
+/// Returns the error as the user sees it, and the marked text.
 fn error(bytes: impl Into<Vec<u8>>) -> (String, String) {
     let error = DataFile::parse("data", bytes.into()).expect_err("the file is wrong");
     let (source, span) = error.place.clone().expect("an error in a file has a place");
@@ -24,7 +24,7 @@ fn values<'a>(file: &'a DataFile, column: &str) -> &'a [f64] {
     file.column(column).unwrap_or_else(|error| panic!("{error}")).values
 }
 
-/// Bit by bit, since NaN is no number.
+/// Asserts equality bit by bit, since NaN is not equal to itself.
 fn assert_same(found: &[f64], expected: &[f64]) {
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(found), bits(expected), "{found:?} is not {expected:?}");
@@ -125,14 +125,12 @@ mod csv {
     }
 
     #[test]
-    fn every_mistake_is_told_with_its_place_and_the_way_out() {
+    fn every_mistake_is_reported_with_its_place_and_the_way_out() {
         let gap = "write a number such as 1.5e-3; a gap is an empty cell, NaN or NA";
-        let cells = "give every row as many cells, an empty one for a gap";
-        let comma = "give every row as many cells; numbers with a decimal comma need `;` between cells";
-        let marks = "a decimal point and a decimal comma stand in one file; write all numbers with the same mark, and without \
-                     marks between thousands";
-        let (open, quote) =
-            ("the quotation mark that opens here", "remove the quotation mark, or close it on its line");
+        let cells = "write the same number of cells in every row, an empty one for a gap";
+        let comma = "write the same number of cells in every row; decimal commas need `;` as separator";
+        let marks = "decimal points and decimal commas are mixed; use one decimal mark, and no thousands separators";
+        let (open, quote) = ("quotation mark", "remove the quotation mark, or close it in the same line");
         let cases = [
             ("", "data: the data file is empty; write a header such as `t[s],u[N*m]` and rows of numbers below it", ""),
             ("t,y\n", "data:1:1: the header has no rows below it; add a row of numbers for each sample", "t,y"),
@@ -142,23 +140,19 @@ mod csv {
             ("t;y\n0;1.234,5\n1;2", &format!("data:2:3: {marks}"), "1.234,5"),
             ("t;y\n0;1.5\n1;1,234\n", &format!("data:3:3: {marks}"), "1,234"),
             ("t\ty\n0,1\t2\n0.2\t3\n", &format!("data:3:1: {marks}"), "0.2"),
-            ("t,y,note\n0,1,\"a\n1,2,b\n2,3,c\n", &format!("data:2:5: {open} does not close; {quote}"), "\"a"),
-            ("t,y,\"note\n0,1,a\n1,2,b\n", &format!("data:1:5: {open} does not close; {quote}"), "\"note"),
-            (
-                "t,n,y\n0,\"a,1\n1,b\",2\n2,c,3\n",
-                &format!("data:2:3: {open} closes behind another row; {quote}"),
-                "\"a,1",
-            ),
+            ("t,y,note\n0,1,\"a\n1,2,b\n2,3,c\n", &format!("data:2:5: unclosed {open}; {quote}"), "\"a"),
+            ("t,y,\"note\n0,1,a\n1,2,b\n", &format!("data:1:5: unclosed {open}; {quote}"), "\"note"),
+            ("t,n,y\n0,\"a,1\n1,b\",2\n2,c,3\n", &format!("data:2:3: {open} closed in another row; {quote}"), "\"a,1"),
             ("t,y\n0,1\n1\n", &format!("data:3:1: the row has 1 cell, the first line has 2; {cells}"), "1"),
             ("t,y\n0,1,5\n", &format!("data:2:1: the row has 3 cells, the first line has 2; {comma}"), "0,1,5"),
             (
                 "t[s],t[s]\n0,1\n",
-                "data:1:6: two columns are called `t`: 1 and 2; rename one of them in the header",
+                "data:1:6: columns 1 and 2 have the same name `t`; rename one of them in the header",
                 "t[s]",
             ),
             (
                 "t y\n0 1\n",
-                "data:1:1: no column of the file holds numbers; separate the cells by commas, semicolons or tabs",
+                "data:1:1: no column of the file contains numbers; separate the cells by commas, semicolons or tabs",
                 "t y",
             ),
         ];
@@ -168,7 +162,7 @@ mod csv {
     }
 
     #[test]
-    fn a_separator_at_the_end_of_a_line_begins_no_column() {
+    fn a_separator_at_the_end_of_a_line_starts_no_column() {
         for text in ["t,y,\n0,1,\n1,2,\n", "t,y\n0,1,\n1,2,\n", "t;y;\n0;1\n", "t,y\n0,1,\n1,2\n"] {
             let text = text.replace("t;y;\n0;1\n", "t;y;\n0;1;\n");
             assert_eq!(read(text.as_str()).column_names(), ["t", "y"], "{text}");
@@ -200,7 +194,7 @@ mod csv {
     }
 
     #[test]
-    fn other_encodings_are_told_with_their_place() {
+    fn other_encodings_are_reported_with_their_place() {
         let (message, marked) = error(b"\xef\xbb\xbft,\xef\xbf\xbd,w[\xb0]\n0,1,2\n");
         assert_eq!(
             (message.as_str(), marked.as_str()),
@@ -215,7 +209,7 @@ mod files {
     use super::*;
 
     #[test]
-    fn file_is_read_whatever_its_extension_says() {
+    fn file_is_read_whatever_its_extension() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         fs::write(&path, level4(false, "time", 0, 2, 1, &le(&[0.0, 1.0]))).unwrap();
@@ -224,9 +218,9 @@ mod files {
     }
 
     #[test]
-    fn missing_file_is_told_by_its_path() {
+    fn missing_file_is_reported_with_its_path() {
         let error = DataFile::read(Path::new("no/such/file.csv")).unwrap_err().to_string();
-        assert_eq!(error, "no/such/file.csv: there is no such file; check the path");
+        assert_eq!(error, "no/such/file.csv: the file does not exist; check the path");
     }
 
     #[test]
@@ -235,7 +229,7 @@ mod files {
         file[..19].copy_from_slice(b"MATLAB 7.3 MAT-file");
         file[124..128].copy_from_slice(b"\x00\x02IM");
         file.extend(b"\x89HDF\r\n\x1a\n");
-        let message = "data: the file is MATLAB level 7.3 (HDF5), which is not read; save it in MATLAB with `save -v7`";
+        let message = "data: MATLAB level 7.3 (HDF5) is not supported; save it in MATLAB with `save -v7`";
         assert_eq!(error(&file[512..]).0, message);
         assert_eq!(error(file).0, message);
     }
@@ -254,7 +248,7 @@ mod files {
         assert_eq!(DataFile::parse("run.mat", b"t,y\n0,1\n".to_vec()).unwrap().format, Format::Csv);
         let error = DataFile::parse("run.mat", b"404: not found".to_vec()).unwrap_err().to_string();
         let way_out = "copy it again, or save it again with `save -v7`";
-        assert_eq!(error, format!("run.mat: the file is not MATLAB, in spite of its name; {way_out}"));
+        assert_eq!(error, format!("run.mat: the file is not in MATLAB format, despite its extension; {way_out}"));
     }
 }
 
@@ -270,7 +264,7 @@ fn word(big_endian: bool, word: u32) -> [u8; 4] {
     if big_endian { word.to_be_bytes() } else { word.to_le_bytes() }
 }
 
-/// A matrix of level 4; `code` is 10 P + T.
+/// Returns a matrix of level 4; `code` is 10 P + T.
 fn level4(big_endian: bool, name: &str, code: u32, rows: u32, columns: u32, numbers: &[u8]) -> Vec<u8> {
     let code = code + if big_endian { 1000 } else { 0 };
     let header = [code, rows, columns, 0, name.len() as u32 + 1].map(|value| word(big_endian, value));
@@ -338,7 +332,10 @@ mod mat4 {
         let largest = i32::MAX as u32;
         assert_eq!(error(level4(false, "y", 0, largest, largest, &[])).0, cut_off(1));
         let (no_header, _) = error([&good[..], &[255; 20]].concat());
-        assert!(no_header.starts_with("data: variable 2 of the file has no MATLAB level 4 header"), "{no_header}");
+        assert!(
+            no_header.starts_with("data: the file is damaged: variable 2 has no MATLAB level 4 header"),
+            "{no_header}"
+        );
     }
 
     #[test]
@@ -364,7 +361,7 @@ mod mat4 {
         assert_eq!(error("Data"), "`Data` of data is a matrix with 2 columns of 2 samples; write `Data:1` to `Data:2`");
         assert_eq!(error("Data:3"), "no column `Data:3` in data; did you mean `Data:1`?");
         assert_eq!(error("Data:0"), "no column `Data:0` in data; did you mean `Data:1`?");
-        assert_eq!(error("w"), "column `w` of data is infinite in row 2; make it NaN, which is a gap");
+        assert_eq!(error("w"), "column `w` of data is infinite in row 2; write NaN for a gap");
     }
 }
 
@@ -386,7 +383,7 @@ fn element(big_endian: bool, kind: u32, data: &[u8]) -> Vec<u8> {
     element
 }
 
-/// An array of a class with flags; `data` are its elements after the name.
+/// Returns an array of a class with flags; `data` are its elements after the name.
 fn array(big_endian: bool, class: u32, sizes: &[u32], name: &str, data: &[u8]) -> Vec<u8> {
     let flags = [word(big_endian, class), word(big_endian, 0)].concat();
     let sizes: Vec<u8> = sizes.iter().flat_map(|size| word(big_endian, *size)).collect();
@@ -444,7 +441,7 @@ mod mat5 {
             (9, DOUBLE, le(&[0.1]), 0.1),
             (12, 14, bytes(&(-1_i64 << 40).to_le_bytes()), -math::powi(2.0, 40)),
             (13, 15, bytes(&(1_u64 << 63).to_le_bytes()), math::powi(2.0, 63)),
-            // MATLAB stores doubles as the smallest integers that hold them; a logical is a flagged uint8.
+            // MATLAB stores doubles as the smallest sufficient integer type; a logical is a flagged uint8.
             (2, DOUBLE, bytes(&[42]), 42.0),
             (2, 0x0200 + 9, bytes(&[1]), 1.0),
         ];
@@ -532,16 +529,16 @@ mod mat5 {
             "complex: complex numbers",
             "function: a function",
             "table: an object (table, string, datetime or the like)",
-            "news: an array of the unknown class 99",
+            "news: an array of unknown class 99",
             "deep: an array with 3 dimensions",
             "short: damaged",
             "vast: damaged",
-            "kind: numbers of the unknown type 8",
+            "kind: numbers of unknown type 8",
             "none: empty",
             "cells: damaged from element 2 on",
-            "variable 15: an element of the unknown type 77",
+            "variable 15: an element of unknown type 77",
             "variable 16: damaged",
-            "variable 17: damaged, it cannot be decompressed (corrupt deflate stream)",
+            "variable 17: damaged: decompression failed (corrupt deflate stream)",
             "variable 18: damaged",
         ];
         assert_eq!(file.skipped, expected);
@@ -565,8 +562,8 @@ mod mat5 {
     fn file_without_numbers_is_refused() {
         let note = array(false, 4, &[1, 1], "note", &[]);
         let found = |found: &str| {
-            let fact = "data: the MATLAB level 5 file holds no matrix of numbers";
-            format!("{fact} (found: {found}); save real, full matrices as variables of their own")
+            let fact = "data: the MATLAB level 5 file contains no numeric matrix";
+            format!("{fact} (found: {found}); save real, full matrices as separate variables")
         };
         assert_eq!(error(level5(false, &[note])).0, found("note: text"));
         assert_eq!(error(level5(false, &[])).0, found("nothing"));
@@ -578,7 +575,7 @@ mod mat5 {
         let reading = |budget| super::super::mat5::read_within(&file, budget).unwrap().finish();
         assert_eq!(reading(20_000).0.len(), 2);
         let (variables, skipped) = reading(10_000);
-        assert_eq!((variables.len(), skipped), (1, vec!["large: too large when it is read".to_owned()]));
+        assert_eq!((variables.len(), skipped), (1, vec!["large: too large in memory".to_owned()]));
     }
 
     #[test]
@@ -590,7 +587,7 @@ mod mat5 {
     }
 }
 
-/// Reads and asks for everything; whatever comes is fine but a panic.
+/// Reads a file and requests everything; any result except a panic is fine.
 fn exercise(bytes: Vec<u8>) {
     match DataFile::parse("data", bytes) {
         Err(error) => assert!(!error.to_string().is_empty()),
@@ -635,7 +632,7 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_cells_are_found_where_they_stand(text in "[\",;\t\n\r a1#\u{b0}]{0,80}") {
+    fn arbitrary_cells_are_found_at_their_positions(text in "[\",;\t\n\r a1#\u{b0}]{0,80}") {
         exercise(text.clone().into_bytes());
         exercise(format!("a,b\n1,1\n{text}").into_bytes());
     }

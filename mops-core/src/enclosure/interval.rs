@@ -4,10 +4,10 @@ use crate::math;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// All numbers from `low` to `high`, both included; the bounds may be infinite.
+/// Closed interval of numbers from `low` to `high`; the bounds may be infinite.
 ///
-/// Every operation encloses the set of its results up to rounding: bounds are not rounded outwards, as the zeros that are
-/// sought with them are located by values, not by bounds.
+/// Every operation encloses the set of its results up to rounding. Bounds are not rounded outwards, because values, not
+/// bounds, locate the zeros.
 ///
 /// Source: R. Moore, R. Kearfott, M. Cloud, Introduction to Interval Analysis (SIAM 2009), chapters 2 and 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,89 +19,90 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Every number.
+    /// Interval of all numbers.
     pub const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// 0 alone.
+    /// Interval that contains only 0.
     pub const ZERO: Self = Self { low: 0.0, high: 0.0 };
 
-    /// The interval between two bounds in any order; every number if one of them is NaN.
+    /// Returns the interval between two bounds in any order; all numbers if a bound is NaN.
     #[must_use]
     #[inline]
     pub fn between(a: f64, b: f64) -> Self {
         if a <= b { Self { low: a, high: b } } else { Self::ordered(b, a) }
     }
 
-    /// The interval between two bounds; every number if one of them is NaN.
+    /// Returns the interval between two ordered bounds; all numbers if a bound is NaN.
     #[inline]
     fn ordered(low: f64, high: f64) -> Self {
         if low <= high { Self { low, high } } else { Self::ALL }
     }
 
-    /// The least interval that contains all of these numbers.
+    /// Returns the smallest interval that contains all of these numbers; all numbers if one is NaN.
     #[inline]
     fn spanning(numbers: [f64; 4]) -> Self {
-        // Comparisons are single instructions, `f64::min` looks for NaN besides; a NaN would be left by them here and there.
+        // Comparisons are faster than `f64::min`, which checks for NaN; NaN is checked separately below.
         let pick = |first: fn(f64, f64) -> bool| numbers.into_iter().reduce(|a, b| if first(b, a) { b } else { a });
-        let [low, high] = [pick(|b, a| b < a), pick(|b, a| b > a)].map(|bound| bound.expect("there are four"));
+        let [low, high] =
+            [pick(|b, a| b < a), pick(|b, a| b > a)].map(|bound| bound.expect("the array has four numbers"));
         if numbers.iter().any(|n| n.is_nan()) { Self::ALL } else { Self { low, high } }
     }
 
-    /// One number; every number for NaN.
+    /// Returns the interval that contains one number; all numbers for NaN.
     #[must_use]
     pub fn point(x: f64) -> Self {
         Self::between(x, x)
     }
 
-    /// The numbers at most `radius` away from `centre`.
+    /// Returns the interval of the numbers at most `radius` away from `centre`.
     #[must_use]
     pub fn around(centre: f64, radius: f64) -> Self {
         Self::between(centre - radius, centre + radius)
     }
 
-    /// The smallest interval that contains both.
+    /// Returns the smallest interval that contains both.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Whether a number lies in it.
+    /// Returns true if the interval contains a number.
     #[must_use]
     pub fn contains(self, x: f64) -> bool {
         self.low <= x && x <= self.high
     }
 
-    /// The largest absolute value in it.
+    /// Returns the largest absolute value in the interval.
     #[must_use]
     pub fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 
-    /// The one number in it, if it has only one.
+    /// Returns the number of a single-point interval; `None` otherwise.
     #[must_use]
     pub fn single(self) -> Option<f64> {
         (self.low == self.high).then_some(self.low)
     }
 
-    /// The results of a function that rises over the interval, or falls over it.
+    /// Returns the range of a monotone function over the interval.
     #[must_use]
     pub fn monotone(self, f: impl Fn(f64) -> f64) -> Self {
         Self::between(f(self.low), f(self.high))
     }
 
-    /// The part within two bounds; the nearer bound where there is none.
+    /// Returns the part between two bounds; the nearer bound if that part is empty.
     #[must_use]
     pub fn clamp(self, low: f64, high: f64) -> Self {
         Self { low: self.low.clamp(low, high), high: self.high.clamp(low, high) }
     }
 
-    /// `1/x`; every number where 0 lies in it.
+    /// Returns `1/x`; all numbers if the interval contains 0.
     #[must_use]
     pub fn reciprocal(self) -> Self {
         if self.contains(0.0) { Self::ALL } else { self.monotone(f64::recip) }
     }
 
-    /// `x^2`.
+    /// Returns `x^2`.
     #[must_use]
     pub fn square(self) -> Self {
         let largest = self.magnitude();
@@ -109,7 +110,7 @@ impl Interval {
         Self { low: least * least, high: largest * largest }
     }
 
-    /// `cos x`, `x` in rad.
+    /// Returns `cos x`, `x` in rad.
     #[must_use]
     pub fn cos(self) -> Self {
         if !self.low.is_finite() || !self.high.is_finite() || self.high - self.low >= TAU {
@@ -121,7 +122,7 @@ impl Interval {
         Self { low: if reaches(PI) { -1.0 } else { ends.low }, high: if reaches(0.0) { 1.0 } else { ends.high } }
     }
 
-    /// `sin x`, `x` in rad.
+    /// Returns `sin x`, `x` in rad.
     #[must_use]
     pub fn sin(self) -> Self {
         let reaches = |phase: f64| ((self.high - phase) / TAU).floor() >= ((self.low - phase) / TAU).ceil();
@@ -135,7 +136,7 @@ impl Interval {
         }
     }
 
-    /// `x^exponent`; where `x` may be negative the exponent is whole, or every number may result.
+    /// Returns `x^exponent`; all numbers if `x` may be negative and the exponent is not an integer.
     #[must_use]
     pub fn power(self, exponent: f64) -> Self {
         if exponent == 0.0 {
@@ -183,7 +184,7 @@ impl Mul for Interval {
         if products.iter().sum::<f64>().is_finite() {
             return Self::spanning(products);
         }
-        // 0 times a bound that is infinite is 0: the numbers themselves are finite.
+        // 0 times an infinite bound is 0, because the numbers themselves are finite.
         Self::spanning(pairs.map(|(a, b)| if a == 0.0 || b == 0.0 { 0.0 } else { a * b }))
     }
 }

@@ -1,4 +1,4 @@
-//! Enclosures: bounds of a quantity and of its rate over an interval of time, to prove that it has no zero there.
+//! Enclosures: bounds of a quantity and of its rate over a time interval, to prove that the quantity has no zero there.
 
 mod interval;
 
@@ -8,13 +8,14 @@ use crate::expression::{Comparison, Function};
 use crate::math;
 pub use interval::Interval;
 
-/// Bounds of a quantity `x(t)` over an interval of time, and of its derivative `dx/dt`.
+/// Bounds of a quantity `x(t)` over a time interval, and of its derivative `dx/dt`.
 ///
-/// Where a quantity has a kink, the rate encloses the slopes on both sides (Clarke's derivative); where it jumps, there is no
+/// At a kink, the rate encloses the one-sided derivatives (Clarke's generalised gradient). At a jump, there is no
 /// enclosure.
 ///
 /// Source: R. Moore, R. Kearfott, M. Cloud, Introduction to Interval Analysis (SIAM 2009), chapters 5 and 6; for hybrid
-/// systems: J. Esposito, V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217.
+/// systems: J. Esposito, V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001,
+/// 204-217.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Enclosure {
     /// Bounds of `x`.
@@ -30,19 +31,21 @@ impl From<f64> for Enclosure {
 }
 
 impl Enclosure {
-    /// Nothing is known.
+    /// Enclosure without information.
     pub const UNKNOWN: Self = Self { value: Interval::ALL, rate: Interval::ALL };
 
-    /// Time from `from` to `to`, s.
+    /// Returns the enclosure of time from `from` to `to`, s.
     #[must_use]
     pub fn of_time(from: f64, to: f64) -> Self {
         Self { value: Interval::between(from, to), rate: Interval::point(1.0) }
     }
 
-    /// The polynomial `sum_k c_k d^k` of the distance `d` from the middle of the interval, `|d| <= radius` in s.
+    /// Returns the enclosure of the polynomial `sum_k c_k d^k` in the distance `d` from the interval centre,
+    /// `|d| <= radius` in s.
     #[must_use]
     pub fn of_polynomial(coefficients: &[f64], radius: f64) -> Self {
-        // Middles and radii: even powers of `d` lie between 0 and that of the radius, odd ones between both signs of it.
+        // Centres and radii: even powers of `d` range from 0 to the power of the radius, odd ones between plus and
+        // minus that.
         let (mut value, mut rate) = ([0.0; 2], [0.0; 2]);
         let add = |sum: &mut [f64; 2], term: f64, power: usize| match power {
             0 => sum[0] += term,
@@ -65,34 +68,35 @@ impl Enclosure {
         Self { value: around(value), rate: around(rate) }
     }
 
-    /// A function of it, from the bounds of the function and of its derivative.
+    /// Returns the enclosure of a function of the quantity, given the bounds of the function and of its derivative
+    /// (chain rule).
     #[must_use]
     pub fn chain(self, value: Interval, derivative: Interval) -> Self {
         Self { value, rate: derivative * self.rate }
     }
 
-    /// The smallest enclosure of both.
+    /// Returns the smallest enclosure that contains both.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self { value: self.value.hull(other.value), rate: self.rate.hull(other.rate) }
     }
 
-    /// Sine of an angle in rad.
+    /// Returns the sine of an angle in rad.
     #[must_use]
     pub fn sin(self) -> Self {
         self.chain(self.value.sin(), self.value.cos())
     }
 
-    /// Cosine of an angle in rad.
+    /// Returns the cosine of an angle in rad.
     #[must_use]
     pub fn cos(self) -> Self {
         self.chain(self.value.cos(), -self.value.sin())
     }
 
-    /// A smooth function of one argument, on the part of its domain that the bounds meet.
+    /// Returns a smooth function of one argument, restricted to its domain.
     ///
     /// # Panics
-    /// For functions of several arguments and those with kinks, which are compiled to other instructions.
+    /// For functions of several arguments and functions with kinks, which are compiled to other instructions.
     #[must_use]
     pub fn function(self, function: Function) -> Self {
         let x = self.value;
@@ -136,7 +140,7 @@ impl Enclosure {
         }
     }
 
-    /// `self^exponent`.
+    /// Returns `self^exponent`.
     #[must_use]
     pub fn power(self, exponent: Self) -> Self {
         if let Some(b) = exponent.value.single() {
@@ -149,7 +153,7 @@ impl Enclosure {
         (self.function(Function::Ln) * exponent).function(Function::Exp)
     }
 
-    /// Angle of the point (`x`, `self`), rad.
+    /// Returns the angle of the point (`x`, `self`), rad.
     #[must_use]
     pub fn atan2(self, x: Self) -> Self {
         let square = self.value.square() + x.value.square();
@@ -166,7 +170,7 @@ impl Enclosure {
         Self { value, rate }
     }
 
-    /// 1 where the comparison holds, 0 where it does not, both where it may.
+    /// Returns 1 if the comparison holds, 0 if it does not, and both if it may.
     #[must_use]
     pub fn holds(self, comparison: Comparison, other: Self) -> Self {
         let difference = self.value - other.value;
@@ -174,7 +178,7 @@ impl Enclosure {
         Self { value: Interval::between(low, high), rate: Interval::point(0.0) }
     }
 
-    /// `a` where this is positive, else `b`.
+    /// Returns `a` if `self` is positive, `b` if it is not, and the hull of both if undecided.
     #[must_use]
     pub fn choose(self, a: Self, b: Self) -> Self {
         match self.value {
@@ -185,7 +189,7 @@ impl Enclosure {
     }
 }
 
-/// The results of an even function that rises with the absolute value.
+/// Returns the range of an even function that increases with the absolute value.
 fn even(x: Interval, f: impl Fn(f64) -> f64) -> Interval {
     let least = if x.contains(0.0) { 0.0 } else { x.low.abs().min(x.high.abs()) };
     Interval::between(f(least), f(x.magnitude()))

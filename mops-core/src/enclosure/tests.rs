@@ -5,7 +5,7 @@ use crate::expression::functions;
 use crate::math;
 use crate::scalar::Dual;
 
-/// A cubic of the distance from the middle of an interval of half-length `radius`.
+/// Cubic in the distance from the centre of an interval of half-length `radius`.
 #[derive(Debug, Clone, Copy)]
 struct Cubic {
     coefficients: [f64; 4],
@@ -17,7 +17,7 @@ impl Cubic {
         Enclosure::of_polynomial(&self.coefficients, self.radius)
     }
 
-    /// The value and slope at `share` of the way from the middle to the end, -1 to 1.
+    /// Returns value and derivative at the fraction `share` from the centre to the end, -1 to 1.
     fn at(&self, share: f64) -> Dual<1> {
         let d = Dual::<1>::variable(share * self.radius, 0);
         let [a, b, c, e] = self.coefficients;
@@ -29,7 +29,7 @@ fn cubic(radius: f64) -> impl Strategy<Value = Cubic> {
     [-3.0..3.0, -3.0..3.0, -3.0..3.0, -3.0..3.0].prop_map(move |coefficients| Cubic { coefficients, radius })
 }
 
-/// Whether the value and the slope of `x` lie within the bounds, up to rounding.
+/// Returns true if the value and the derivative of `x` lie within the bounds, up to rounding.
 fn holds(bounds: Enclosure, x: Dual<1>) -> bool {
     let within = |bounds: Interval, x: f64| {
         let slop = 1e-12 * (1.0 + x.abs());
@@ -97,7 +97,7 @@ proptest! {
                 let (bounds, value) = (bounds(a.enclosure()), value(x));
                 prop_assert!(holds(bounds, value), "operation {k}: {bounds:?} {value:?}");
             }
-            // The slope of a root at 0 is infinite; a convention gives it as 0.
+            // The derivative of a square root at 0 is infinite; by convention it is given as 0.
             for function in SMOOTH.into_iter().filter(|f| *f != Function::Sqrt || x.value != 0.0) {
                 let bounds = a.enclosure().function(function);
                 let value = function.smooth(x).expect("it is smooth");

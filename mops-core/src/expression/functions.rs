@@ -1,9 +1,9 @@
-//! The functions of expressions, with their derivatives.
+//! Functions of expressions, with their derivatives.
 
 use crate::math;
 use crate::scalar::Scalar;
 
-/// A function that expressions know.
+/// Function available in expressions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Function {
     /// Sine of an angle in rad.
@@ -36,19 +36,19 @@ pub enum Function {
     Sqrt,
     /// Absolute value.
     Abs,
-    /// -1, 0 or 1.
+    /// Sign: -1, 0 or 1.
     Sign,
-    /// The smallest argument.
+    /// Smallest argument.
     Min,
-    /// The largest argument.
+    /// Largest argument.
     Max,
-    /// `clip(x, low, high)`: `x` within the limits, else the limit (saturation).
+    /// Saturation `clip(x, low, high)`: `x` within the limits, otherwise the limit.
     Clip,
-    /// `deadzone(x, low, high)`: 0 within the limits, else the distance beyond the limit.
+    /// Dead zone `deadzone(x, low, high)`: 0 within the limits, otherwise the distance beyond the limit.
     Deadzone,
-    /// `table(x, x1, y1, x2, y2, ..)`: straight lines through the points, the first and the last extended.
+    /// Lookup table `table(x, x1, y1, x2, y2, ..)`: linear interpolation, extrapolated beyond the first and last point.
     Table,
-    /// `if(condition, a, b)`, `if(condition, a, condition, b, .., otherwise)`.
+    /// Selection `if(condition, a, b)` or `if(condition, a, condition, b, .., otherwise)`.
     If,
 }
 
@@ -79,12 +79,12 @@ pub const FUNCTIONS: [(&str, Function, usize, usize); 22] = [
 ];
 
 impl Function {
-    /// Its name in expressions.
+    /// Returns the name in expressions.
     pub fn name(self) -> &'static str {
         FUNCTIONS.iter().find(|(_, function, ..)| *function == self).expect("every function has a name").0
     }
 
-    /// The value of a smooth function of one argument; `None` for all others.
+    /// Returns the value of a smooth function of one argument; `None` for all other functions.
     #[inline]
     pub fn smooth<S: Scalar>(self, x: S) -> Option<S> {
         let v = x.value();
@@ -107,29 +107,31 @@ impl Function {
     }
 }
 
-/// A derivative for tangents: 0 where it is infinite, as at the ends of roots and of arcs. A simulation that rests there keeps
-/// finite tangents, such as a tank that ran empty; a linearisation there is refused, as differences grow where the slope is
-/// said to be 0.
+/// Returns a derivative for tangents: 0 where it is infinite, as at the ends of roots and of arcs.
+///
+/// A simulation at rest there, such as an empty tank, thus keeps finite tangents. A linearisation there is refused,
+/// because differences grow where the derivative is given as 0.
 #[inline]
 fn tangent(derivative: f64) -> f64 {
     if derivative.is_infinite() { 0.0 } else { derivative }
 }
 
-/// Square root; its infinite derivative at 0 counts as 0.
+/// Returns the square root; its infinite derivative at 0 counts as 0.
 #[inline]
 pub fn sqrt<S: Scalar>(x: S) -> S {
     if x.value() == 0.0 { x.chain(0.0, 0.0) } else { x.sqrt() }
 }
 
-/// Angle of the point (x, y), rad, from -pi to pi.
+/// Returns the angle of the point (x, y), rad, from -pi to pi.
 pub fn atan2<S: Scalar>(y: S, x: S) -> S {
     let (a, b) = (y.value(), x.value());
     let square = a * a + b * b;
     (y * (b / square) - x * (a / square)).chain(math::atan2(a, b), 1.0)
 }
 
-/// `base^exponent`; a negative base needs a whole exponent that does not vary. An infinite derivative at base 0 counts as 0,
-/// as that of a square root.
+/// Returns `base^exponent`; a negative base needs a constant integer exponent.
+///
+/// An infinite derivative at base 0 counts as 0, as for the square root.
 pub fn power<S: Scalar>(base: S, exponent: S) -> S {
     let (a, b) = (base.value(), exponent.value());
     let value = math::powf(a, b);
@@ -141,7 +143,7 @@ pub fn power<S: Scalar>(base: S, exponent: S) -> S {
     (base * by_base + exponent * by_exponent).chain(value, 1.0)
 }
 
-/// -1, 0 or 1, with derivative 0.
+/// Returns -1, 0 or 1, with derivative 0.
 pub fn sign<S: Scalar>(x: S) -> S {
     let v = x.value();
     S::from(if v > 0.0 {
@@ -153,26 +155,26 @@ pub fn sign<S: Scalar>(x: S) -> S {
     })
 }
 
-/// The smaller one; the first where they are equal.
+/// Returns the smaller argument; the first if they are equal.
 #[inline]
 pub fn min<S: Scalar>(a: S, b: S) -> S {
     if b.value() < a.value() { b } else { a }
 }
 
-/// The larger one; the first where they are equal.
+/// Returns the larger argument; the first if they are equal.
 #[inline]
 pub fn max<S: Scalar>(a: S, b: S) -> S {
     if b.value() > a.value() { b } else { a }
 }
 
-/// Straight lines through the points `x1, y1, x2, y2, ..`, the first and the last line extended.
+/// Interpolates linearly between the points `x1, y1, x2, y2, ..` and extrapolates the first and the last line.
 pub fn table<S: Scalar>(x: S, points: &[S]) -> S {
     let last = points.len() / 2 - 1;
     let piece = (1..last).find(|&k| x.value() < points[2 * k].value()).unwrap_or(last) - 1;
     line(x, [points[2 * piece], points[2 * piece + 1], points[2 * piece + 2], points[2 * piece + 3]])
 }
 
-/// The straight line through the points `[x1, y1, x2, y2]`.
+/// Returns the value at `x` of the straight line through the points `[x1, y1, x2, y2]`.
 pub fn line<S: Scalar>(x: S, [x1, y1, x2, y2]: [S; 4]) -> S {
     y1 + (y2 - y1) * ((x - x1) / (x2 - x1))
 }

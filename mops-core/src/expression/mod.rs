@@ -13,11 +13,11 @@ use std::collections::HashSet;
 
 use crate::scalar::Scalar;
 
-/// An expression over named quantities, read once and evaluated with values or with tangents.
+/// Expression over named quantities, parsed once and evaluated with values or with tangents.
 ///
-/// Operators `+ - * / ^` with the usual precedence (`-x^2` is `-(x^2)`), parentheses, `pi`, and the functions of
-/// [`FUNCTIONS`]; conditions are comparisons `> >= < <=`, joined by `and`, `or`, `not`. A number may have a unit in brackets:
-/// `20 [degC]`; its value is that in the coherent SI unit, 293.15.
+/// Operators are `+ - * / ^` with the usual precedence (`-x^2` is `-(x^2)`), with parentheses, `pi`, and the functions
+/// of [`FUNCTIONS`]. Conditions are comparisons `> >= < <=`, combined by `and`, `or`, `not`. A number may have a unit
+/// in brackets: `20 [degC]` has the value in the coherent SI unit, 293.15.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     root: Node,
@@ -25,10 +25,10 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// Reads an expression.
+    /// Parses an expression.
     ///
     /// # Errors
-    /// A text that is not an expression, with the place of the first mistake.
+    /// If the text is not an expression, with the position of the first mistake.
     pub fn parse(text: &str) -> Result<Self, SyntaxError> {
         let root = parse::expression(text)?;
         let (mut names, mut seen): (Vec<String>, HashSet<&str>) = Default::default();
@@ -39,34 +39,35 @@ impl Expression {
             _ => {}
         });
         match foreign {
-            Some(span) => {
-                Err(SyntaxError { span, message: "only models have derivatives and families of states".to_owned() })
-            }
+            Some(span) => Err(SyntaxError {
+                span,
+                message: "derivatives and families of states are allowed in models only".to_owned(),
+            }),
             None => Ok(Self { root, names }),
         }
     }
 
-    /// What it is made of.
+    /// Returns the root of the expression tree.
     pub fn root(&self) -> &Node {
         &self.root
     }
 
-    /// Names that occur, each once, in the order of their first use; values are given in this order.
+    /// Returns the names in the expression, each once, in the order of first use. Values are given in this order.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// The value for given values of [`Expression::names`].
+    /// Returns the value for given values of [`Expression::names`].
     pub fn evaluate<S: Scalar>(&self, values: &[S]) -> S {
         self.root.evaluate(&|name| {
-            let index = self.names.iter().position(|known| known == name).expect("names were gathered on reading");
+            let index = self.names.iter().position(|known| known == name).expect("parsing collects all names");
             values[index]
         })
     }
 }
 
 impl Node {
-    /// The value, where `lookup` gives that of every name.
+    /// Returns the value of the node; `lookup` returns the value of a name.
     ///
     /// # Panics
     /// At a derivative, or at a member of a family.
@@ -91,24 +92,24 @@ impl Node {
                 let values: Vec<S> = arguments.iter().map(value).collect();
                 function.evaluate(&values)
             }
-            _ => unreachable!("the reader has checked what stands where a number is expected"),
+            _ => unreachable!("the parser checks that this is a number"),
         }
     }
 
-    /// Whether the condition holds.
+    /// Returns true if the condition holds.
     fn holds<S: Scalar>(&self, lookup: &impl Fn(&str) -> S) -> bool {
         match &self.form {
             Form::Compare(comparison, a, b) => comparison.holds(a.evaluate(lookup).value(), b.evaluate(lookup).value()),
             Form::All(conditions) => conditions.iter().all(|condition| condition.holds(lookup)),
             Form::Any(conditions) => conditions.iter().any(|condition| condition.holds(lookup)),
             Form::Not(a) => !a.holds(lookup),
-            _ => unreachable!("the reader has checked what stands where a condition is expected"),
+            _ => unreachable!("the parser checks that this is a condition"),
         }
     }
 }
 
 impl Function {
-    /// The value of any function but `if`.
+    /// Returns the value of any function except `if`.
     pub fn evaluate<S: Scalar>(self, values: &[S]) -> S {
         use functions::{atan2, max, min, sign, table};
         let x = values[0];
@@ -214,10 +215,10 @@ mod tests {
         ];
         for (open, close) in nests {
             let nested = |depth: usize| format!("{}x{}", open.repeat(depth), close.repeat(depth));
-            // One of these opens two brackets a level.
+            // Each of these opens one or two brackets per level.
             let levels = open.matches(['(', '^']).count();
             assert!(Expression::parse(&nested(DEEPEST / levels)).is_ok(), "{open}");
-            // Texts of more than a megabyte are refused for their length.
+            // Texts of more than a megabyte are refused because of their length.
             let longest = 1_000_000 / (open.len() + close.len());
             for depth in [DEEPEST / levels + 1, 1000, 10_000, longest] {
                 let wrong = Expression::parse(&nested(depth)).unwrap_err();
@@ -226,7 +227,7 @@ mod tests {
                 assert!((place..=place + 2 * open.len()).contains(&wrong.span.start), "{open}: {:?}", wrong.span);
             }
         }
-        // What stands beside each other is not nested.
+        // Consecutive operands are not nested.
         assert_eq!(value(&format!("x{}", " + (x)^(2)".repeat(1000)), &[1.0]), 1001.0);
         let wrong = equation(&format!("x' = {}x", "x[".repeat(300))).unwrap_err();
         assert_eq!(wrong.message, format!("nested more than {DEEPEST} deep"));

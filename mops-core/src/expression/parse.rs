@@ -1,4 +1,4 @@
-//! From text to [`Node`]s.
+//! Parser from text to [`Node`]s.
 //!
 //! ```text
 //! equation    = expression ('=' expression)?
@@ -26,37 +26,37 @@ use super::functions::{FUNCTIONS, Function};
 use super::tree::{Comparison, Form, Node, Operator};
 use crate::unit::Unit;
 
-/// Where an expression is wrong, and why.
+/// Syntax error: its position and cause.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SyntaxError {
-    /// Bytes of the text.
+    /// Byte range in the text.
     pub span: Range<usize>,
-    /// One sentence.
+    /// Error message, one sentence.
     pub message: String,
 }
 
-/// An equation `left = right`, or an expression alone.
+/// Equation `left = right`, or a single expression.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equation {
-    /// What stands before the `=`, if there is one.
+    /// Left side of the `=`, if any.
     pub left: Option<Node>,
-    /// The rest.
+    /// Right side, or the expression.
     pub right: Node,
 }
 
-/// Brackets, functions, indices and exponents within each other, at most: each takes a part of the stack.
+/// Largest nesting depth of brackets, functions, indices and exponents, each of which uses stack.
 pub const DEEPEST: usize = 200;
 
-/// Bytes of a text, at most. A sum of half a million terms fits in, and what is read of it into some 100 MB.
+/// Longest text, in bytes. It allows a sum of half a million terms, which takes some 100 MB after parsing.
 const LONGEST: usize = 1 << 20;
 
-/// Marks the error of a text that is nested too deeply.
+/// Marker of the error of a text that is nested too deeply.
 const TOO_DEEP: StrContext = StrContext::Label("too deep");
 
-/// The text, and how deeply the reader is nested in it.
+/// Text and current nesting depth of the parser.
 type Input<'t> = Stateful<LocatingSlice<&'t str>, usize>;
 
-/// As read: functions by their names, conditions anywhere.
+/// Parsed form before the check: functions by name, conditions anywhere.
 enum Raw {
     Number(f64),
     Quantity(f64, String, Range<usize>),
@@ -85,7 +85,7 @@ impl Spanned {
     }
 }
 
-/// Reads an expression that is a number.
+/// Parses an expression that is a number.
 pub fn expression(text: &str) -> Result<Node, SyntaxError> {
     if let Some(quantity) = quantity_alone(text) {
         return Ok(quantity);
@@ -94,10 +94,10 @@ pub fn expression(text: &str) -> Result<Node, SyntaxError> {
     number_of(raw)
 }
 
-/// Reads an equation, or an expression that is a number.
+/// Parses an equation, or an expression that is a number.
 ///
 /// # Errors
-/// A text that is neither, with the place of the first mistake.
+/// If the text is neither, with the position of the first mistake.
 pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
     if let Some(right) = quantity_alone(text) {
         return Ok(Equation { left: None, right });
@@ -110,8 +110,9 @@ pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
     })
 }
 
-/// A text that is a number with a unit and nothing else, as everywhere in a study: `20 degC`. A blank stands between the two:
-/// `1/s` is one over a quantity `s`.
+/// Parses a text that is only a number with a unit, as elsewhere in a study: `20 degC`.
+///
+/// A blank separates the two: `1/s` is one divided by a quantity `s`.
 fn quantity_alone(text: &str) -> Option<Node> {
     let (number, unit) = text.trim().split_once(char::is_whitespace)?;
     let is_unit = unit.trim_start().starts_with(|c: char| c.is_alphabetic() || c == '%') || unit.starts_with("1/");
@@ -126,14 +127,14 @@ fn quantity_alone(text: &str) -> Option<Node> {
     Some(Node { form: Form::Quantity(number, unit), span: start..start + text.trim().len() })
 }
 
-/// Whether a number in a unit is beyond all numbers.
+/// Returns true if a number in a unit exceeds the number range.
 fn is_too_large(number: f64, unit: &Unit) -> bool {
     !(number * unit.factor() + unit.zero()).is_finite()
 }
 
 fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<ContextError>>) -> Result<T, SyntaxError> {
     if text.len() > LONGEST {
-        let message = format!("{} bytes are more than the {LONGEST} that one expression may have", text.len());
+        let message = format!("the expression has {} bytes, more than the limit of {LONGEST}", text.len());
         return Err(SyntaxError { span: text.floor_char_boundary(LONGEST)..text.len(), message });
     }
     parser.parse(Stateful { input: LocatingSlice::new(text), state: 0 }).map_err(|error| {
@@ -151,7 +152,7 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
                 _ => None,
             })
             .collect();
-        let found = if rest.is_empty() { "the expression ends".to_owned() } else { format!("`{rest}` stands") };
+        let found = if rest.is_empty() { "the end of the expression".to_owned() } else { format!("`{rest}`") };
         let word = text[from..].split(|c: char| !c.is_alphabetic() && c != '%').next().unwrap_or_default();
         if text[..from].trim_end().ends_with(|c: char| c.is_ascii_digit())
             && Unit::parse(word).is_ok()
@@ -161,18 +162,15 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
             return SyntaxError { span: from..from + word.len(), message };
         }
         let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
-        SyntaxError { span: from..to, message: format!("{found} where {wanted} is expected") }
+        SyntaxError { span: from..to, message: format!("expected {wanted}, found {found}") }
     })
 }
 
-/// Checks that it is a number, and so are all parts that must be; finds the functions.
+/// Checks that the parsed form is a number, and so are its parts where required; looks up the functions.
 fn number_of(raw: Spanned) -> Result<Node, SyntaxError> {
     let node = checked(raw)?;
     if node.is_condition() {
-        return Err(SyntaxError {
-            span: node.span,
-            message: "a condition stands where a number is expected".to_owned(),
-        });
+        return Err(SyntaxError { span: node.span, message: "expected a number, found a condition".to_owned() });
     }
     Ok(node)
 }
@@ -180,7 +178,7 @@ fn number_of(raw: Spanned) -> Result<Node, SyntaxError> {
 fn condition_of(raw: Spanned) -> Result<Node, SyntaxError> {
     let node = checked(raw)?;
     if !node.is_condition() {
-        let message = "a number stands where a condition such as `x > 0` is expected".to_owned();
+        let message = "expected a condition such as `x > 0`, found a number".to_owned();
         return Err(SyntaxError { span: node.span, message });
     }
     Ok(node)
@@ -224,7 +222,7 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
     let wrong = |span: Range<usize>, message: String| Err(SyntaxError { span, message });
     if name == "der" {
         let [of] = <[Spanned; 1]>::try_from(arguments)
-            .map_err(|_| SyntaxError { span: span.clone(), message: "`der` takes one quantity".to_owned() })?;
+            .map_err(|_| SyntaxError { span: span.clone(), message: "`der` takes one argument".to_owned() })?;
         let of = number_of(of)?;
         return match of.form {
             Form::Name(_) | Form::Member(..) => Ok(Form::Rate(Box::new(of))),
@@ -233,7 +231,7 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
     }
     let Some(&(_, function, least, most)) = FUNCTIONS.iter().find(|(known, ..)| *known == name) else {
         let names: Vec<&str> = FUNCTIONS.iter().map(|(name, ..)| *name).collect();
-        return wrong(place, format!("there is no function `{name}`; known: {}", names.join(", ")));
+        return wrong(place, format!("unknown function `{name}`; known: {}", names.join(", ")));
     };
     let count = arguments.len();
     let fits = match function {
@@ -266,7 +264,7 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
     Ok(Form::Call(function, checked.collect::<Result<_, _>>()?))
 }
 
-/// The number that stands there as such.
+/// Returns the value of an argument that is a literal number.
 fn literal(argument: &Spanned) -> Option<f64> {
     match &argument.raw {
         Raw::Number(number) => Some(*number),
@@ -290,7 +288,7 @@ fn is_letter(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// What stands within something else: one level deeper.
+/// Parses a nested part, one level deeper.
 fn nested<'t>(
     inner: fn(&mut Input<'t>) -> ModalResult<Spanned>,
 ) -> impl Parser<Input<'t>, Spanned, ErrMode<ContextError>> {
@@ -377,7 +375,7 @@ fn chain(
     Ok(Spanned { raw: Raw::Chain(Box::new(first), rest), span })
 }
 
-/// `-x^2` is `-(x^2)`; `-5 [degC]` is a temperature below 0 degC.
+/// Parses a signed power: `-x^2` is `-(x^2)`, and `-5 [degC]` is a temperature below 0 degC.
 fn signed(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let (sign, span) = opt((one_of(['-', '+']), multispace0)).with_span().parse_next(input)?;
     let inner = power(input)?;
@@ -407,7 +405,7 @@ fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
     alt((bracketed, number, name_or_call, fail.context(expected("a number, a name or `(`")))).parse_next(input)
 }
 
-/// A number, with a unit in brackets or without.
+/// Parses a number with an optional unit in brackets.
 fn number(input: &mut Input<'_>) -> ModalResult<Spanned> {
     let (value, span): (f64, _) = preceded(peek(one_of(('0'..='9', '.'))), float).with_span().parse_next(input)?;
     let unit = take_while(1.., |c: char| c != ']' && c != '[').with_span();

@@ -1,4 +1,4 @@
-//! What an expression is once it is read: a tree whose every node knows where it stands in the text.
+//! Expression tree: every node stores its position in the text.
 
 use std::ops::Range;
 
@@ -6,62 +6,62 @@ use super::functions::Function;
 use crate::scalar::Scalar;
 use crate::unit::Unit;
 
-/// A part of an expression.
+/// Node of an expression tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// What it is.
+    /// Kind of the node.
     pub form: Form,
-    /// Bytes of the text.
+    /// Byte range in the text.
     pub span: Range<usize>,
 }
 
-/// The kinds of [`Node`]. A condition stands only where one is expected; the reader checks that.
+/// Kind of a [`Node`]. Conditions occur only where expected, as the parser checks.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Form {
-    /// A number, `pi` included.
+    /// Number, including `pi`.
     Number(f64),
-    /// A number with its unit, `20 [degC]`; its value is that in the coherent SI unit.
+    /// Number with its unit, `20 [degC]`, in the coherent SI unit.
     Quantity(f64, Unit),
-    /// A named quantity.
+    /// Named quantity.
     Name(String),
-    /// A member of a family: `T[i-1]`.
+    /// Member of a family: `T[i-1]`.
     Member(String, Box<Node>),
-    /// The derivative of a quantity with respect to time: `x'`, or `der(x)`.
+    /// Time derivative of a quantity: `x'`, or `der(x)`.
     Rate(Box<Node>),
-    /// `-a`.
+    /// Negation `-a`.
     Negative(Box<Node>),
-    /// A sum or a product, from left to right: `a - b + c` is `a`, then `- b`, then `+ c`. It is flat, so that its length
-    /// takes no stack.
+    /// Sum or product, from left to right: `a - b + c` is `a`, then `- b`, then `+ c`. The list is flat, so that its
+    /// length uses no stack.
     Chain(Box<Node>, Vec<(Operator, Node)>),
-    /// `a ^ b`; `x^2^3` is `x^(2^3)`.
+    /// Power `a ^ b`; `x^2^3` is `x^(2^3)`.
     Power(Box<Node>, Box<Node>),
-    /// `f(a, b, ..)`.
+    /// Function call `f(a, b, ..)`.
     Call(Function, Vec<Node>),
-    /// A condition: `a > b`.
+    /// Condition `a > b`.
     Compare(Comparison, Box<Node>, Box<Node>),
-    /// A condition: all of them, `a and b`.
+    /// Conjunction of conditions, `a and b`.
     All(Vec<Node>),
-    /// A condition: at least one of them, `a or b`.
+    /// Disjunction of conditions, `a or b`.
     Any(Vec<Node>),
-    /// A condition: the opposite.
+    /// Negated condition.
     Not(Box<Node>),
 }
 
-/// Arithmetic between the operands of a [`Form::Chain`].
+/// Arithmetic operator between the operands of a [`Form::Chain`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operator {
-    /// `a + b`.
+    /// Sum `a + b`.
     Add,
-    /// `a - b`.
+    /// Difference `a - b`.
     Subtract,
-    /// `a * b`.
+    /// Product `a * b`.
     Multiply,
-    /// `a / b`.
+    /// Quotient `a / b`.
     Divide,
 }
 
 impl Operator {
-    /// The result for two operands.
+    /// Returns the result for two operands.
     pub fn of<S: Scalar>(self, a: S, b: S) -> S {
         match self {
             Self::Add => a + b,
@@ -72,21 +72,21 @@ impl Operator {
     }
 }
 
-/// A comparison of two numbers.
+/// Comparison of two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Comparison {
-    /// `a > b`.
+    /// Greater than, `a > b`.
     Greater,
-    /// `a >= b`.
+    /// At least, `a >= b`.
     AtLeast,
-    /// `a < b`.
+    /// Less than, `a < b`.
     Less,
-    /// `a <= b`.
+    /// At most, `a <= b`.
     AtMost,
 }
 
 impl Comparison {
-    /// Whether it holds.
+    /// Returns true if the comparison holds for these numbers.
     pub fn holds(self, a: f64, b: f64) -> bool {
         match self {
             Self::Greater => a > b,
@@ -98,12 +98,12 @@ impl Comparison {
 }
 
 impl Node {
-    /// Whether it is a condition, not a number.
+    /// Returns true for a condition, false for a number.
     pub fn is_condition(&self) -> bool {
         matches!(self.form, Form::Compare(..) | Form::All(_) | Form::Any(_) | Form::Not(_))
     }
 
-    /// The nodes directly below.
+    /// Returns the child nodes.
     pub fn children(&self) -> Vec<&Self> {
         match &self.form {
             Form::Number(_) | Form::Quantity(..) | Form::Name(_) => Vec::new(),

@@ -1,16 +1,16 @@
-//! Dimensions of expressions: what every part measures, and what the quantities measure that are declared without a unit.
+//! Dimensional analysis of expressions, and inference of the units of quantities declared without one.
 //!
-//! The terms of a sum, the sides of a comparison or of an equation, the limits of a `clip` and the branches of an `if` measure
-//! the same; arguments of `sin`, `exp` and their like are pure numbers; `sqrt` and powers with a constant exponent raise the
-//! dimension. A quantity that is declared without a unit has an unknown dimension, which is solved for: every rule is a linear
-//! equation between exponents.
+//! The terms of a sum and the sides of a comparison or of an equation have the same dimension. So do the limits of a
+//! `clip` and the branches of an `if`. Arguments of `sin`, `exp` and similar functions are pure numbers. `sqrt` and
+//! powers with a constant exponent raise the dimension to a power. The dimension of a quantity declared without a unit
+//! is unknown and solved for: every rule is a linear equation between exponents.
 //!
-//! A number without a unit is a pure number in a product. As a whole term of a sum it counts in the coherent SI unit of the
-//! others, which is refused where these are declared in other units: nobody could tell whether 20 beside a temperature in degC
-//! is in degC or in K.
+//! A number without a unit is a pure number in a product. As a whole term of a sum it counts in the coherent SI unit of
+//! the other terms. This is refused if these are declared in other units. For example, 20 added to a temperature in
+//! degC may be in degC or in K.
 //!
-//! Source: A. Kennedy, Programming Languages and Dimensions, University of Cambridge Technical Report 391 (1996), chapter 3
-//! (inference of dimensions by linear equations).
+//! Source: A. Kennedy, Programming Languages and Dimensions, University of Cambridge Technical Report 391 (1996),
+//! chapter 3 (inference of dimensions by linear equations).
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -21,7 +21,7 @@ use super::tree::{Form, Node, Operator};
 use crate::math;
 use crate::unit::{Dimension, Unit};
 
-/// A dimension, as far as it is known: a known one times powers of unknown ones.
+/// Partly known dimension: a known one times powers of unknown ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Open {
     known: Dimension,
@@ -35,7 +35,7 @@ impl From<Dimension> for Open {
 }
 
 impl Open {
-    /// Whether it is known to be that of a pure number.
+    /// Returns true if the dimension is known to be that of a pure number.
     fn is_none(&self) -> bool {
         self.unknown.is_empty() && self.known.is_none()
     }
@@ -48,43 +48,43 @@ impl Open {
                 None => self.unknown.push((unknown, exponent * power)),
             }
         }
-        // What cancels leaves roundings of thirds behind.
+        // Cancelled exponents keep rounding errors of thirds.
         self.unknown.retain(|(_, power)| power.abs() > 1e-9);
         self
     }
 }
 
-/// Whether an expression is a number without a unit.
+/// Classification of an expression as a number without a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Bare {
-    /// It is no such quantity.
+    /// Not a bare number.
     No,
-    /// It is 0, which is the same in all units but those of temperature.
+    /// Zero, which is equal in all units except those of temperature.
     Zero,
-    /// It is a number; its value, where it is one literal.
+    /// Number, with its value if it is a single literal.
     Number(Option<f64>),
 }
 
-/// What an expression measures, and the unit that the units declared in it make.
+/// Dimension of an expression, and the unit that results from the declared units in it.
 #[derive(Debug, Clone)]
 pub struct Measure {
     dimension: Open,
-    /// The value of the declared unit in the coherent one; `None` where the parts do not agree.
+    /// Value of the resulting unit in the coherent one; `None` if the parts disagree.
     factor: Option<f64>,
-    /// How many zeros of temperature scales it contains: 1 in a temperature in degC, 0 in a difference of two.
+    /// Number of temperature-scale zeros in the expression: 1 for a temperature in degC, 0 for a difference of two.
     zeros: f64,
     bare: Bare,
-    /// Whether it is made of quantities without a declared unit, and of numbers.
+    /// True if the expression consists of quantities without a declared unit, and of numbers.
     loose: bool,
-    /// The first quantity in it whose unit is not coherent.
+    /// First quantity in the expression whose unit is not coherent.
     foreign: Option<Rc<(String, Unit)>>,
 }
 
-/// Factors closer than this are one: cm times 1/cm.
+/// Largest distance from 1 of a factor that counts as one: cm times 1/cm.
 const ONE: f64 = 1e-9;
 
 impl Measure {
-    /// Measure of a quantity declared in a unit.
+    /// Returns the measure of a quantity declared in a unit.
     pub fn declared(name: &str, unit: &Unit) -> Self {
         let foreign = (!unit.is_coherent()).then(|| Rc::new((name.to_owned(), unit.clone())));
         Self {
@@ -97,7 +97,7 @@ impl Measure {
         }
     }
 
-    /// Measure of a pure number.
+    /// Returns the measure of a pure number.
     pub fn pure() -> Self {
         Self::number(Bare::No)
     }
@@ -107,12 +107,12 @@ impl Measure {
         Self { dimension, factor: Some(1.0), zeros: 0.0, bare, loose: false, foreign: None }
     }
 
-    /// Whether it is made of quantities without a declared unit.
+    /// Returns true if the expression consists of quantities without a declared unit.
     pub fn is_loose(&self) -> bool {
         self.loose
     }
 
-    /// Measure of the product with a power of another quantity.
+    /// Returns the measure of the product with a power of another quantity.
     #[must_use]
     pub fn times(&self, other: &Self, exponent: f64) -> Self {
         let dimension = self.dimension.clone().times(&other.dimension, exponent);
@@ -123,7 +123,7 @@ impl Measure {
             (_, Bare::Zero) if exponent > 0.0 => Bare::Zero,
             _ => Bare::Number(None),
         };
-        // A temperature times a pure number stays one; times anything else it is a difference.
+        // A temperature times a pure number remains a temperature; times anything else it is a difference.
         let zeros = |of: &Self, by: &Self| match by.bare {
             Bare::Number(Some(value)) => of.zeros * value,
             _ if by.dimension.is_none() => of.zeros,
@@ -138,14 +138,14 @@ impl Measure {
             foreign: self.foreign.clone().or_else(|| other.foreign.clone()),
             dimension,
         };
-        // A ratio of lengths is a number, in whatever units they are declared.
+        // A ratio of lengths is a pure number, for any units of the lengths.
         if product.dimension.is_none() && !self.dimension.is_none() {
             return Self { factor: Some(1.0), foreign: None, ..product };
         }
         product
     }
 
-    /// Measure of the time derivative.
+    /// Returns the measure of the time derivative.
     #[must_use]
     pub fn rate(&self, time: &Self) -> Self {
         Self { zeros: 0.0, ..self.times(time, -1.0) }
@@ -155,54 +155,54 @@ impl Measure {
         self.zeros.abs() > ONE
     }
 
-    /// Whether a number beside it could be in another unit than the coherent one.
+    /// Returns true if an added number could be in another unit than the coherent one.
     fn is_foreign(&self) -> bool {
         self.is_temperature() || self.factor.is_none_or(|factor| (factor - 1.0).abs() > ONE)
     }
 }
 
-/// What does not fit, at its place in the expression.
+/// Dimensional error at its position in the expression.
 #[derive(Debug, Clone)]
 pub struct Conflict {
-    /// Bytes of the expression.
+    /// Byte range in the expression.
     pub span: Range<usize>,
-    /// One sentence.
+    /// Error message, one sentence.
     pub fact: String,
-    /// The way out.
+    /// Suggested fix.
     pub help: String,
 }
 
-/// The quantities that an expression names.
+/// Quantities named in an expression.
 pub trait Quantities {
-    /// An error in one of them.
+    /// Error of a quantity.
     type Error;
 
-    /// What a name, a member of a family or a derivative measures.
+    /// Returns the measure of a name, a member of a family or a derivative.
     ///
     /// # Errors
-    /// What is wrong with its definition.
+    /// If its definition is wrong.
     fn measure(&mut self, dimensions: &mut Dimensions, node: &Node) -> Result<Measure, Self::Error>;
 
-    /// The value of a named constant.
+    /// Returns the value of a named constant.
     fn constant(&self, name: &str) -> Option<f64>;
 
-    /// Takes note of a number at its place that counts in the coherent unit of its neighbours.
+    /// Records a number and its position that counts in the coherent unit of the neighbouring terms.
     fn counts(&mut self, number: String, place: Range<usize>, dimension: Open);
 
-    /// The error for what does not fit in the present expression.
+    /// Converts a conflict in the present expression to an error.
     fn refuse(&self, conflict: Conflict) -> Self::Error;
 }
 
-/// Quantities by name, for expressions without derivatives, families and constants.
+/// Named quantities, for expressions without derivatives, families and constants.
 pub struct Named(pub Vec<(String, Measure)>);
 
 impl Quantities for Named {
     type Error = Conflict;
 
     /// # Panics
-    /// At a name that is not one of them.
+    /// At an unknown name.
     fn measure(&mut self, _: &mut Dimensions, node: &Node) -> Result<Measure, Conflict> {
-        let Form::Name(name) = &node.form else { unreachable!("the reader takes names only") };
+        let Form::Name(name) = &node.form else { unreachable!("the parser accepts names only") };
         Ok(self.0.iter().find(|(known, _)| known == name).expect("names were checked").1.clone())
     }
 
@@ -217,34 +217,34 @@ impl Quantities for Named {
     }
 }
 
-/// The dimensions of quantities that were declared without a unit, as they are found.
+/// Dimensions of quantities declared without a unit, as inferred so far.
 #[derive(Debug, Clone, Default)]
 pub struct Dimensions {
-    /// Name, and what it was found to be.
+    /// Name and inferred dimension of each.
     unknown: Vec<(String, Option<Open>)>,
 }
 
 impl Dimensions {
-    /// Measure of a quantity without a declared unit; its dimension follows from the terms that it is used with.
+    /// Returns the measure of a quantity without a declared unit; its dimension follows from the terms it is used with.
     pub fn open(&mut self, name: &str) -> Measure {
         self.unknown.push((name.to_owned(), None));
         let dimension = Open { known: Dimension::NONE, unknown: vec![(self.unknown.len() - 1, 1.0)] };
         Measure { dimension, loose: true, ..Measure::pure() }
     }
 
-    /// The dimension of what was measured, with all that is known by now; what is still open counts as a pure number.
+    /// Returns the dimension of a measure as inferred so far; unknown parts count as a pure number.
     pub fn of(&self, measure: &Measure) -> Dimension {
         self.found(&measure.dimension)
     }
 
-    /// An open dimension, with all that is known by now; what is still open counts as a pure number.
+    /// Returns an open dimension as inferred so far; unknown parts count as a pure number.
     pub fn found(&self, dimension: &Open) -> Dimension {
         self.resolved(dimension).known
     }
 
     fn resolved(&self, open: &Open) -> Open {
         let mut resolved = open.clone();
-        // Solved ones lead to others, never in a circle: each is solved by what was unknown then.
+        // Solved ones refer to others without a cycle, since each is solved in terms of those unknown at that time.
         while let Some(at) = resolved.unknown.iter().position(|&(unknown, _)| self.unknown[unknown].1.is_some()) {
             let (unknown, power) = resolved.unknown.swap_remove(at);
             if let Some(found) = &self.unknown[unknown].1 {
@@ -254,7 +254,7 @@ impl Dimensions {
         resolved
     }
 
-    /// Asks for one dimension; whether that can be.
+    /// Requires two dimensions to be equal; returns false if that is impossible.
     fn equal(&mut self, a: &Open, b: &Open) -> bool {
         let mut rest = self.resolved(&a.clone().times(b, -1.0));
         let Some((unknown, power)) = rest.unknown.pop() else { return rest.known.is_none() };
@@ -262,13 +262,13 @@ impl Dimensions {
         true
     }
 
-    /// What an expression measures.
+    /// Returns the measure of an expression.
     ///
     /// # Errors
-    /// The first part that does not fit.
+    /// At the first part whose dimension is wrong.
     pub fn measure<Q: Quantities>(&mut self, quantities: &mut Q, node: &Node) -> Result<Measure, Q::Error> {
         Ok(match &node.form {
-            // Beside an angle pi is in rad.
+            // In a sum with an angle, pi is in rad.
             Form::Number(number) if *number == PI => Measure::pure(),
             Form::Number(number) => {
                 Measure::number(if *number == 0.0 { Bare::Zero } else { Bare::Number(Some(*number)) })
@@ -293,7 +293,7 @@ impl Dimensions {
                         let sign = if *operator == Operator::Add { 1.0 } else { -1.0 };
                         terms.push(Part { measure: self.measure(quantities, node)?, node: Some(node), sign });
                     }
-                    return self.join(quantities, &terms, true, "terms of a sum have one dimension");
+                    return self.join(quantities, &terms, true, "terms of a sum must have the same dimension");
                 }
                 let mut product = self.measure(quantities, first)?;
                 for (operator, factor) in rest {
@@ -305,7 +305,7 @@ impl Dimensions {
             Form::Power(base, exponent) => self.power(quantities, base, exponent)?,
             Form::Call(function, arguments) => self.call(quantities, *function, arguments)?,
             Form::Compare(_, a, b) => {
-                self.alike(quantities, &[a, b], "the sides of a comparison have one dimension")?;
+                self.alike(quantities, &[a, b], "both sides of a comparison must have the same dimension")?;
                 Measure::pure()
             }
             Form::All(conditions) | Form::Any(conditions) => {
@@ -318,7 +318,7 @@ impl Dimensions {
         })
     }
 
-    /// Joint measure of parts of one dimension.
+    /// Returns the joint measure of parts that must have the same dimension.
     fn alike<Q: Quantities>(&mut self, q: &mut Q, parts: &[&Node], rule: &str) -> Result<Measure, Q::Error> {
         let mut measured = Vec::with_capacity(parts.len());
         for part in parts {
@@ -327,10 +327,11 @@ impl Dimensions {
         self.join(q, &measured, false, rule)
     }
 
-    /// Asks that an expression measures what a quantity measures that is not part of it: a rate, a state that is reset.
+    /// Requires an expression to have the dimension of a quantity outside of it, such as a rate or a state that is
+    /// reset.
     ///
     /// # Errors
-    /// The part that does not fit.
+    /// At the part whose dimension is wrong.
     pub fn fits<Q: Quantities>(
         &mut self,
         quantities: &mut Q,
@@ -344,15 +345,15 @@ impl Dimensions {
         self.join(quantities, &[wanted, found], false, rule).map(|_| ())
     }
 
-    /// What the two sides of an equation measure.
+    /// Returns the joint measure of the two sides of an equation.
     ///
     /// # Errors
-    /// The part that does not fit.
+    /// At the part whose dimension is wrong.
     pub fn equate<Q: Quantities>(&mut self, q: &mut Q, sides: [&Node; 2]) -> Result<Measure, Q::Error> {
-        self.alike(q, &sides, "the sides of an equation have one dimension")
+        self.alike(q, &sides, "both sides of an equation must have the same dimension")
     }
 
-    /// Joint measure of parts of one dimension: of a sum, or of things beside each other.
+    /// Returns the joint measure of parts with the same dimension, of a sum or otherwise.
     fn join<Q: Quantities>(
         &mut self,
         q: &mut Q,
@@ -387,7 +388,8 @@ impl Dimensions {
             joined.loose &= part.loose;
             joined.foreign = joined.foreign.or_else(|| part.foreign.clone());
         }
-        // One in K less one in degC is a difference: who takes a scale of temperature away has one to take it from.
+        // A temperature in K minus one in degC is a difference: the subtracted zero of the scale belongs to the first
+        // one.
         let in_kelvin = parts.iter().any(|part| part.measure.bare == Bare::No && !part.measure.is_temperature());
         if is_sum && joined.zeros < 0.0 && in_kelvin {
             joined.zeros = 0.0;
@@ -407,7 +409,8 @@ impl Dimensions {
                 }
                 (Some(foreign), Bare::No) if part.loose => {
                     let (name, unit) = &**foreign;
-                    let fact = format!("a quantity without a declared unit beside {}, which is in {unit}", named(name));
+                    let fact =
+                        format!("a quantity without a declared unit next to {}, which is in {unit}", named(name));
                     let help = format!("declare its unit, such as {unit}");
                     return Err(q.refuse(Conflict { span: node.span.clone(), fact, help }));
                 }
@@ -417,7 +420,7 @@ impl Dimensions {
         Ok(joined)
     }
 
-    /// Two parts that do not measure the same.
+    /// Returns the conflict between two parts of different dimension.
     fn unlike(&self, first: &Measure, part: &Measure, span: Range<usize>, rule: &str) -> Conflict {
         let unit = |measure: &Measure| {
             let open = self.resolved(&measure.dimension);
@@ -434,18 +437,18 @@ impl Dimensions {
             (own, "1") => format!("expected a pure number, found a quantity in {own}"),
             (own, other) => format!("expected a quantity in {other}, found one in {own}"),
         };
-        Conflict { span, fact, help: format!("{rule}; a number with a unit is written 9.81 [m/s2]") }
+        Conflict { span, fact, help: format!("{rule}; write a number with a unit as 9.81 [m/s2]") }
     }
 
-    /// A number beside a quantity that is declared in another than the coherent unit.
+    /// Returns the conflict between a number and a quantity that is not declared in the coherent unit.
     fn beside(&self, joined: &Measure, node: &Node, (name, unit): &(String, Unit)) -> Conflict {
-        let fact = format!("a number without a unit beside {}, which is in {unit}", named(name));
+        let fact = format!("a number without a unit next to {}, which is in {unit}", named(name));
         let place = literals(node).into_iter().next();
         let (number, span) = place.unwrap_or_else(|| ("0".to_owned(), node.span.clone()));
         let dimension = self.of(joined);
         let help = if joined.is_temperature() {
             let difference = unit.difference();
-            format!("write {number} [{unit}] for a temperature, {number} [{difference}] for a difference of two")
+            format!("write {number} [{unit}] for a temperature, {number} [{difference}] for a temperature difference")
         } else if dimension.is_none() && unit.dimension().is_none() {
             let pure = if unit.is_angle() { "rad" } else { "1" };
             format!("write {number} [{unit}] or {number} [{pure}]")
@@ -458,7 +461,7 @@ impl Dimensions {
 
     fn power<Q: Quantities>(&mut self, q: &mut Q, base: &Node, exponent: &Node) -> Result<Measure, Q::Error> {
         let of = self.measure(q, base)?;
-        self.fits(q, &Measure::pure(), exponent, "an exponent is a pure number")?;
+        self.fits(q, &Measure::pure(), exponent, "an exponent must be a pure number")?;
         if let Some(value) = constant(exponent, q) {
             let one = Measure::number(of.bare);
             return Ok(Measure { loose: of.loose, ..one.times(&of, value) });
@@ -485,31 +488,31 @@ impl Dimensions {
                 Measure::number(if of.bare == Bare::No { Bare::No } else { Bare::Number(None) })
             }
             Function::Min | Function::Max => {
-                self.alike(q, &all, &format!("the arguments of `{}` have one dimension", function.name()))?
+                self.alike(q, &all, &format!("the arguments of `{}` must have the same dimension", function.name()))?
             }
             Function::Clip | Function::Deadzone => self.alike(
                 q,
                 &all,
-                &format!("the limits of `{}` have the dimension of what it limits", function.name()),
+                &format!("the limits of `{}` must have the dimension of its first argument", function.name()),
             )?,
             Function::Atan2 => {
-                self.alike(q, &all, "the arguments of `atan2` have one dimension")?;
+                self.alike(q, &all, "the arguments of `atan2` must have the same dimension")?;
                 Measure::pure()
             }
             Function::Table => {
                 let places: Vec<&Node> = std::iter::once(all[0]).chain(all[1..].iter().copied().step_by(2)).collect();
-                self.alike(q, &places, "the argument and the x of a `table` have one dimension")?;
+                self.alike(q, &places, "the argument and the x of a `table` must have the same dimension")?;
                 let values: Vec<&Node> = all[2..].iter().copied().step_by(2).collect();
-                self.alike(q, &values, "the y of a `table` have one dimension")?
+                self.alike(q, &values, "the y of a `table` must have the same dimension")?
             }
             Function::If => {
-                let (otherwise, pairs) = all.split_last().expect("the reader asks for three arguments");
+                let (otherwise, pairs) = all.split_last().expect("the parser requires three arguments");
                 for condition in pairs.iter().step_by(2) {
                     self.measure(q, condition)?;
                 }
                 let branches: Vec<&Node> =
                     pairs.iter().skip(1).step_by(2).chain(std::iter::once(otherwise)).copied().collect();
-                self.alike(q, &branches, "the branches of an `if` have one dimension")?
+                self.alike(q, &branches, "the branches of an `if` must have the same dimension")?
             }
             _ => {
                 let of = self.measure(q, all[0])?;
@@ -525,14 +528,14 @@ impl Dimensions {
     }
 }
 
-/// A part of a sum, or of things of one dimension; without a node where it is no part of the expression.
+/// Part of a sum or of a comparison of dimensions; without a node if it is outside of the expression.
 struct Part<'n> {
     measure: Measure,
     node: Option<&'n Node>,
     sign: f64,
 }
 
-/// A quantity in a sentence; a number with its unit is no name.
+/// Formats a quantity for a sentence; a number with its unit has no name.
 fn named(name: &str) -> String {
     if name.contains('[') && name.ends_with(']') && name.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
         return "a number".to_owned();
@@ -540,7 +543,7 @@ fn named(name: &str) -> String {
     format!("`{name}`")
 }
 
-/// The numbers in an expression that has no unit, as they are shown, with their places; 0 is none.
+/// Returns the numbers of an expression without a unit, as shown to the user, with their positions; 0 is omitted.
 fn literals(node: &Node) -> Vec<(String, Range<usize>)> {
     let all = |nodes: Vec<&Node>| nodes.into_iter().flat_map(literals).collect();
     let mut has_names = false;
@@ -558,7 +561,7 @@ fn literals(node: &Node) -> Vec<(String, Range<usize>)> {
     }
 }
 
-/// The value of an expression of numbers and constants.
+/// Returns the value of an expression of numbers and constants.
 fn constant<Q: Quantities>(node: &Node, quantities: &Q) -> Option<f64> {
     let mut fixed = true;
     node.walk(&mut |node| {

@@ -1,4 +1,4 @@
-//! What a study file says, apart from how it is written; and the data files it reads.
+//! Contents of a study file, independent of its layout, and the data files it reads.
 
 use std::cell::RefCell;
 use std::io;
@@ -8,7 +8,7 @@ use toml::de::DeValue;
 
 use super::Files;
 
-/// A value of the file, settings included.
+/// Returns a value of the file, settings included.
 pub(super) fn of(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::from(text.as_ref()),
@@ -20,7 +20,7 @@ pub(super) fn of(value: &DeValue<'_>) -> Value {
             let digits = number.as_str().replace('_', "");
             match digits.parse::<f64>().ok().and_then(serde_json::Number::from_f64) {
                 Some(number) => Value::Number(number),
-                // Infinity and what is no number have no other form.
+                // Infinity and NaN have no other form.
                 None => Value::from(digits),
             }
         }
@@ -33,7 +33,7 @@ pub(super) fn of(value: &DeValue<'_>) -> Value {
     }
 }
 
-/// Data files that are listed as they are read.
+/// Data files, recorded as they are read.
 pub(super) struct Listed<'f> {
     inner: &'f dyn Files,
     read: RefCell<Vec<(String, String)>>,
@@ -44,7 +44,7 @@ impl<'f> Listed<'f> {
         Self { inner, read: RefCell::default() }
     }
 
-    /// The files read so far, each once, with a digest of its bytes.
+    /// Returns the files read so far, each once, with a digest of its bytes.
     pub fn digests(&self) -> Vec<(String, String)> {
         self.read.borrow().clone()
     }
@@ -65,7 +65,7 @@ impl Files for Listed<'_> {
     }
 }
 
-/// FNV-1a of 128 bits, in hexadecimal: files that differ by accident have other ones.
+/// Returns the 128-bit FNV-1a hash, in hexadecimal, to detect accidental differences between files.
 ///
 /// Source: G. Fowler, L. C. Noll, K.-P. Vo, The FNV non-cryptographic hash algorithm, IETF draft (2019).
 pub fn digest(bytes: &[u8]) -> String {

@@ -9,7 +9,7 @@ use crate::diagnostic::Diagnostic;
 use crate::model::Model;
 use crate::placement::EffectDraft;
 
-/// The model with the effects of the table.
+/// Returns the model with the effects of the table.
 pub(super) fn add(
     catalogue: &Catalogue,
     model: Box<dyn Model>,

@@ -1,4 +1,4 @@
-//! Shapes of options that kinds may use: tables with any keys, and texts that are short for a table.
+//! Option types for kinds: tables with arbitrary keys, and strings as a short form of tables.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 
-/// A table with any keys, in the order of the file.
+/// A table with arbitrary keys, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entries<T>(pub Vec<(String, T)>);
 
@@ -49,7 +49,7 @@ impl<T: JsonSchema> JsonSchema for Entries<T> {
     }
 }
 
-/// A text that is short for a table, or the table: `"rad"` for `{ unit = "rad" }`.
+/// A table, or a string as its short form: `"rad"` for `{ unit = "rad" }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Short<T>(pub T);
 
@@ -59,7 +59,7 @@ impl<'de, T: Deserialize<'de> + From<String>> Deserialize<'de> for Short<T> {
         impl<'de, T: Deserialize<'de> + From<String>> Visitor<'de> for Either<T> {
             type Value = Short<T>;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a text or a table")
+                f.write_str("a string or a table")
             }
             fn visit_str<E>(self, text: &str) -> Result<Short<T>, E> {
                 Ok(Short(T::from(text.to_owned())))

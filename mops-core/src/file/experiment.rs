@@ -33,9 +33,9 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         let (values, unit) = table.input(&place, &column.0)?;
         if column.0.hold.is_none() && values.looks_smooth() {
             warnings.push(format!(
-                "input `{input}` of `{name}` looks smooth, and is held between its samples: if it was not, \
-                 hold = \"first\" is right, or \"band-limited\" where it was filtered before it was sampled \
-                 (hold = \"zero\" says that it was held, and ends this warning)"
+                "input `{input}` of `{name}` looks smooth, but is constant between its samples: use hold = \"first\" for \
+                 linear interpolation, \"band-limited\" for an input filtered before sampling, or \
+                 hold = \"zero\" to confirm and suppress this warning"
             ));
         }
         inputs.push((input.clone(), values, unit));
@@ -69,7 +69,7 @@ fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diag
             _ => format!("the data file `{shown}` cannot be read: {error}"),
         };
         let place = node.child("file").expect("it was just read");
-        place.diagnostic(why).with_help("paths count from the folder of the study file")
+        place.diagnostic(why).with_help("paths are relative to the folder of the study file")
     })?;
     DataFile::parse(&files.show(path), bytes)
 }
@@ -79,12 +79,12 @@ struct Table<'f> {
     file: &'f DataFile,
     /// Name of the time column.
     time: String,
-    /// Times of all rows, s, as the study counts them.
+    /// Times of all rows, s, in the time of the study.
     times: Vec<f64>,
-    /// Rows of which measurements are used.
+    /// Rows used for measurements.
     rows: Range<usize>,
-    /// Rows of which inputs are used: from the start of the simulation on, which may be before the first measurement. None where
-    /// the file begins after the start of the simulation.
+    /// Rows used for inputs: from the start of the simulation on, which may precede the first measurement. `None` if the
+    /// file starts after the start of the simulation.
     driven: Option<Range<usize>>,
 }
 
@@ -96,7 +96,7 @@ impl<'f> Table<'f> {
             None => file.time_column().ok_or_else(|| {
                 place
                     .diagnostic("no column of the file is called `t` or `time`".to_owned())
-                    .with_help(format!("say which: time = \"...\"; the file has {}", file.column_names().join(", ")))
+                    .with_help(format!("set time = \"...\" to one of {}", file.column_names().join(", ")))
             })?,
         };
         let column = column_at(&place, file, &time)?;
@@ -108,8 +108,8 @@ impl<'f> Table<'f> {
         let factor = unit.factor_to(&Unit::known("s")).ok_or_else(|| {
             let place = node.child("time-unit").unwrap_or(place);
             place
-                .diagnostic(format!("the time column `{time}` is in `{unit}`, which is no unit of time"))
-                .with_help("say which it is: time-unit = \"s\"")
+                .diagnostic(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
+                .with_help("set time-unit = \"s\"")
         })?;
         let times: Vec<f64> = column.values.iter().map(|t| t * factor).collect();
         let skip = section.skip.min(times.len());
@@ -127,14 +127,18 @@ impl<'f> Table<'f> {
                 _ if to.is_some() => "to",
                 _ => "file",
             };
-            let left = if first + 1 == last { "one sample is left" } else { "no sample is left" };
+            let left = if first + 1 == last { "one" } else { "none" };
             let all = format!("{} samples, from {} to {} s", times.len(), times[0], times[times.len() - 1]);
-            return Err(at_key(node, key, format!("{left} of `{}`, and two are needed", file.source.name))
-                .with_help(format!("the file has {all}")));
+            return Err(at_key(
+                node,
+                key,
+                format!("expected at least two samples of `{}`, found {left}", file.source.name),
+            )
+            .with_help(format!("the file has {all}")));
         }
         let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
         let times: Vec<f64> = times.iter().map(|t| t - origin).collect();
-        // The simulation begins at 0 s: what holds there is what the last row before says.
+        // The simulation starts at 0 s: inputs there are taken from the last row before.
         let driven = times[skip..last].partition_point(|&t| t <= 0.0).checked_sub(1).map(|row| skip + row..last);
         Ok(Self { file, time, times, rows: first..last, driven })
     }
@@ -156,18 +160,18 @@ impl<'f> Table<'f> {
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
         let Some(rows) = self.driven.clone() else {
             let first = self.times[self.rows.start];
-            let fact = format!("the simulation begins at 0 s, and `{}` is not known before {first} s", table.column);
-            return Err(place.diagnostic(fact).with_help(
-                "leave out `reset-time = false`, so that the simulation begins at the first sample; or record the input from 0 s on",
-            ));
+            let fact = format!("the simulation starts at 0 s, but `{}` is unknown before {first} s", table.column);
+            return Err(place
+                .diagnostic(fact)
+                .with_help("omit `reset-time = false` to start at the first sample, or record the input from 0 s on"));
         };
         let (times, values) = (self.times[rows.clone()].to_vec(), values[rows.clone()].to_vec());
         if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
-            let fact = format!("the input column `{}` has a gap at {} s", table.column, times[gap]);
+            let fact = format!("the input column `{}` has a missing sample at {} s", table.column, times[gap]);
             return Err(self
                 .at(&table.column, rows.start + gap, &fact)
                 .unwrap_or_else(|| place.diagnostic(fact))
-                .with_help("an input must be known throughout: fill the gap, or cut it off with `from` and `to`"));
+                .with_help("an input has no missing samples: add the sample, or cut it off with `from` and `to`"));
         }
         Ok((Input::Sampled { times, values, hold: table.hold.unwrap_or_default() }, unit))
     }
@@ -186,11 +190,11 @@ impl<'f> Table<'f> {
         if column.values.len() != time_rows {
             return Err(at
                 .diagnostic(format!(
-                    "`{name}` has {} samples, the time `{}` has {time_rows}",
+                    "`{name}` has {} samples, but the time column `{}` has {time_rows}",
                     column.values.len(),
                     self.time
                 ))
-                .with_help("say which column is its time with `time`, in an experiment of its own if need be"));
+                .with_help("set the matching time column with `time`, if necessary in a separate experiment"));
         }
         let unit = match (unit, column.unit) {
             (Some(unit), _) => Some(read_unit(place, "unit", unit)?),
@@ -201,26 +205,26 @@ impl<'f> Table<'f> {
         let offset = match (offset, &unit) {
             (None, _) => 0.0,
             (Some(q), Some(unit)) => q.to(&unit.difference()).map_err(|why| {
-                at_key(place, "offset", why).with_help(format!("a number without a unit counts in `{unit}`"))
+                at_key(place, "offset", why).with_help(format!("a number without a unit is in `{unit}`"))
             })?,
             (Some(q), None) => q.number,
         };
         Ok((column.values.iter().map(|v| scale * v + offset).collect(), unit))
     }
 
-    /// A mistake in a cell of a CSV file.
+    /// Returns an error located in a cell of a CSV file.
     fn at(&self, column: &str, row: usize, fact: &str) -> Option<Diagnostic> {
         let span = self.file.span_of(column, row);
         (span != (0..0)).then(|| Diagnostic::new(fact).at(&self.file.source, span))
     }
 }
 
-/// A bare number of a channel counts in the unit of its column, as `offset` does.
+/// Returns the quantity of a channel with the unit of its column if it has none, as for `offset`.
 fn in_unit_of_column(quantity: &Quantity, unit: Option<&Unit>) -> Quantity {
     Quantity { unit: quantity.unit.clone().or(unit.cloned()), ..quantity.clone() }
 }
 
-/// A column, with the study's place where the file does not have it.
+/// Returns a column; an error for a missing one has the location in the study.
 pub(super) fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Column<'f>, Diagnostic> {
     file.column(name).map_err(|error| {
         let located = place.diagnostic(error.message);
@@ -228,7 +232,7 @@ pub(super) fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) ->
     })
 }
 
-/// The unit that the header of the file gives a column; `key` says it in the study.
+/// Returns the unit of a column from the header of the file; `key` overrides it in the study.
 pub(super) fn unit_of_header(
     place: &Node<'_>,
     file: &DataFile,
@@ -239,12 +243,12 @@ pub(super) fn unit_of_header(
     Unit::parse(unit).map_err(|_| {
         let name = &file.source.name;
         place
-            .diagnostic(format!("the header of {name} gives `{column}` the unit `{unit}`, which is not known"))
-            .with_help(format!("say here which it is, as in {key} = \"...\"; {UNIT_HELP}"))
+            .diagnostic(format!("unknown unit `{unit}` of `{column}` in the header of {name}"))
+            .with_help(format!("set {key} = \"...\" here; {UNIT_HELP}"))
     })
 }
 
-/// Times from row `skip` on must be there and increase.
+/// Checks that the times from row `skip` on exist and increase.
 fn check_times(file: &DataFile, column: &str, times: &[f64], skip: usize) -> Result<(), Diagnostic> {
     let wrong = |row: usize, message: String, way_out: &str| {
         let source: &Arc<Source> = &file.source;
@@ -252,8 +256,8 @@ fn check_times(file: &DataFile, column: &str, times: &[f64], skip: usize) -> Res
     };
     let used = &times[skip..];
     if let Some(row) = used.iter().position(|t| !t.is_finite()) {
-        let fact = format!("sample {} has no time: `{column}` has a gap there", skip + row + 1);
-        return wrong(skip + row, fact, "delete the row; wrong ones at the start are dropped with `skip`");
+        let fact = format!("sample {} has no value in the time column `{column}`", skip + row + 1);
+        return wrong(skip + row, fact, "delete the row; `skip` drops wrong rows at the start");
     }
     match used.windows(2).position(|pair| pair[1] <= pair[0]) {
         Some(row) => wrong(
@@ -264,7 +268,7 @@ fn check_times(file: &DataFile, column: &str, times: &[f64], skip: usize) -> Res
                 used[row + 1],
                 used[row]
             ),
-            "sort the rows, and delete what is there twice; wrong ones at the start are dropped with `skip`",
+            "sort the rows and delete duplicates; `skip` drops wrong rows at the start",
         ),
         None => Ok(()),
     }

@@ -11,7 +11,7 @@ use crate::math;
 use crate::study::{CaseDraft, Measured};
 use crate::unit::Unit;
 
-/// Reads an experiment over frequency.
+/// Reads an experiment with frequency responses.
 pub(super) fn read(
     name: String,
     node: &Node<'_>,
@@ -22,14 +22,14 @@ pub(super) fn read(
         if let (true, Some(place)) = (is_there, node.child(key)) {
             return Err(place
                 .key_diagnostic(format!("`{key}` are measured over time, `responses` over frequency"))
-                .with_help("make an experiment of its own for each"));
+                .with_help("use separate experiments"));
         }
     }
     let Some(column) = &section.frequency else {
         let place = node.child("responses").expect("it was just read");
         return Err(place
-            .key_diagnostic("nothing says at which frequencies the responses were measured".to_owned())
-            .with_help("name the column: frequency = \"...\""));
+            .key_diagnostic("the responses have no frequency column".to_owned())
+            .with_help("set frequency = \"...\" to the name of the column"));
     };
     let place = node.child("frequency").expect("it was just read");
     let frequencies = frequencies(node, &place, column, &section, file)?;
@@ -39,7 +39,7 @@ pub(super) fn read(
         let (values, unit) = values(&place, table, file)?;
         if values.len() != frequencies.len() {
             let fact = format!(
-                "the response has {} samples, the frequency `{column}` has {}",
+                "the response has {} samples, but the frequency column `{column}` has {}",
                 values.len(),
                 frequencies.len()
             );
@@ -49,8 +49,8 @@ pub(super) fn read(
         let (frequencies, values): (Vec<f64>, Vec<[f64; 2]>) = kept.map(|(f, v)| (*f, *v)).unzip();
         if frequencies.is_empty() {
             return Err(place
-                .key_diagnostic(format!("every sample of `{signal}` is a gap"))
-                .with_help("take other columns"));
+                .key_diagnostic(format!("all samples of `{signal}` are missing"))
+                .with_help("choose other columns"));
         }
         responses.push(ResponseData { signal: signal.clone(), frequencies, values, unit });
     }
@@ -58,7 +58,7 @@ pub(super) fn read(
     Ok(CaseDraft { name, parameters: section.parameters.0, measured: Some(measured), ..CaseDraft::default() })
 }
 
-/// The frequencies, rad/s.
+/// Returns the frequencies, rad/s.
 fn frequencies<'t>(
     node: &Node<'t>,
     place: &Node<'t>,
@@ -75,35 +75,34 @@ fn frequencies<'t>(
     let factor = unit.factor_to(&Unit::known("rad/s")).ok_or_else(|| {
         let place = node.child("frequency-unit").unwrap_or_else(|| place.clone());
         place
-            .diagnostic(format!("the frequency column `{name}` is in `{unit}`, which is no unit of frequency"))
-            .with_help("say which it is: frequency-unit = \"Hz\"")
+            .diagnostic(format!("the frequency column `{name}` is in `{unit}`, which is not a unit of frequency"))
+            .with_help("set frequency-unit = \"Hz\"")
     })?;
     if let Some(row) = column.values.iter().position(|f| !(f.is_finite() && *f >= 0.0)) {
         let fact = format!("sample {} of the frequency `{name}` is {}", row + 1, column.values[row]);
         return Err(Diagnostic::new(fact)
-            .with_help("frequencies are numbers from 0 up: delete the row, or correct it")
+            .with_help("frequencies must be finite and not negative: delete or correct the row")
             .at(&file.source, file.span_of(name, row)));
     }
     Ok(column.values.iter().map(|f| f * factor).collect())
 }
 
-/// The unit that the header gives a real or imaginary part or a magnitude; `None` for 1, which is that of the model.
+/// Returns the unit in the header of a real or imaginary part or a magnitude. `None` for no unit, or for 1, which is the unit
+/// of the model.
 fn unit_of(place: &Node<'_>, file: &DataFile, name: &str, unit: Option<&str>) -> Result<Option<Unit>, Diagnostic> {
     let Some(unit) = unit else { return Ok(None) };
     let parsed = Unit::parse(unit).map_err(|_| {
         let source = &file.source.name;
         place
-            .diagnostic(format!("the header of {source} gives `{name}` the unit `{unit}`, which is not known"))
-            .with_help(
-                "a response is in dB, in the unit of the output over that of the input, or has no unit in the header",
-            )
+            .diagnostic(format!("unknown unit `{unit}` of `{name}` in the header of {source}"))
+            .with_help("use dB, the unit of the output divided by that of the input, or no unit in the header")
     })?;
     Ok((parsed.factor_to(&Unit::one()) != Some(1.0)).then_some(parsed))
 }
 
 type Values = (Vec<[f64; 2]>, Option<Unit>);
 
-/// Real and imaginary parts, and their unit.
+/// Returns real and imaginary parts, and their unit.
 fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Values, Diagnostic> {
     let at = |key: &str| place.child(key).expect("it was just read");
     match (&table.real, &table.imaginary, &table.magnitude, &table.phase) {
@@ -114,7 +113,7 @@ fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Va
             let unit = unit_of(&at("real"), file, names.0, real.unit)?;
             if unit != unit_of(&at("imaginary"), file, names.1, imaginary.unit)? {
                 return Err(place
-                    .key_diagnostic(format!("`{}` and `{}` are not in the same unit", names.0, names.1))
+                    .key_diagnostic(format!("`{}` and `{}` have different units", names.0, names.1))
                     .with_help("correct the units in the header of the file"));
             }
             Ok((real.values.iter().zip(imaginary.values).map(|(&re, &im)| [re, im]).collect(), unit))
@@ -130,8 +129,8 @@ fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Va
             };
             let factor = unit.factor_to(&Unit::known("rad")).ok_or_else(|| {
                 at("phase")
-                    .diagnostic(format!("the phase column `{phase}` is in `{unit}`, which is no unit of an angle"))
-                    .with_help("take another column, or correct the unit in the header of the file")
+                    .diagnostic(format!("the phase column `{phase}` is in `{unit}`, which is not a unit of angle"))
+                    .with_help("choose another column, or correct the unit in the header of the file")
             })?;
             let polar = |(&size, &angle): (&f64, &f64)| {
                 let size = if decibel { math::powf(10.0, size / 20.0) } else { size };
@@ -141,7 +140,9 @@ fn values(place: &Node<'_>, table: &ResponseTable, file: &DataFile) -> Result<Va
             Ok((size.values.iter().zip(angle.values).map(polar).collect(), in_unit))
         }
         _ => Err(place
-            .key_diagnostic("a frequency response has a real and an imaginary part, or magnitude and phase".to_owned())
+            .key_diagnostic(
+                "a frequency response needs a real and an imaginary part, or magnitude and phase".to_owned(),
+            )
             .with_help("as in { magnitude = \"mag\", phase = \"ph\" }, or { real = \"re\", imaginary = \"im\" }")),
     }
 }
@@ -177,7 +178,7 @@ mod tests {
         let data = "f [Hz],m [dB],p [deg],re,im\n1,20,90,0,10\n2,0,,1,0\n3,-20,180,-0.1,0\n";
         let polar = responses("frequency = 'f'\nresponses = { y = { magnitude = 'm', phase = 'p' } }", data).unwrap();
         let parts = responses("frequency = 'f'\nresponses = { y = { real = 're', imaginary = 'im' } }", data).unwrap();
-        assert_eq!((polar[0].values.len(), parts[0].values.len()), (2, 3), "a gap is left out");
+        assert_eq!((polar[0].values.len(), parts[0].values.len()), (2, 3), "a missing sample is omitted");
         assert!((polar[0].frequencies[1] - 6.0 * std::f64::consts::PI).abs() < 1e-12);
         for (a, b) in polar[0].values.iter().zip([parts[0].values[0], parts[0].values[2]]) {
             assert!((a[0] - b[0]).abs() < 1e-12 && (a[1] - b[1]).abs() < 1e-12, "{a:?} {b:?}");
@@ -196,15 +197,15 @@ mod tests {
         assert_eq!(unit("mrad/(N m)", false), Ok(Some("mrad/(N m)".to_owned())));
         assert_eq!((unit("1", false), unit("dB", false), unit("volts", true)), (Ok(None), Ok(None), Ok(None)));
         let unknown = unit("volts", false).unwrap_err();
-        assert!(unknown.contains("gives `m` the unit `volts`, which is not known"), "{unknown}");
+        assert!(unknown.contains("unknown unit `volts` of `m` in the header of"), "{unknown}");
     }
 
     #[test]
-    fn what_is_missing_or_wrong_is_told_at_its_place() {
+    fn missing_or_wrong_entries_are_reported_at_their_location() {
         let data = "f [m],re,im\n1,0,10\n-2,1,0\n";
         let wrong = |experiment: &str| responses(experiment, data).unwrap_err();
         let both = "responses = { y = { real = 're', imaginary = 'im' } }";
-        assert!(wrong(both).contains("study.toml:3:1: nothing says at which frequencies"), "{}", wrong(both));
+        assert!(wrong(both).contains("study.toml:3:1: the responses have no frequency column"), "{}", wrong(both));
         let length = wrong(&format!("frequency = 'f'\n{both}"));
         assert!(length.contains("study.toml:3:13: the frequency column `f` is in `m`"), "{length}");
         let negative = wrong(&format!("frequency = 'f'\nfrequency-unit = 'Hz'\n{both}"));

@@ -1,5 +1,5 @@
-//! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types; the second
-//! ([`crate::Draft::build`]) checks what the words mean, and its mistakes are led back to their positions.
+//! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types. The second
+//! ([`crate::Draft::build`]) checks the contents; its errors are mapped back to their positions.
 
 mod built;
 mod content;
@@ -41,15 +41,15 @@ use crate::unit::{Quantity, Unit};
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
 
-/// Where data files come from: a folder, or the program itself.
+/// Source of data files: a folder, or the program itself.
 pub trait Files {
-    /// The bytes of a file, by its path as the study names it.
+    /// Reads a file, by its path in the study.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// Returns an error if the file cannot be read.
     fn read(&self, path: &str) -> io::Result<Vec<u8>>;
 
-    /// The path as it is shown to the user.
+    /// Returns the path as shown to the user.
     fn show(&self, path: &str) -> String;
 }
 
@@ -102,23 +102,23 @@ impl Study {
 
 /// A study file, read and checked.
 pub struct StudyFile {
-    /// The study.
+    /// Study.
     pub study: Study,
-    /// The solver it names, or the first of the catalogue.
+    /// Solver of the study, or the first of the catalogue.
     pub solver: SolverChoice,
-    /// Largest number of points evaluated, where the study limits it.
+    /// Maximum number of evaluated points, if the study limits it.
     pub max_evaluations: Option<usize>,
-    /// Its text, with the settings of the command line at the end.
+    /// Text of the file, with the settings of the command line appended.
     pub source: Arc<Source>,
-    /// What it says, settings included, without comments and layout.
+    /// Contents of the file, settings included, without comments and layout.
     pub content: serde_json::Value,
-    /// The data files that were read, by the names the study has for them, with a digest of their bytes.
+    /// Data files that were read: names as in the study, and digests of their bytes.
     pub data: Vec<(String, String)>,
     text: Arc<Text>,
 }
 
 impl StudyFile {
-    /// Leads a mistake that showed only when the study was run back to its place in the text.
+    /// Returns the diagnostic of an error that occurred when the study was run, with its location in the text.
     pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
         match self.text.parse() {
             Ok(root) => self.text.settle(root.locate(mistake)),
@@ -127,10 +127,10 @@ impl StudyFile {
     }
 }
 
-/// Reads a study file; `settings` are `key=value` pairs that go over it.
+/// Reads a study file; `settings` are `key=value` pairs that override it.
 ///
 /// # Errors
-/// The first mistake: with file, line and column, the fact and the way out.
+/// Returns the first error, with file, line and column, description and suggested fix.
 pub fn read(
     catalogue: &Catalogue,
     name: &str,
@@ -193,7 +193,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     })
 }
 
-/// The one key of a table that is not among the common ones, as a kind of the catalogue.
+/// Returns the only key of a table that is not a common one, as a kind of the catalogue.
 fn kind<'t, 'k, K>(
     node: &Node<'t>,
     common: &[&'static str],
@@ -216,18 +216,18 @@ fn kind<'t, 'k, K>(
         if found.is_some() {
             let article = if what.starts_with('e') { "an" } else { "a" };
             return Err(value
-                .key_diagnostic(format!("{article} {what} is of one kind, but two are named"))
-                .with_help("remove one"));
+                .key_diagnostic(format!("{article} {what} has one kind, but two are given"))
+                .with_help("remove one of them"));
         }
         found = Some((kind, value));
     }
     found.ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(name_of).collect();
-        // Long lists are a page of their own.
+        // Long lists have their own page.
         let help = if names.len() > 40 {
-            "`mops list` has their names".to_owned()
+            "`mops list` shows the kinds".to_owned()
         } else {
-            format!("name one of: {}", names.join(", "))
+            format!("use one of: {}", names.join(", "))
         };
         node.key_diagnostic(format!("the {what} has no kind")).with_help(help)
     })
@@ -270,7 +270,7 @@ fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
     })
 }
 
-/// Which units there are.
+/// Help on units.
 const UNIT_HELP: &str =
     "units are s, ms, min, Hz, m, kg, rad, deg, N, V, A and the like, and products such as \"kg m2\" or \"N m s/rad\"";
 
@@ -278,7 +278,7 @@ fn read_unit(node: &Node<'_>, key: &str, text: &str) -> Result<Unit, Diagnostic>
     Unit::parse(text).map_err(|why| at_key(node, key, why).with_help(UNIT_HELP))
 }
 
-/// A mistake in the value under a key, or in the value itself where there is no such key.
+/// Returns an error in the value under a key, or in the value itself if there is no such key.
 fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
     node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
@@ -298,7 +298,7 @@ fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelDraft)]) -> 
         let known = models.iter().flat_map(|(_, draft)| &draft.model.interface().inputs);
         let input = match known.into_iter().find(|v| v.name == *name) {
             Some(v) => section.input(&v.unit).map_err(|mistake| node.locate(&mistake.within(name).within("inputs")))?,
-            // Refused when the study is built.
+            // Rejected when the study is built.
             None => Input::Constant(0.0),
         };
         inputs.push((name.clone(), input, None));
@@ -309,7 +309,7 @@ fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelDraft)]) -> 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
     let second = Unit::known("s");
     quantity
-        .map(|q| q.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit counts in s")))
+        .map(|q| q.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit is in s")))
         .transpose()
 }
 
@@ -329,7 +329,7 @@ fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionDra
     })
 }
 
-/// A criterion of a study file: its mistakes stand under the name of its kind.
+/// A criterion of a study file; its errors are located under the name of its kind.
 struct Located {
     inner: Box<dyn crate::criterion::CriterionSpec>,
     kind: &'static str,
@@ -356,8 +356,8 @@ fn read_solver(catalogue: &Catalogue, root: &Node<'_>) -> Result<(SolverChoice, 
     if common.max_evaluations == Some(0) {
         let place = node.child("max-evaluations").expect("it was read");
         return Err(place
-            .diagnostic("a run needs at least one evaluation".to_owned())
-            .with_help("leave `max-evaluations` out for its default"));
+            .diagnostic("expected at least 1 evaluation, found 0".to_owned())
+            .with_help("omit `max-evaluations` for the default"));
     }
     if node.entries()?.iter().all(|(key, _)| SolverCommon::KEYS.contains(&key.as_str())) {
         return Ok((default(), common.max_evaluations));

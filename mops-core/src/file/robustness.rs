@@ -1,5 +1,5 @@
-//! The tables of uncertain parameters in a study file, and of the tasks over them: `[uncertain]`, `[worst-case]`,
-//! `[monte-carlo]`, `[robust]`; and `[uncertainty]`, of the estimates of a calibration.
+//! Tables of uncertain parameters in a study file, and of the tasks over them: `[uncertain]`, `[worst-case]`, `[monte-carlo]`
+//! and `[robust]`. `[uncertainty]` is for the estimates of a calibration.
 
 use schemars::JsonSchema;
 
@@ -13,8 +13,8 @@ use crate::study::{
 };
 use crate::unit::Quantity;
 
-/// A parameter of models, or a tuner, that is not known exactly. Without a distribution its values lie evenly between `min`
-/// and `max`; with one, the bounds cut off what lies outside.
+/// An uncertain parameter of models, or an uncertain tuner. Without a distribution its values are uniform between `min` and
+/// `max`; with one, the distribution is truncated at the bounds.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct UncertainSection {
@@ -22,15 +22,16 @@ pub(super) struct UncertainSection {
     pub min: Option<Quantity>,
     /// Largest value.
     pub max: Option<Quantity>,
-    /// Of a tuner: the share of the design's value by which it may be off, either way, instead of `min` and `max`; 0.05 is
+    /// Largest relative deviation of a tuner from its design value, in both directions, instead of `min` and `max`; 0.05 is
     /// 5 %.
     pub tolerance: Option<f64>,
-    /// `{ mean = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.2] }`: 95 % of the values lie in it.
+    /// Normal distribution: `{ mean = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.2] }` with the central interval that
+    /// contains 95 % of the values.
     pub normal: Option<NormalTable>,
-    /// `{ median = 1.0, deviation = 0.1 }`, the deviation being that of the natural logarithm, or
-    /// `{ interval = [0.8, 1.25] }`: 95 % of the values lie in it.
+    /// Log-normal distribution: `{ median = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.25] }` with the central interval
+    /// that contains 95 % of the values. `deviation` is the standard deviation of the natural logarithm.
     pub log_normal: Option<LogNormalTable>,
-    /// `{ mode = 1.0 }`: a triangle from `min` over the mode to `max`.
+    /// Triangular distribution between `min` and `max`: `{ mode = 1.0 }` is its peak.
     pub triangular: Option<TriangularTable>,
 }
 
@@ -42,11 +43,11 @@ pub(super) struct NormalTable {
     pub mean: Option<Quantity>,
     /// Standard deviation.
     pub deviation: Option<Quantity>,
-    /// Two values between which 95 % of all lie, instead of mean and deviation.
+    /// Interval that contains 95 % of the values, instead of mean and deviation.
     pub interval: Option<[Quantity; 2]>,
 }
 
-/// A distribution whose logarithm is normal.
+/// A log-normal distribution.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct LogNormalTable {
@@ -54,7 +55,7 @@ pub(super) struct LogNormalTable {
     pub median: Option<Quantity>,
     /// Standard deviation of the natural logarithm; 0.1 is about 10 %.
     pub deviation: Option<f64>,
-    /// Two values between which 95 % of all lie, instead of median and deviation.
+    /// Interval that contains 95 % of the values, instead of median and deviation.
     pub interval: Option<[Quantity; 2]>,
 }
 
@@ -66,84 +67,85 @@ pub(super) struct TriangularTable {
     pub mode: Quantity,
 }
 
-/// How `task = "worst-case"` searches the box of [uncertain] for the largest scaled value of every criterion.
+/// Settings of `task = "worst-case"`: the search of the box of [uncertain] for the largest scaled value of every criterion.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct WorstCaseSection {
-    /// The design that is looked at: `optimum` (the default: the study is solved first) or `start`.
+    /// Design to be examined: `optimum` (default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
-    /// Criteria whose worst is sought; all that count where absent.
+    /// Criteria for the worst-case search; default is every criterion that counts.
     pub criteria: Option<Vec<String>>,
-    /// Points at which every criterion is looked at first, besides the corners of the box; 128 where absent.
+    /// Number of initial sample points per criterion, in addition to the corners of the box; default 128.
     pub samples: Option<usize>,
-    /// Local searches for every criterion, from the worst of these points; 8 where absent. One more, over the whole box,
-    /// comes on top.
+    /// Number of local searches per criterion, from the worst sample points; default 8. One more search covers the whole
+    /// box.
     pub starts: Option<usize>,
 }
 
-/// Makes a design hold over the whole box of [uncertain], as far as its worst cases are found: solve for the cases at hand,
-/// search the worst ones, add them, and so on.
+/// Settings of a design against the worst cases in the box of [uncertain], as far as the search finds them. The design is
+/// solved for the present cases, the worst cases are searched and added, and the procedure is repeated.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct RobustSection {
-    /// Rounds, at most; 12 where absent.
+    /// Maximum number of iterations; default 12.
     pub rounds: Option<usize>,
-    /// What a worst case may exceed the design's own worst by, in scaled values, without being added; 0.001 where absent.
+    /// Tolerance in scaled values; default 0.001. A worst case is added only if it exceeds the present worst scaled value by
+    /// more.
     pub tolerance: Option<f64>,
-    /// As in [worst-case]; 128 where absent.
+    /// Number of initial sample points, as in [worst-case]; default 128.
     pub samples: Option<usize>,
-    /// As in [worst-case]; 4 where absent.
+    /// Number of local searches, as in [worst-case]; default 4.
     pub starts: Option<usize>,
 }
 
-/// How `task = "monte-carlo"` draws the parameters of [uncertain], and what it tells of the criteria.
+/// Settings of `task = "monte-carlo"`: sampling of the parameters of [uncertain], and reported statistics.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct MonteCarloSection {
-    /// The design that is looked at: `optimum` (the default: the study is solved first) or `start`.
+    /// Design to be examined: `optimum` (default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
-    /// Number of samples; 1000 where absent.
+    /// Number of samples; default 1000.
     pub samples: Option<usize>,
-    /// How they are drawn: `random` (the default), `latin-hypercube`, or `sobol` (a scrambled sequence).
+    /// Sampling method: `random` (default), `latin-hypercube`, or `sobol` (a scrambled sequence).
     #[serde(default)]
     pub method: Sampling,
-    /// Shares of the values whose bounds are told; [0.05, 0.5, 0.95] where absent.
+    /// Levels of the reported quantiles; default [0.05, 0.5, 0.95].
     pub quantiles: Option<Vec<f64>>,
-    /// Confidence of the intervals; 0.95 where absent.
+    /// Confidence level of the intervals; default 0.95.
     pub level: Option<f64>,
 }
 
-/// What a calibration tells of its estimates besides standard errors.
+/// Settings of the uncertainty of a calibration's estimates, in addition to standard errors.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct UncertaintySection {
-    /// Profiles of the likelihood: `true` for every tuner, or a list of tuners.
+    /// Likelihood profiles: `true` for every tuner, or a list of tuners.
     pub profile: Option<AllOrSome>,
-    /// Number of bootstrap replicates: residuals are drawn anew in blocks and everything is estimated again. None where
-    /// absent; 200 do for standard errors, 1000 for intervals.
+    /// Number of bootstrap replicates, with residuals resampled in blocks; default none. 200 are sufficient for standard
+    /// errors, 1000 for intervals.
     pub bootstrap: Option<usize>,
-    /// Length of a block in samples; the cube root of their number, rounded up, where absent.
+    /// Block length in samples; default is the cube root of the number of samples, rounded up.
     pub block: Option<usize>,
-    /// `true` draws bands around the predictions of the calibrated model.
+    /// `true` computes confidence bands of the predictions of the calibrated model.
     #[serde(default)]
     pub bands: bool,
-    /// Confidence of all intervals; 0.95 where absent.
+    /// Confidence level of all intervals; default 0.95.
     pub level: Option<f64>,
 }
 
-/// All of them, or a list.
+/// All names, none, or a list.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum AllOrSome {
     /// All or none.
     All(bool),
-    /// These.
+    /// Listed names.
     Some(Vec<String>),
 }
 
-/// Reads the tables; what is absent has its defaults.
+/// Reads the tables; absent tables have their defaults.
 pub(super) fn read(root: &Node<'_>, tasks: &mut TasksDraft) -> Result<(), Diagnostic> {
     for (name, node) in root.table("uncertain")? {
         tasks.uncertain.push((name, uncertain(&node)?));
@@ -198,12 +200,12 @@ fn uncertain(node: &Node<'_>) -> Result<UncertainDraft, Diagnostic> {
     let named = [normal.is_some(), log_normal.is_some(), triangular.is_some()].iter().filter(|&&is| is).count();
     if named > 1 {
         return Err(node
-            .key_diagnostic("a parameter has one distribution, but two are named".to_owned())
-            .with_help("remove one"));
+            .key_diagnostic("expected one distribution, found several".to_owned())
+            .with_help("keep one of them"));
     }
     let incomplete = |key: &str, way_out: &str| {
         let place = node.child(key).expect("it was read");
-        Err(place.diagnostic(format!("the {key} distribution is not complete, or said twice")).with_help(way_out))
+        Err(place.diagnostic(format!("the {key} distribution is incomplete or overdetermined")).with_help(way_out))
     };
     let distribution = match (normal, log_normal, triangular) {
         (Some(NormalTable { mean: Some(mean), deviation: Some(deviation), interval: None }), ..) => {
@@ -226,5 +228,5 @@ fn uncertain(node: &Node<'_>) -> Result<UncertainDraft, Diagnostic> {
     Ok(UncertainDraft { min, max, tolerance, distribution })
 }
 
-/// All uncertain parameters, for the schema.
+/// Table of all uncertain parameters, for the schema.
 pub(super) type UncertainTable = Entries<UncertainSection>;

@@ -1,4 +1,4 @@
-//! The JSON schema of study files, made from the types that read them, and the manual pages made from it.
+//! JSON schema of study files, derived from the types that read them, and the manual pages derived from it.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::catalogue::{Catalogue, schema_of};
 use crate::effect::Effect;
 use crate::unit::Quantity;
 
-/// The schema of a whole study file, for editors.
+/// Returns the schema of a complete study file, for editors.
 pub fn study_schema(catalogue: &Catalogue) -> Value {
     let kinds = |list: Vec<(&str, Schema)>| -> Map<String, Value> {
         list.into_iter().map(|(name, schema)| (name.to_owned(), schema.to_value())).collect()
@@ -57,7 +57,7 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
     })
 }
 
-/// The keys of a model, with the effects of the catalogue by their names.
+/// Returns the schema of a model with the effects of the catalogue, by name.
 fn with_effects(mut common: Value, catalogue: &Catalogue) -> Value {
     let section = schema_of::<EffectSection>().to_value();
     let kind = |effect: &Arc<dyn Effect>| {
@@ -71,12 +71,12 @@ fn with_effects(mut common: Value, catalogue: &Catalogue) -> Value {
     common
 }
 
-/// A table with any names, each of the given schema.
+/// Returns the schema of a table with arbitrary names, each with the given schema.
 fn named(schema: Value) -> Value {
     json!({ "type": "object", "additionalProperties": schema })
 }
 
-/// The common keys and exactly one kind (at most one where it may be absent).
+/// Returns the schema of the common keys with exactly one kind, or at most one if the kind is optional.
 fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Value {
     if must_be {
         common["oneOf"] = kinds.keys().map(|name| json!({ "required": [name] })).collect();
@@ -88,11 +88,11 @@ fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Valu
     common
 }
 
-/// What may stand under a table's keys.
+/// Keys that a table may contain.
 pub(super) enum Keys<'s> {
-    /// Any key, all of one schema.
+    /// Arbitrary keys, all with one schema.
     Any(&'s Value),
-    /// These keys.
+    /// Listed keys.
     Known(Vec<(&'s String, &'s Value)>),
 }
 
@@ -112,7 +112,7 @@ impl<'s> Keys<'s> {
     }
 }
 
-/// The keys that a schema allows; `None` if it allows no table, or anything.
+/// Returns the keys that a schema allows; `None` if it allows no table, or anything.
 pub(super) fn keys_of(schema: &Value) -> Option<Keys<'_>> {
     if let Some(Value::Object(any)) = schema.get("additionalProperties").filter(|s| s.is_object()) {
         let _ = any;
@@ -135,12 +135,12 @@ pub(super) fn keys_of(schema: &Value) -> Option<Keys<'_>> {
     (closed || !known.is_empty()).then_some(Keys::Known(known))
 }
 
-/// The documentation of a key, as the end of a sentence.
+/// Returns the documentation of a key, as the end of a sentence.
 pub(super) fn documentation(schema: &Value, key: &str) -> Option<String> {
     keys_of(schema)?.get(key)?.get("description")?.as_str().map(super::shape::on_one_line)
 }
 
-/// The tables of a study file: name, and schema of what may stand in each.
+/// Returns the tables of a study file: name and schema of each.
 pub fn tables() -> Vec<(&'static str, Schema)> {
     vec![
         ("study", schema_of::<StudySection>()),
@@ -163,7 +163,7 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
     ]
 }
 
-/// The tables of a study file in which a key stands, at any depth.
+/// Returns the tables of a study file that contain a key, at any depth.
 pub fn tables_with(key: &str) -> Vec<&'static str> {
     let with = tables().into_iter().filter(|(_, schema)| has_key(schema.as_value(), key));
     with.map(|(table, _)| table).collect()
@@ -177,7 +177,7 @@ fn has_key(schema: &Value, key: &str) -> bool {
     }
 }
 
-/// A kind's page in the manual, from its schema: what it is, then its options.
+/// Returns the manual page of a kind, from its schema: description and options.
 pub fn describe(name: &str, schema: &Schema) -> String {
     let schema = schema.as_value();
     let mut page = format!("{name}\n\n");
@@ -193,7 +193,7 @@ pub fn describe(name: &str, schema: &Schema) -> String {
     page
 }
 
-/// Formulas stand between fences in the documentation; on a terminal they are indented.
+/// Indents the fenced formulas of a documentation, for the terminal.
 fn without_fences(text: &str) -> String {
     let mut inside = false;
     let mut lines = Vec::new();
@@ -215,7 +215,7 @@ fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
         let indent = "  ".repeat(depth);
         let default = option.get("default").filter(|d| !d.is_null()).map(|d| format!(", default {d}"));
         let need = if required.contains(&key.as_str()) { ", required".to_owned() } else { default.unwrap_or_default() };
-        // That a count is not negative goes without saying.
+        // A count is obviously not negative.
         let range = super::shape::range_in_words(option).filter(|range| range != "at least 0");
         let range = range.map_or_else(String::new, |range| format!(", {range}"));
         *page += &format!("{indent}{key} ({}{range}{need})\n", type_name(option));
@@ -223,7 +223,7 @@ fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
         for line in about.lines() {
             *page += &format!("{indent}    {line}\n");
         }
-        // A table with any names: what stands under each.
+        // A table with arbitrary names: the options under each name.
         match keys_of(option) {
             Some(Keys::Any(each)) if matches!(keys_of(each), Some(Keys::Known(_))) => {
                 *page += &format!("{indent}    NAME ({})\n", type_name(each));
@@ -259,7 +259,7 @@ fn type_name(schema: &Value) -> String {
         Some(Value::String(name)) => name.clone(),
         Some(Value::Array(names)) => {
             let names: Vec<&str> = names.iter().filter_map(Value::as_str).filter(|n| *n != "null").collect();
-            // A quantity is a number, or a text with a unit.
+            // A quantity is a number, or a string with a unit.
             if names == ["number", "string"] { "quantity".to_owned() } else { names.join(" | ") }
         }
         _ => "table".to_owned(),

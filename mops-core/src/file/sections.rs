@@ -1,4 +1,4 @@
-//! What may stand in the tables of a study file. The documentation of each key is what `mops schema` gives to editors.
+//! Tables of a study file. The documentation of each key is part of the schema that `mops schema` writes for editors.
 
 use std::fmt;
 
@@ -15,34 +15,37 @@ use crate::study::Task;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 
-/// What the study is.
+/// General settings of the study.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct StudySection {
-    /// Name, as it stands in reports.
+    /// Name used in reports.
     pub name: String,
-    /// What it is for: `design` (the default), `calibration`, `diagnosis`, `excitation`, `monte-carlo`, `pareto`,
-    /// `sensitivity`, `sweep` or `worst-case`.
+    /// Task: `design` (default), `calibration`, `diagnosis`, `excitation`, `monte-carlo`, `pareto`, `sensitivity`, `sweep`
+    /// or `worst-case`.
     #[serde(default)]
     pub task: Task,
-    /// How scaled values are combined: `max` (of a design) or `sum` (of a calibration).
+    /// Combination of the scaled values: `max` (default of a design), `sum` (default of a calibration) or `each` (default of
+    /// `pareto`).
     pub objective: Option<Objective>,
-    /// Seed of all random numbers; 1 where absent.
+    /// Seed of all random numbers; default 1.
     pub seed: Option<u64>,
 }
 
-/// What every model may have beside its kind.
+/// Common keys of all models.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ModelCommon {
-    /// Values of parameters that neither a tuner nor a case sets.
+    /// Parameter values, used unless a tuner or a case sets the parameter.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
-    /// Makes it the linearisation of the model, to be read by criteria of linear systems:
-    /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`; `{}` for all of them.
+    /// Replaces the model by its linearisation, for criteria of linear systems:
+    /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`. `{}` selects all inputs and
+    /// outputs.
     pub linearise: Option<LineariseSection>,
-    /// Physical effects at places of the model, by names of your choice: `arm = { coulomb-friction = { place = "joint:phi" } }`
-    /// adds the parameter `arm.c`. `mops list` names the effects, `mops check` the places.
+    /// Physical effects at places of the model, under names of your choice:
+    /// `arm = { coulomb-friction = { place = "joint:phi" } }` adds the parameter `arm.c`. `mops list` shows the effects,
+    /// `mops check` the places.
     #[serde(default)]
     pub effects: Entries<Entries<EffectSection>>,
 }
@@ -51,33 +54,33 @@ impl ModelCommon {
     pub const KEYS: &[&str] = &["parameters", "linearise", "effects"];
 }
 
-/// Where an effect acts. Its strengths are parameters of the model, which tuners, cases and `parameters` set; where nothing
-/// does they are neutral, and the effect is not there.
+/// Place of an effect. The effect parameters are model parameters, set by tuners, cases and `parameters`. By default they
+/// have their null value, at which the effect vanishes.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct EffectSection {
-    /// The place: `joint:NAME`, `process:NAME`, `actuator:NAME` or `sensor:NAME`.
+    /// Place: `joint:NAME`, `process:NAME`, `actuator:NAME` or `sensor:NAME`.
     pub place: String,
-    /// A second place, for effects that need one: what an actuator's ripple turns with, the joint that drag comes from.
+    /// Second place, for effects that need one: the rotation that causes an actuator ripple, the joint that exerts drag.
     pub companion: Option<String>,
 }
 
-/// Where a model is linearised, and between what.
+/// Operating point, inputs and outputs of a linearisation.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct LineariseSection {
-    /// Inputs; all where absent.
+    /// Inputs; default all.
     pub inputs: Option<Vec<String>>,
-    /// Signals that are outputs; all where absent.
+    /// Signals used as outputs; default all.
     pub outputs: Option<Vec<String>>,
-    /// Values of states and inputs at the operating point; states that are not named have their start value, inputs the
-    /// value that the case gives them at the start.
+    /// Values of states and inputs at the operating point. By default, states have their initial value and inputs the
+    /// initial value of the case.
     #[serde(default)]
     pub at: Entries<Quantity>,
-    /// `true` moves the operating point to the nearest equilibrium; what `at` names is held, and so are the inputs.
+    /// `true` moves the operating point to the nearest equilibrium; the inputs, and the states in `at`, stay fixed.
     #[serde(default)]
     pub equilibrium: bool,
-    /// States and inputs that the search for the equilibrium may move although they would be held.
+    /// States and inputs that the equilibrium search may vary although they would be fixed.
     #[serde(default)]
     pub free: Vec<String>,
 }
@@ -89,46 +92,46 @@ impl From<LineariseSection> for Linearise {
     }
 }
 
-/// A quantity that a solver may change; its name is that of a model's parameter.
+/// A quantity that a solver may change; it has the name of a model parameter.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct TunerSection {
-    /// Value at the start.
+    /// Initial guess.
     pub start: Option<Quantity>,
     /// Smallest value.
     pub min: Option<Quantity>,
     /// Largest value.
     pub max: Option<Quantity>,
-    /// Unit of the values; the parameter's where absent.
+    /// Unit of the values; default is the unit of the parameter.
     pub unit: Option<String>,
-    /// How the range is spread: `linear` or `log`.
+    /// Mapping of the range: `linear` or `log`.
     #[serde(default)]
     pub scale: Scale,
-    /// Whole numbers only.
+    /// `true` allows integers only.
     #[serde(default)]
     pub integer: bool,
-    /// These values only.
+    /// List of the allowed values.
     pub values: Option<Vec<Quantity>>,
-    /// `false` keeps the tuner at its start value.
+    /// `false` keeps the tuner at its initial guess.
     pub active: Option<bool>,
-    /// Expression of tuners that stand before this one, such as `"4*Td"`; the tuner follows it.
+    /// Expression of tuners defined before this one, such as `"4*Td"`; the tuner takes its value.
     pub tie: Option<String>,
-    /// One value for every case or experiment instead of one for the study. In selection and validation experiments it is
-    /// estimated from their own data, as start values are.
+    /// `true` gives every case or experiment a separate value. In selection and validation experiments the value is
+    /// estimated from their own data, as initial states are.
     #[serde(default)]
     pub per_case: bool,
-    /// Values at the start in cases or experiments that begin elsewhere, by their names; with `per-case`.
+    /// Initial guesses of single cases or experiments, by name; requires `per-case`.
     #[serde(default)]
     pub starts: Entries<Quantity>,
 }
 
-/// What a case may have beside values of parameters.
+/// Keys of a case in addition to parameter values.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct CaseOptions {
-    /// What drives the model's inputs; an input that is not named is 0. Each moves as `constant`, `step` or `sine`:
-    /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. Numbers without a unit count in that of the input.
-    /// What was recorded is an input of [experiments].
+    /// Inputs of the model; all others are 0. Each is a `constant`, `step` or `sine`:
+    /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. Numbers without a unit are in the unit of the
+    /// input. Recorded inputs belong in [experiments].
     #[serde(default)]
     pub inputs: Entries<InputSection>,
     /// End of the simulation.
@@ -139,11 +142,11 @@ impl CaseOptions {
     pub const KEYS: &[&str] = &["inputs", "horizon"];
 }
 
-/// How an input moves.
+/// An input as a function of time.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum InputSection {
-    /// The same value throughout.
+    /// Constant value.
     Constant(Quantity),
     /// A step.
     Step(StepSection),
@@ -151,39 +154,39 @@ pub(super) enum InputSection {
     Sine(SineSection),
 }
 
-/// One value up to a time, another from then on.
+/// Step from one value to another.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct StepSection {
-    /// When it steps; a number without a unit counts in s. 0 where absent.
+    /// Time of the step; a number without a unit is in s. Default 0.
     pub time: Option<Quantity>,
-    /// Value before; 0 where absent.
+    /// Value before the step; default 0.
     pub before: Option<Quantity>,
-    /// Value from then on.
+    /// Value after the step.
     pub after: Quantity,
 }
 
-/// `offset + amplitude sin(2 pi frequency t + phase)`.
+/// Sine `offset + amplitude sin(2 pi frequency t + phase)`.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SineSection {
     /// Amplitude.
     pub amplitude: Quantity,
-    /// Frequency; a number without a unit counts in Hz.
+    /// Frequency; a number without a unit is in Hz.
     pub frequency: Quantity,
-    /// Phase; a number without a unit counts in rad. 0 where absent.
+    /// Phase; a number without a unit is in rad. Default 0.
     pub phase: Option<Quantity>,
-    /// Mean value; 0 where absent.
+    /// Mean value; default 0.
     pub offset: Option<Quantity>,
 }
 
 impl InputSection {
-    /// The input, with values in `unit`. Mistakes carry the key of the value.
+    /// Returns the input, with values in `unit`. Errors have the key of the value.
     pub fn input(&self, unit: &Unit) -> Result<Input, Mistake> {
         let number = |key: &'static str, quantity: &Quantity, unit: &Unit| {
-            let unitless = |m: Mistake| m.with_help(format!("a number without a unit counts in `{unit}`"));
+            let unitless = |m: Mistake| m.with_help(format!("a number without a unit is in `{unit}`"));
             let value = quantity.to(unit).map_err(|why| unitless(Mistake::new(key, why)))?;
-            let finite = || Mistake::new(key, format!("an input must be finite, not {value}"));
+            let finite = || Mistake::new(key, format!("expected a finite value of the input, found {value}"));
             value.is_finite().then_some(value).ok_or_else(|| finite().with_help("give a number"))
         };
         let or_zero = |key: &'static str, quantity: &Option<Quantity>, unit: &Unit| {
@@ -217,16 +220,16 @@ impl InputSection {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ExperimentSection {
-    /// Data file: CSV, or MATLAB level 4 or 5; its path from the study's folder.
+    /// Data file: CSV, or MATLAB level 4 or 5; the path is relative to the folder of the study.
     pub file: String,
-    /// Column of the time; its unit is the header's, else s.
+    /// Time column; its unit is taken from the header, by default s.
     pub time: Option<String>,
-    /// Unit of the time column, where its header does not say.
+    /// Unit of the time column, if its header has none.
     pub time_unit: Option<String>,
-    /// Column of the frequency, where frequency responses were measured instead of signals over time; its unit is the
-    /// header's, else rad/s.
+    /// Frequency column, for frequency responses instead of signals over time; its unit is taken from the header, by default
+    /// rad/s.
     pub frequency: Option<String>,
-    /// Unit of the frequency column, where its header does not say: `Hz` or `rad/s`.
+    /// Unit of the frequency column, if its header has none: `Hz` or `rad/s`.
     pub frequency_unit: Option<String>,
     /// Measured frequency responses, by the output of a linear model: `y = { magnitude = "column", phase = "column" }` or
     /// `y = { real = "column", imaginary = "column" }`.
@@ -236,31 +239,31 @@ pub(super) struct ExperimentSection {
     #[serde(default)]
     pub channels: Entries<ChannelSection>,
     /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`. Between samples an
-    /// input stays (`hold = "zero"`, the default) or moves on straight lines (`hold = "first"`).
+    /// input is constant (`hold = "zero"`, default) or interpolated linearly (`hold = "first"`).
     #[serde(default)]
     pub inputs: Entries<InputColumn>,
-    /// What it is used for: `calibration` (the default), `selection` or `validation`.
+    /// Role: `calibration` (default), `selection` or `validation`.
     #[serde(default)]
     pub role: Role,
-    /// States whose start values are estimated: `["phi", "theta"]`, or a table with `start`, `min`, `max` for each.
+    /// States whose initial values are estimated: `["phi", "theta"]`, or a table with `start`, `min`, `max` for each.
     #[serde(default)]
     pub free: FreeSection,
-    /// Values of parameters that hold in this experiment.
+    /// Parameter values of this experiment.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
-    /// Time in the file from which it is used.
+    /// Start of the used part of the file, as time in the file.
     pub from: Option<Quantity>,
-    /// Time in the file up to which it is used.
+    /// End of the used part of the file, as time in the file.
     pub to: Option<Quantity>,
-    /// Number of samples dropped at the start of the file; sensors often begin with a wrong one.
+    /// Number of samples dropped at the start of the file; the first sample of a sensor is often wrong.
     #[serde(default)]
     pub skip: usize,
-    /// `false` keeps the times of the file: the simulation begins at 0 s, and inputs are taken from the file from then on, also
-    /// before `from`. Otherwise the simulation begins at the first sample used.
+    /// `false` keeps the times of the file. The simulation then starts at 0 s, with inputs from the file from that time on,
+    /// even before `from`. By default the simulation starts at the first sample used.
     pub reset_time: Option<bool>,
 }
 
-/// Where a measured frequency response stands in the file.
+/// Columns of a measured frequency response.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ResponseTable {
@@ -268,55 +271,55 @@ pub(super) struct ResponseTable {
     pub real: Option<String>,
     /// Column of the imaginary part.
     pub imaginary: Option<String>,
-    /// Column of the magnitude: in dB where its header or `decibel` says so, else in the unit of its header, else in that of
-    /// the output over that of the input.
+    /// Column of the magnitude. It is in dB if its header or `decibel` specifies dB, else in the unit of its header. The
+    /// default is the unit of the output divided by that of the input.
     pub magnitude: Option<String>,
-    /// Column of the phase: in the unit of its header, else deg.
+    /// Column of the phase; its unit is taken from the header, by default deg.
     pub phase: Option<String>,
-    /// `true` for a magnitude in dB whose header does not say so.
+    /// `true` for a magnitude in dB whose header does not specify dB.
     #[serde(default)]
     pub decibel: bool,
 }
 
-/// Where a measured signal stands in the file, and what makes it the model's.
+/// Column of a measured signal, and its conversion to the signal of the model.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ChannelTable {
     /// Column of the file.
     pub column: String,
-    /// Unit of the column; the header's, else the signal's, where absent.
+    /// Unit of the column; default is the unit in the header, else that of the signal.
     pub unit: Option<String>,
-    /// Factor that the column is multiplied by, such as -1 for a sensor mounted the other way round.
+    /// Factor applied to the column, such as -1 for a sensor mounted in the opposite direction.
     pub scale: Option<f64>,
-    /// What is added after scaling, in the column's unit.
+    /// Offset added after scaling, in the unit of the column.
     pub offset: Option<Quantity>,
-    /// Standard deviation of the noise; residuals are weighted by it.
+    /// Standard deviation of the noise, used to weight residuals.
     pub noise: Option<Quantity>,
 }
 
-/// Where a recorded input stands in the file.
+/// Column of a recorded input, and its conversion to the input of the model.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct InputTable {
     /// Column of the file.
     pub column: String,
-    /// Unit of the column; the header's, else the input's, where absent.
+    /// Unit of the column; default is the unit in the header, else that of the input.
     pub unit: Option<String>,
-    /// Factor that the column is multiplied by.
+    /// Factor applied to the column.
     pub scale: Option<f64>,
-    /// What is added after scaling, in the column's unit.
+    /// Offset added after scaling, in the unit of the column.
     pub offset: Option<Quantity>,
-    /// How it acts between samples: `zero` (the default: it stays until the next one, as a computer puts it out), `first`
-    /// (straight lines from sample to sample, as for one that moves smoothly) or `band-limited` (nothing above half the sampling
-    /// frequency, as for one that was filtered before it was sampled).
+    /// Interpolation between samples. `zero` (default): constant until the next sample, as a digital controller outputs it.
+    /// `first`: linear interpolation, for smooth inputs. `band-limited`: no content above half the sampling frequency, for
+    /// inputs filtered before sampling.
     pub hold: Option<Hold>,
 }
 
-/// A state whose start value is estimated; what is absent is read off the data.
+/// A state whose initial value is estimated; absent values are derived from the data.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct FreeTable {
-    /// First guess.
+    /// Initial guess.
     pub start: Option<Quantity>,
     /// Smallest value.
     pub min: Option<Quantity>,
@@ -324,23 +327,23 @@ pub(super) struct FreeTable {
     pub max: Option<Quantity>,
 }
 
-/// What every criterion may have beside its kind.
+/// Common keys of all criteria.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct CriterionCommon {
-    /// The model it reads; needed where there are several.
+    /// Model that the criterion reads; required if there are several.
     pub model: Option<String>,
-    /// The cases it is evaluated in; all where absent.
+    /// Cases in which the criterion is evaluated; default all.
     pub cases: Option<Vec<String>>,
     /// `minimise` (the default), `inequality`, `equality` or `monitor`.
     pub usage: Option<Usage>,
-    /// The value to reach: the criterion is divided by it. Must be positive; some kinds have one of their own.
+    /// Demand: an upper limit (positive) if less is better, a lower limit if more is better. Some kinds have a default.
     pub demand: Option<Quantity>,
-    /// Value that scales to 0, where a demand does not fit; goes with `bad`.
+    /// Value that scales to 0, as an alternative to `demand`; requires `bad`.
     pub good: Option<Quantity>,
-    /// Value that scales to 1, where a demand does not fit; goes with `good`.
+    /// Value that scales to 1, as an alternative to `demand`; requires `good`.
     pub bad: Option<Quantity>,
-    /// Weight of its scaled value in the objective; 1 where absent.
+    /// Weight of the scaled value in the objective; default 1.
     pub weight: Option<f64>,
 }
 
@@ -348,11 +351,11 @@ impl CriterionCommon {
     pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight"];
 }
 
-/// What every solver may have beside its kind.
+/// Common keys of all solvers.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SolverCommon {
-    /// Largest number of points that are evaluated.
+    /// Maximum number of evaluated points.
     pub max_evaluations: Option<usize>,
 }
 
@@ -360,7 +363,7 @@ impl SolverCommon {
     pub const KEYS: &[&str] = &["max-evaluations"];
 }
 
-/// A text, or a table: `"column"` is short for `{ column = "column" }`.
+/// A string, or a table: `"column"` is short for `{ column = "column" }`.
 macro_rules! column_or_table {
     ($name:ident, $table:ident, $short:expr) => {
         #[derive(Debug)]
@@ -372,7 +375,7 @@ macro_rules! column_or_table {
                 impl<'de> Visitor<'de> for Either {
                     type Value = $name;
                     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                        f.write_str("the name of a column, or a table with `column`")
+                        f.write_str("a column name, or a table with `column`")
                     }
                     fn visit_str<E>(self, column: &str) -> Result<$name, E> {
                         let make: fn(String) -> $table = $short;
@@ -412,7 +415,7 @@ column_or_table!(InputColumn, InputTable, |column| InputTable {
     hold: None
 });
 
-/// Free start values: a list of states, or a table.
+/// Free initial states: a list of states, or a table.
 #[derive(Debug, Default)]
 pub(super) struct FreeSection(pub Vec<(String, FreeTable)>);
 

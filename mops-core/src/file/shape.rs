@@ -1,5 +1,4 @@
-//! Whether a value has the shape that a schema describes: keys, types, words, ranges; where not, what is wrong in plain
-//! words.
+//! Check of a value against a schema: keys, types, words and ranges, with messages for users.
 
 use serde_json::Value;
 use toml::de::{DeInteger, DeValue};
@@ -8,14 +7,14 @@ use super::schema::{Keys, keys_of};
 use super::tree::Node;
 use crate::diagnostic::{Diagnostic, suggestion};
 
-/// The key that leads to a value, and what its documentation says.
+/// A key, and its documentation.
 #[derive(Clone, Copy)]
 struct Key<'k> {
     name: &'k str,
     about: Option<&'k str>,
 }
 
-/// Refuses keys that are unknown or missing and values of the wrong type or out of range, at any depth.
+/// Rejects keys that are unknown or missing and values of the wrong type or out of range, at any depth.
 pub(super) fn check(node: &Node<'_>, schema: &Value) -> Result<(), Diagnostic> {
     let name = node.key_text();
     check_value(node, schema, Key { name: &name, about: None })
@@ -37,7 +36,7 @@ fn check_value(node: &Node<'_>, schema: &Value, key: Key<'_>) -> Result<(), Diag
     }
 }
 
-/// The schemas of which a value must meet one.
+/// Returns the alternative schemas of a value.
 fn alternatives(schema: &Value) -> Vec<&Value> {
     let choice = ["anyOf", "oneOf"].iter().find_map(|choice| schema.get(choice)?.as_array());
     match choice {
@@ -46,7 +45,7 @@ fn alternatives(schema: &Value) -> Vec<&Value> {
     }
 }
 
-/// The names of the types that a schema allows; none where it allows all.
+/// Returns the names of the types that a schema allows; empty if it allows all.
 fn types(schema: &Value) -> Vec<&str> {
     match &schema["type"] {
         Value::String(name) => vec![name],
@@ -73,14 +72,14 @@ fn accepts(schema: &Value, value: &DeValue<'_>) -> bool {
 fn check_whole(node: &Node<'_>, number: &DeInteger<'_>, schema: &Value, key: Key<'_>) -> Result<(), Diagnostic> {
     let Ok(value) = i64::from_str_radix(number.as_str(), number.radix()) else {
         return Err(node
-            .diagnostic(format!("{number} is too large for a whole number"))
-            .with_help("write it with a point or an exponent, as in 1e20"));
+            .diagnostic(format!("{number} is too large for an integer"))
+            .with_help("write it with a decimal point or an exponent, such as 1e20"));
     };
     #[allow(clippy::cast_precision_loss)]
     check_range(node, value as f64, schema, key)
 }
 
-/// The range of numbers that a schema allows, in words; nothing where it allows all.
+/// Returns the range of numbers that a schema allows, in words; `None` if it allows all.
 pub(super) fn range_in_words(schema: &Value) -> Option<String> {
     let bound = |name: &str| schema[name].as_f64();
     if let (Some(low), Some(high)) = (bound("minimum"), bound("maximum")) {
@@ -121,8 +120,8 @@ fn wrong_type(node: &Node<'_>, alternatives: &[&Value], key: Key<'_>) -> Diagnos
     let mut wanted: Vec<&str> = alternatives.iter().flat_map(|schema| types(schema)).map(in_words).collect();
     wanted.dedup();
     let found = match node.value() {
-        DeValue::String(_) => "a text",
-        DeValue::Float(_) if wanted == ["a whole number"] => "a number with a point or an exponent",
+        DeValue::String(_) => "a string",
+        DeValue::Float(_) if wanted == ["an integer"] => "a number with a decimal point or an exponent",
         DeValue::Integer(_) | DeValue::Float(_) => "a number",
         DeValue::Boolean(true) => "`true`",
         DeValue::Boolean(false) => "`false`",
@@ -130,7 +129,7 @@ fn wrong_type(node: &Node<'_>, alternatives: &[&Value], key: Key<'_>) -> Diagnos
         DeValue::Array(_) => "a list",
         DeValue::Table(_) => "a table",
     };
-    let fact = format!("{found} stands where {} is expected", wanted.join(" or "));
+    let fact = format!("expected {}, found {found}", wanted.join(" or "));
     let keys: Vec<&str> = alternatives.iter().filter_map(|schema| keys_of(schema)).flat_map(|k| k.names()).collect();
     let way_out = if wanted != ["a table"] {
         help(key)
@@ -145,8 +144,8 @@ fn wrong_type(node: &Node<'_>, alternatives: &[&Value], key: Key<'_>) -> Diagnos
 fn in_words(name: &str) -> &str {
     match name {
         "number" => "a number",
-        "integer" => "a whole number",
-        "string" => "a text",
+        "integer" => "an integer",
+        "string" => "a string",
         "boolean" => "`true` or `false`",
         "array" => "a list",
         _ => "a table",
@@ -156,11 +155,11 @@ fn in_words(name: &str) -> &str {
 fn help(key: Key<'_>) -> String {
     match key.about {
         Some(about) => format!("`{}`: {}", key.name, on_one_line(about)),
-        None => "`mops describe` tells what each key takes".to_owned(),
+        None => "`mops describe` explains each key".to_owned(),
     }
 }
 
-/// A documentation as the end of a sentence.
+/// Returns a documentation as the end of a sentence.
 pub(super) fn on_one_line(about: &str) -> String {
     let about = about.replace('\n', " ");
     let about = about.trim_end_matches('.');
@@ -185,7 +184,7 @@ fn check_word(node: &Node<'_>, word: &str, fitting: &[&Value], key: Key<'_>) -> 
     if known.contains(&word) {
         return Ok(());
     }
-    Err(node.diagnostic(format!("`{}` cannot be `{word}`", key.name)).with_help(suggestion(word, known)))
+    Err(node.diagnostic(format!("invalid value `{word}` of `{}`", key.name)).with_help(suggestion(word, known)))
 }
 
 fn check_list(node: &Node<'_>, schema: &Value, key: Key<'_>) -> Result<(), Diagnostic> {
@@ -195,10 +194,7 @@ fn check_list(node: &Node<'_>, schema: &Value, key: Key<'_>) -> Result<(), Diagn
         && !(least..=most).contains(&elements.len())
     {
         let wanted = if least == most { least.to_string() } else { format!("{least} to {most}") };
-        let fact = match elements.len() {
-            1 => format!("1 value stands where {wanted} are expected"),
-            count => format!("{count} values stand where {wanted} are expected"),
-        };
+        let fact = format!("expected {wanted} values, found {}", elements.len());
         return Err(node.diagnostic(fact).with_help(help(key)));
     }
     match schema.get("items") {
@@ -229,7 +225,7 @@ fn check_table(node: &Node<'_>, fitting: &[&Value], key: Key<'_>) -> Result<(), 
     } else if entries.len() != 1 {
         // Alternatives are the variants of an enumeration, each with one key.
         let number = if entries.is_empty() { "none" } else { "more than one" };
-        let fact = format!("one of {} must stand here, and {number} does", names.join(", "));
+        let fact = format!("expected exactly one of {}, found {number}", names.join(", "));
         return Err(node.diagnostic(fact).with_help(format!("as in {} = {{ {} = ... }}", key.name, names[0])));
     }
     entries.iter().try_for_each(|(name, node)| {
@@ -238,7 +234,7 @@ fn check_table(node: &Node<'_>, fitting: &[&Value], key: Key<'_>) -> Result<(), 
     })
 }
 
-/// The key with its own documentation, else with that of the table it stands in.
+/// Returns the key with its own documentation, or else with that of its table.
 fn described<'k>(name: &'k str, schema: &'k Value, above: Key<'k>) -> Key<'k> {
     Key { name, about: schema["description"].as_str().or(above.about) }
 }

@@ -15,20 +15,20 @@ use crate::study::{
 };
 use crate::unit::Quantity;
 
-/// What is asked of the inputs by `task = "excitation"`, and in the report of every calibration.
+/// Settings of the excitation analysis, for `task = "excitation"` and the report of every calibration.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ExcitationSection {
-    /// The inputs that are looked at; all where absent.
+    /// Inputs to analyse; default all.
     pub inputs: Option<Vec<String>>,
-    /// Time between two samples; that of the recording where absent.
+    /// Sample time; default is the sample time of the recording.
     pub sample_time: Option<Quantity>,
-    /// Standard deviation of the noise on inputs, as in { u = 0.01 }; what is weaker does not count as excitation.
+    /// Standard deviation of the noise of each input, such as { u = 0.01 }; weaker components do not count as excitation.
     #[serde(default)]
     pub noise: Entries<Quantity>,
-    /// Number of parameters to be estimated; that of the active tuners where absent.
+    /// Number of parameters to estimate; default is the number of active tuners.
     pub parameters: Option<usize>,
-    /// FIR and ARX models by least squares, by name: { fir = { input = "u", output = "y", b = 20 } }.
+    /// FIR and ARX models estimated by least squares, by name: { fir = { input = "u", output = "y", b = 20 } }.
     #[serde(default)]
     pub regressions: Entries<RegressionSection>,
 }
@@ -37,51 +37,51 @@ pub(super) struct ExcitationSection {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct RegressionSection {
-    /// The experiment; the first with the output where absent.
+    /// Experiment; default is the first one with the output.
     pub experiment: Option<String>,
-    /// The input.
+    /// Input of the model.
     pub input: String,
-    /// The measured output.
+    /// Measured output of the model.
     pub output: String,
-    /// Number of past outputs; 0, the default, is a finite impulse response.
+    /// Number of past outputs; default 0, a finite impulse response.
     #[serde(default)]
     pub a: usize,
     /// Number of past inputs.
     pub b: usize,
-    /// Samples from an input to the first output that it moves; 1 where absent.
+    /// Delay in samples from an input to the first output that it affects; default 1.
     pub delay: Option<usize>,
-    /// Forgetting factor of the recursive estimate; 1, the default, forgets nothing.
+    /// Forgetting factor of the recursive estimate; default 1, no forgetting.
     pub forgetting: Option<f64>,
 }
 
-/// Where `task = "sensitivity"` looks.
+/// Settings of `task = "sensitivity"`.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SensitivitySection {
-    /// The point: `optimum` (the default: the study is solved first) or `start`.
+    /// Point: `optimum` (default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
-    /// Share of the largest singular value (columns of unit length) that slopes still resolve; where absent 1e-8 for tangents
-    /// and 1e-4 for differences. What they resolve is judged against the noise.
+    /// Smallest singular value that the derivatives resolve, as share of the largest (columns of unit length). Default 1e-8
+    /// for tangents and 1e-4 for finite differences. Resolved directions are compared with the noise.
     pub zero: Option<f64>,
-    /// `local` (the default): slopes along the tuners. Over the box of [uncertain] instead: `morris`, elementary effects,
-    /// which tell at little cost what matters at all; `sobol`, shares of the variance.
+    /// Method. `local` (default): derivatives with respect to the tuners. Over the box of [uncertain]: `morris`, elementary
+    /// effects as an inexpensive screening; `sobol`, variance shares.
     #[serde(default)]
     pub method: SensitivityMethod,
-    /// Of `morris` the number of trajectories (20 where absent), each of one simulation more than there are uncertain
-    /// parameters; of `sobol` that of samples (512), each of two more.
+    /// Number of trajectories for `morris` (default 20); each takes one simulation more than there are uncertain parameters.
+    /// Number of samples for `sobol` (default 512); each takes two simulations more than there are uncertain parameters.
     pub samples: Option<usize>,
 }
 
-/// What `task = "sweep"` draws: the objective over one tuner, or over two.
+/// Settings of `task = "sweep"`: the objective over one tuner, or over two.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SweepSection {
-    /// The tuner along x: its name, or a table with `tuner`, `min`, `max`, `points`.
+    /// Tuner along x: its name, or a table with `tuner`, `min`, `max`, `points`.
     pub x: Short<AxisTable>,
-    /// The tuner along y; without it the sweep is a line.
+    /// Tuner along y; without it the sweep is a line.
     pub y: Option<Short<AxisTable>>,
-    /// Where the other tuners stand: `optimum` (the default: the study is solved first) or `start`.
+    /// Values of the other tuners: `optimum` (default: the study is solved first) or `start`.
     #[serde(default)]
     pub at: Place,
 }
@@ -92,11 +92,11 @@ pub(super) struct SweepSection {
 pub(super) struct AxisTable {
     /// Name of the tuner.
     pub tuner: String,
-    /// Smallest value; that of the tuner where absent.
+    /// Smallest value; default is the lower bound of the tuner.
     pub min: Option<Quantity>,
-    /// Largest value; that of the tuner where absent.
+    /// Largest value; default is the upper bound of the tuner.
     pub max: Option<Quantity>,
-    /// Number of values; 41 on a surface and 201 on a line where absent.
+    /// Number of values; default 41 on a surface and 201 on a line.
     pub points: Option<usize>,
 }
 
@@ -106,30 +106,30 @@ impl From<String> for AxisTable {
     }
 }
 
-/// How `task = "diagnosis"`, and `mops diagnose`, search for what the model lacks.
+/// Settings of the search for missing effects, for `task = "diagnosis"` and `mops diagnose`.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct DiagnosisSection {
-    /// Largest number of effects that are added; 3 where absent.
+    /// Maximum number of added effects; default 3.
     pub max_effects: Option<usize>,
-    /// Probability with which something counts as missing where nothing is; 0.01 where absent.
+    /// False-alarm probability; default 0.01.
     pub level: Option<f64>,
-    /// Kinds of effect that are tried; all of the catalogue (`mops list`) where absent.
+    /// Kinds of effect to try; default is the whole catalogue (`mops list`).
     pub effects: Option<Vec<String>>,
-    /// Kinds of effect that are not tried.
+    /// Kinds of effect to exclude.
     #[serde(default)]
     pub without: Vec<String>,
 }
 
-/// What `task = "pareto"`, and `mops pareto`, look for.
+/// Settings of `task = "pareto"` and `mops pareto`.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ParetoSection {
-    /// Number of points of the front, about; 30 where absent.
+    /// Approximate number of points of the Pareto front; default 30.
     pub points: Option<usize>,
 }
 
-/// Names of the tables, as they stand at the top of a study file.
+/// Names of the tables of tasks in a study file.
 pub(super) const TABLES: [&str; 10] = [
     "excitation",
     "sensitivity",
@@ -143,7 +143,7 @@ pub(super) const TABLES: [&str; 10] = [
     "uncertainty",
 ];
 
-/// What a reader should know of tables of other tasks than that of the study: they do nothing.
+/// Returns notes on tables of other tasks, which are not used.
 pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
     let word = serde_json::to_value(task).expect("a task is a word");
     let is_of = |table: &str| match table {
@@ -153,10 +153,10 @@ pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
         own => word == own,
     };
     let unused = TABLES.iter().filter(|table| root.child(table).is_some() && !is_of(table));
-    unused.map(|table| format!("[{table}] does nothing in a study with the task {word}")).collect()
+    unused.map(|table| format!("[{table}] is not used by the task {word}")).collect()
 }
 
-/// Reads the tables of all tasks; what is absent has its defaults.
+/// Reads the tables of all tasks; absent tables have their defaults.
 pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {
     let mut tasks = TasksDraft::default();
     if let Some(node) = root.child("excitation") {
@@ -207,7 +207,7 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
     Ok(tasks)
 }
 
-/// Refuses names that are those of no effect.
+/// Rejects names that are not effects of the catalogue.
 fn check_effects(catalogue: &Catalogue, names: &[String]) -> Result<(), Mistake> {
     let known = || catalogue.effects.iter().map(|effect| effect.name());
     match names.iter().find(|name| !known().any(|effect| effect == **name)) {

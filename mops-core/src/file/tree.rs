@@ -1,4 +1,4 @@
-//! A TOML text with the position of every key and value, and the way from a mistake back to its position.
+//! TOML text with the position of every key and value, and the location of errors in it.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -17,12 +17,12 @@ use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::mistake::Mistake;
 use crate::unit::Quantity;
 
-/// A study's text, with every setting of the command line as a line of its own at the end, so that mistakes in
-/// settings have a position too. `parts` are what is parsed: each padded so that positions are those in the whole text.
+/// Text of a study. Every setting of the command line is appended as a separate line, so that errors in settings have a
+/// position too. `parts` are parsed one by one, each padded so that positions refer to the complete text.
 pub(super) struct Text {
     source: Arc<Source>,
     parts: Vec<String>,
-    /// Where the settings stand in the whole text.
+    /// Positions of the settings in the complete text.
     settings: Vec<Range<usize>>,
 }
 
@@ -64,7 +64,7 @@ impl Text {
         diagnostic.at(&self.source, place)
     }
 
-    /// A mistake in a setting of the command line, with its place there.
+    /// Relocates an error in a setting of the command line to the setting itself.
     pub fn settle(&self, diagnostic: Diagnostic) -> Diagnostic {
         let Some((_, span)) = diagnostic.place.as_ref().filter(|(source, _)| Arc::ptr_eq(source, &self.source)) else {
             return diagnostic;
@@ -74,7 +74,7 @@ impl Text {
         let text = self.source.text[setting.clone()].to_owned() + "\n";
         let span = span.start - setting.start..span.end - setting.start;
         let help = diagnostic.help.as_ref().map(|help| match help.contains('"') {
-            true => format!("{help}; a shell takes quotes away, unless single ones stand around the setting"),
+            true => format!("{help}; put single quotes around the setting, because the shell removes quotes"),
             false => help.clone(),
         });
         Diagnostic { help, ..diagnostic.at(&Arc::new(Source { name: "--set".to_owned(), text }), span) }
@@ -84,7 +84,7 @@ impl Text {
 fn merge<'t>(into: &mut DeTable<'t>, from: DeTable<'t>) {
     for (key, value) in from {
         match into.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut) {
-            // An empty table adds nothing: it stands for the table that is there.
+            // An empty table adds nothing; it keeps the existing table.
             Some(DeValue::Table(old)) if value.get_ref().as_table().is_some_and(|new| !new.is_empty()) => {
                 let DeValue::Table(new) = value.into_inner() else { unreachable!("it is a table") };
                 merge(old, new);
@@ -96,7 +96,7 @@ fn merge<'t>(into: &mut DeTable<'t>, from: DeTable<'t>) {
     }
 }
 
-/// A value of the text, with the place of the key that leads to it.
+/// A value of the text, with the position of its key.
 #[derive(Clone)]
 pub(super) struct Node<'t> {
     source: &'t Arc<Source>,
@@ -105,22 +105,22 @@ pub(super) struct Node<'t> {
 }
 
 impl<'t> Node<'t> {
-    /// A mistake in the value.
+    /// Returns an error located at the value.
     pub fn diagnostic(&self, message: String) -> Diagnostic {
         Diagnostic::new(message).at(self.source, self.value.span())
     }
 
-    /// A mistake at the key.
+    /// Returns an error located at the key.
     pub fn key_diagnostic(&self, message: String) -> Diagnostic {
         Diagnostic::new(message).at(self.source, self.key.clone())
     }
 
-    /// A mistake in the text that the value is: `within` are bytes of it.
+    /// Returns an error located at the bytes `within` of a string value.
     pub fn diagnostic_within(&self, within: Range<usize>, message: String) -> Diagnostic {
         let span = self.value.span();
         let quoted = self.source.text.get(span.start + 1..span.end.saturating_sub(1));
         match self.value.get_ref().as_str() {
-            // Without escapes, what is read is what is written.
+            // Without escapes, the parsed string equals the written one.
             text if text == quoted => {
                 Diagnostic::new(message).at(self.source, span.start + 1 + within.start..span.start + 1 + within.end)
             }
@@ -132,12 +132,12 @@ impl<'t> Node<'t> {
         self.value.get_ref()
     }
 
-    /// The key as it is written, without quotes.
+    /// Returns the key as written, without quotes.
     pub fn key_text(&self) -> String {
         self.source.text[self.key.clone()].trim_matches(['"', '\'']).to_owned()
     }
 
-    /// The value as it is written.
+    /// Returns the value as written.
     pub fn value_text(&self) -> &str {
         &self.source.text[self.value.span()]
     }
@@ -153,36 +153,36 @@ impl<'t> Node<'t> {
         Node { source: self.source, key: key.span(), value: Cow::Owned(value.clone()) }
     }
 
-    /// Keys and values, in the order of the text.
+    /// Returns keys and values, in the order of the text.
     pub fn entries(&self) -> Result<Vec<(String, Self)>, Diagnostic> {
         let table = self.as_table()?;
         Ok(table.iter().map(|(key, value)| (key.get_ref().to_string(), self.below(key, value))).collect())
     }
 
-    /// The value under a key.
+    /// Returns the value under a key.
     pub fn child(&self, key: &str) -> Option<Self> {
         let table = self.value.get_ref().as_table()?;
         table.iter().find(|(k, _)| k.get_ref() == key).map(|(k, v)| self.below(k, v))
     }
 
-    /// The elements of a list.
+    /// Returns the elements of a list.
     pub fn elements(&self) -> Vec<Self> {
         let elements = self.value.get_ref().as_array().into_iter().flat_map(|array| array.iter());
         elements.map(|e| Node { source: self.source, key: e.span(), value: Cow::Owned(e.clone()) }).collect()
     }
 
-    /// The value under a key that must be there.
+    /// Returns the value under a required key.
     pub fn required(&self, key: &str, help: &str) -> Result<Self, Diagnostic> {
         self.child(key)
             .ok_or_else(|| Diagnostic::new(format!("the study has no [{key}]")).with_help(help).at(self.source, 0..0))
     }
 
-    /// Keys and values of the table under a key; nothing where it is absent.
+    /// Returns keys and values of the table under a key; empty if it is absent.
     pub fn table(&self, key: &str) -> Result<Vec<(String, Self)>, Diagnostic> {
         self.child(key).map_or(Ok(Vec::new()), |node| node.entries())
     }
 
-    /// Refuses keys that are not known.
+    /// Rejects unknown keys.
     pub fn check_keys(&self, known: &[&str]) -> Result<(), Diagnostic> {
         for (key, node) in self.entries()? {
             if !known.contains(&key.as_str()) {
@@ -196,7 +196,7 @@ impl<'t> Node<'t> {
         self.key_diagnostic(format!("unknown key `{key}`")).with_help(suggestion(key, known.iter().copied()))
     }
 
-    /// The same table with these keys alone.
+    /// Returns the table reduced to these keys.
     pub fn only(&self, keys: &[&str]) -> Self {
         let Some(table) = self.value.get_ref().as_table() else { return self.clone() };
         let kept = table.iter().filter(|(key, _)| keys.contains(&key.get_ref().as_ref()));
@@ -205,12 +205,12 @@ impl<'t> Node<'t> {
         Node { source: self.source, key: self.key.clone(), value: Cow::Owned(value) }
     }
 
-    /// Reads the value as a `T`: unknown keys and wrong types are refused where they stand.
+    /// Reads the value as a `T`; unknown keys and wrong types are rejected at their position.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Diagnostic> {
         self.read_with(&schema_of::<T>(), T::deserialize)
     }
 
-    /// Reads the value with a reader whose schema is given.
+    /// Reads the value with a reader and its schema.
     pub fn read_with<T>(
         &self,
         schema: &Schema,
@@ -220,12 +220,12 @@ impl<'t> Node<'t> {
         reader(ValueDeserializer::from(self.value.as_ref().clone())).map_err(|error| self.type_error(schema, &error))
     }
 
-    /// What a reader refuses although its shape is right, such as a quantity with an unknown unit.
+    /// Returns the error of a reader for a value of the right shape, such as a quantity with an unknown unit.
     fn type_error(&self, schema: &Schema, error: &toml::de::Error) -> Diagnostic {
         let span = error.span().unwrap_or_else(|| self.value.span());
         let message = error.message().trim_end().replace('\n', "; ");
         let message = match message.split_once(", expected ") {
-            Some((_, expected)) => format!("{} stands where {expected} is expected", &self.source.text[span.clone()]),
+            Some((_, expected)) => format!("expected {expected}, found {}", &self.source.text[span.clone()]),
             None => message,
         };
         let key = self.key_around(&span).and_then(|key| documentation(schema.as_value(), &key).map(|d| (key, d)));
@@ -235,23 +235,23 @@ impl<'t> Node<'t> {
         let help = match key {
             _ if is_unit => UNIT_HELP.to_owned(),
             Some((key, about)) => format!("`{key}`: {about}"),
-            None => "`mops describe` tells what each key takes".to_owned(),
+            None => "`mops describe` explains each key".to_owned(),
         };
         Diagnostic::new(message).with_help(help).at(self.source, span)
     }
 
-    /// The key of this table under which the place lies.
+    /// Returns the key of this table whose value contains the position.
     fn key_around(&self, place: &Range<usize>) -> Option<String> {
         let table = self.value.get_ref().as_table()?;
         let around = |value: &Spanned<DeValue<'_>>| value.span().start <= place.start && place.end <= value.span().end;
         table.iter().find(|(_, value)| around(value)).map(|(key, _)| key.get_ref().to_string())
     }
 
-    /// A mistake with its position: the value under its last key, or the last key that is there.
+    /// Returns an error with its location: the value under its last key, or the last existing key.
     pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
         let mut node = self.clone();
         for key in &mistake.path {
-            // `free = ["phi"]` names its entries as elements; the options of a kind stand in the table of its name.
+            // `free = ["phi"]` has its entries as elements; the options of a kind are in the table of its name.
             let element = || node.elements().into_iter().find(|e| e.value().as_str() == Some(key));
             let option = || node.entries().ok()?.into_iter().find_map(|(_, kind)| kind.child(key));
             match node.child(key).or_else(element).or_else(option) {

@@ -1,27 +1,27 @@
-//! Non-dominated sorting of three and more objectives by divide and conquer.
+//! Non-dominated sorting of three or more objectives by divide and conquer.
 //!
-//! Source: M. T. Jensen, IEEE Transactions on Evolutionary Computation 7 (2003) 503-515; F.-A. Fortin, S. Grenier, M. Parizeau,
-//! GECCO (2013) 615-622, for objectives that may be equal; M. Buzdalov, A. Shalyto, PPSN XIII (2014) 528-537, for the bound
-//! `O(n log^(m-1) n)`.
+//! Source: M. T. Jensen, IEEE Transactions on Evolutionary Computation 7 (2003) 503-515; F.-A. Fortin, S. Grenier, M.
+//! Parizeau, GECCO (2013) 615-622, for equal objectives; M. Buzdalov, A. Shalyto, PPSN XIII (2014) 528-537, for the
+//! bound `O(n log^(m-1) n)`.
 
-/// Sets that are no larger are compared pair by pair.
+/// Largest set that is compared pair by pair.
 const FEW: usize = 32;
 
-/// Different points in lexicographic order, and their ranks as far as they are known: each is at least that.
+/// Distinct points in lexicographic order, with lower bounds of their ranks.
 pub(super) struct Divide<'a> {
     /// Objectives, `m` per point.
     objectives: &'a [f64],
     m: usize,
-    /// The ranks.
+    /// Ranks of the points.
     pub(super) ranks: Vec<u32>,
-    /// Of every point the place of its second objective among all of them.
+    /// Position of each point's second objective in the sorted list of all.
     seconds: Vec<u32>,
-    /// Of a sweep: by that place one more than the largest rank so far, as a Fenwick tree of maxima.
+    /// Fenwick tree of maxima for a sweep: by that position, one more than the largest rank so far.
     tree: Vec<u32>,
 }
 
 impl<'a> Divide<'a> {
-    /// Ranks the points.
+    /// Returns the ranks of the points.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn ranked(objectives: &'a [f64], m: usize) -> Vec<u32> {
         let count = objectives.len() / m;
@@ -40,7 +40,7 @@ impl<'a> Divide<'a> {
         divide.ranks
     }
 
-    /// Ranks points among each other that are equal in the objectives from `k` on.
+    /// Ranks points that are equal in the objectives from `k` on among each other.
     fn among(&mut self, points: &[u32], k: usize) {
         if points.len() <= FEW {
             for (at, &j) in points.iter().enumerate() {
@@ -62,7 +62,7 @@ impl<'a> Divide<'a> {
         }
     }
 
-    /// Ranks points after others, whose ranks are known, and which are not worse in the objectives from `k` on.
+    /// Ranks points after others with known ranks that are not worse in the objectives from `k` on.
     fn after(&mut self, known: &[u32], points: &[u32], k: usize) {
         if known.len().min(points.len()) <= 2 || known.len() * points.len() <= FEW * FEW {
             for &j in points {
@@ -113,11 +113,11 @@ impl<'a> Divide<'a> {
         self.clear(points);
     }
 
-    /// Ranks points after those that are known by their first two objectives.
+    /// Ranks points after those with known ranks, by their first two objectives.
     fn sweep(&mut self, known: &[u32], points: &[u32]) {
         let mut before = known.iter().copied().peekable();
         for &j in points {
-            // What is not worse stands before in lexicographic order.
+            // Points that are not worse come first in lexicographic order.
             while let Some(i) = before.next_if(|&i| i < j) {
                 self.enter(i);
             }
@@ -126,7 +126,7 @@ impl<'a> Divide<'a> {
         self.clear(known);
     }
 
-    /// Ranks a point after those that the tree holds.
+    /// Ranks a point after those in the tree.
     fn follow(&mut self, j: u32) {
         let rank = &mut self.ranks[j as usize];
         let mut place = self.seconds[j as usize] + 1;
@@ -136,7 +136,7 @@ impl<'a> Divide<'a> {
         }
     }
 
-    /// Empties the tree of these points.
+    /// Removes these points from the tree.
     fn clear(&mut self, points: &[u32]) {
         for &i in points {
             self.change(i, |_| 0);
@@ -149,7 +149,7 @@ impl<'a> Divide<'a> {
         self.change(i, |most| most.max(rank));
     }
 
-    /// Changes every node of the tree that holds a point.
+    /// Changes every node of the tree that covers a point.
     fn change(&mut self, i: u32, to: impl Fn(u32) -> u32) {
         let mut place = self.seconds[i as usize] as usize + 1;
         while place < self.tree.len() {
@@ -158,7 +158,7 @@ impl<'a> Divide<'a> {
         }
     }
 
-    /// The last of the first `k` objectives.
+    /// Returns the last of the first `k` objectives of a point.
     fn value(&self, i: u32, k: usize) -> f64 {
         self.objectives[i as usize * self.m + k - 1]
     }
@@ -169,7 +169,7 @@ impl<'a> Divide<'a> {
         *values.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// Points of which the last of the first `k` objectives is less, equal and more, in their order.
+    /// Splits points into those whose last of the first `k` objectives is less, equal and greater, keeping their order.
     fn split(&self, points: &[u32], middle: f64, k: usize) -> [Vec<u32>; 3] {
         let mut parts = [const { Vec::new() }; 3];
         for &i in points {
@@ -180,7 +180,7 @@ impl<'a> Divide<'a> {
     }
 }
 
-/// Two lists in increasing order as one.
+/// Merges two lists in increasing order.
 fn merged(a: &[u32], b: &[u32]) -> Vec<u32> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let mut rest = b.iter().copied().peekable();

@@ -1,14 +1,15 @@
-//! The volume that a front dominates.
+//! Hypervolume of a front.
 
 use super::{compare, non_dominated};
 
-/// The volume between the points and `reference`, of which points that are not better in every objective have no part.
+/// Returns the hypervolume between the points and `reference`. Points that are not better than `reference` in every
+/// objective do not count.
 ///
-/// Two objectives: a sweep. Three: a sweep along the third with the staircase of the other two. More: the exclusive volumes
-/// of one point after the other (WFG).
+/// Two objectives: a sweep. Three: a sweep along the third with the staircase of the other two. More: the exclusive
+/// volumes of one point after the other (WFG).
 ///
-/// Source: C. M. Fonseca, L. Paquete, M. Lopez-Ibanez, IEEE CEC (2006) 1157-1163 (dimension sweep); L. While, L. Bradstreet,
-/// L. Barone, IEEE Transactions on Evolutionary Computation 16 (2012) 86-95 (WFG).
+/// Source: C. M. Fonseca, L. Paquete, M. Lopez-Ibanez, IEEE CEC (2006) 1157-1163 (dimension sweep); L. While, L.
+/// Bradstreet, L. Barone, IEEE Transactions on Evolutionary Computation 16 (2012) 86-95 (WFG).
 pub fn hypervolume(objectives: &[f64], reference: &[f64]) -> f64 {
     let m = reference.len();
     let inside = objectives.chunks_exact(m.max(1)).filter(|point| point.iter().zip(reference).all(|(f, r)| f < r));
@@ -34,7 +35,7 @@ fn area(points: &mut [Vec<f64>], reference: &[f64]) -> f64 {
     sum
 }
 
-/// Sweeps along the third objective; the area of the staircase grows by what each point adds to it.
+/// Sweeps along the third objective; each point adds its exclusive area to the staircase.
 fn volume(points: &mut [Vec<f64>], reference: &[f64]) -> f64 {
     points.sort_unstable_by(|a, b| a[2].total_cmp(&b[2]));
     // Steps of the staircase: the first objective increases, the second decreases.
@@ -50,7 +51,7 @@ fn volume(points: &mut [Vec<f64>], reference: &[f64]) -> f64 {
         if from > 0 && stairs[from - 1][1] <= y || stairs.get(from).is_some_and(|step| step[0] == x && step[1] <= y) {
             continue;
         }
-        // The new step covers those behind it that are not lower.
+        // The new step covers subsequent ones that are not lower.
         let to = from + stairs[from..].partition_point(|step| step[1] >= y);
         let mut ceiling = if from > 0 { stairs[from - 1][1] } else { reference[1] };
         let mut left = x;
@@ -66,7 +67,7 @@ fn volume(points: &mut [Vec<f64>], reference: &[f64]) -> f64 {
 }
 
 fn exclusive(mut points: Vec<Vec<f64>>, reference: &[f64]) -> f64 {
-    // The worst in the last objective first: the limited sets become small.
+    // Points are ordered from the worst in the last objective, so that the limited sets become small.
     points.sort_unstable_by(|a, b| b[b.len() - 1].total_cmp(&a[a.len() - 1]).then(compare(a, b)));
     let m = reference.len();
     let mut sum = 0.0;
@@ -87,7 +88,7 @@ mod tests {
 
     use super::*;
 
-    /// By inclusion and exclusion over all subsets.
+    /// Returns the hypervolume by inclusion and exclusion over all subsets.
     fn by_subsets(points: &[Vec<f64>], reference: &[f64]) -> f64 {
         let mut sum = 0.0;
         for subset in 1_u32..1 << points.len() {

@@ -1,7 +1,7 @@
-//! Fronts of points that no other is better than in every objective: sorting, thinning, and how good a front is.
+//! Pareto fronts: non-dominated sorting, thinning, and quality indicators.
 //!
-//! Objectives are minimised and stand in one array, `m` per point. A point dominates another if it is worse in no objective
-//! and better in one.
+//! Objectives are minimised and stored in one array, `m` per point. A point dominates another if it is worse in no
+//! objective and better in at least one.
 
 use crate::math;
 
@@ -14,7 +14,7 @@ pub use hypervolume::hypervolume;
 pub use read_outs::{knee, normalised, ranges};
 pub use sort::FrontSorter;
 
-/// Indices of the points that no other dominates, in increasing order; of equal points the first.
+/// Returns the indices of the non-dominated points, in increasing order; only the first of equal points.
 pub fn non_dominated(objectives: &[f64], m: usize) -> Vec<usize> {
     let mut sorter = FrontSorter::default();
     let ranks = sorter.sort(objectives, m);
@@ -26,8 +26,10 @@ pub fn non_dominated(objectives: &[f64], m: usize) -> Vec<usize> {
     first
 }
 
-/// At most `count` of the points, spread evenly: the best in every objective, then again and again the one farthest from
-/// those taken, each objective measured by its range.
+/// Returns at most `count` points, spread evenly.
+///
+/// The best point in every objective comes first, then repeatedly the one farthest from those selected. Each objective
+/// is normalised by its range.
 pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
     let points = objectives.len() / m.max(1);
     if points <= count {
@@ -55,7 +57,8 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
     taken
 }
 
-/// The inverted generational distance: the mean over the points of a reference front of the distance to the nearest point.
+/// Returns the inverted generational distance: the mean distance of the points of a reference front to their nearest
+/// point.
 ///
 /// Source: C. A. Coello Coello, M. Reyes Sierra, MICAI (2004), Lecture Notes in Artificial Intelligence 2972, 688-697.
 #[allow(clippy::cast_precision_loss)]
@@ -67,9 +70,9 @@ pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &
     reference.iter().map(nearest).sum::<f64>() / reference.len() as f64
 }
 
-/// The order by the first objective, then the second, and so on.
+/// Compares lexicographically: by the first objective, then the second, and so on.
 pub(crate) fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
-    // Zeros of either sign are equal, as they are to who asks which is less.
+    // Zeros of either sign are equal, consistent with the operator `<`.
     let order = |(a, b): (&f64, &f64)| a.partial_cmp(b).unwrap_or_else(|| a.total_cmp(b));
     a.iter().zip(b).map(order).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
 }

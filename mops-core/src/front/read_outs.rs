@@ -1,6 +1,6 @@
-//! What a front tells at a glance: how far it reaches, and where its knee is.
+//! Summary of a front: its ranges and its knee.
 
-/// The least and the largest value of every objective.
+/// Returns the smallest and the largest value of every objective.
 pub fn ranges(objectives: &[f64], m: usize) -> Vec<[f64; 2]> {
     let range = |k: usize| {
         let column = || objectives.iter().skip(k).step_by(m);
@@ -9,14 +9,16 @@ pub fn ranges(objectives: &[f64], m: usize) -> Vec<[f64; 2]> {
     (0..m).map(range).collect()
 }
 
-/// The objectives, each 0 at its least and 1 at its largest value; 0 where these are the same.
+/// Returns the objectives normalised to 0 at the smallest and 1 at the largest value; 0 if these are equal.
 pub fn normalised(objectives: &[f64], ranges: &[[f64; 2]]) -> Vec<f64> {
     let scale = |(f, [low, high]): (&f64, &[f64; 2])| if high > low { (f - low) / (high - low) } else { 0.0 };
     objectives.chunks_exact(ranges.len().max(1)).flat_map(|row| row.iter().zip(ranges).map(scale)).collect()
 }
 
-/// The knee: the point farthest from the plane through the points that are best in one objective and worst in all others,
-/// on the side of the ideal point, each objective measured by its range. `None` where no point lies on that side.
+/// Returns the knee of the front, or `None` if no point lies on the side of the ideal point.
+///
+/// The knee is the point farthest from a plane, towards the ideal point. The plane passes through the points that are
+/// best in one objective and worst in all others. Each objective is normalised by its range.
 ///
 /// Source: I. Das, Structural Optimization 18 (1999) 107-115.
 pub fn knee(objectives: &[f64], m: usize) -> Option<usize> {
@@ -35,7 +37,7 @@ mod tests {
 
     #[test]
     fn the_knee_of_a_hyperbola_is_its_corner() {
-        // y = 1/x from 1/8 to 8, in units that differ by a thousand.
+        // y = 1/x from 1/8 to 8, in units that differ by a factor of 1000.
         let points: Vec<f64> =
             (-30..=30).map(|i| math::powf(2.0, f64::from(i) / 10.0)).flat_map(|x| [x, 1000.0 / x]).collect();
         let knee = knee(&points, 2).unwrap();
@@ -43,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn a_front_that_bulges_away_has_no_knee() {
+    fn a_concave_front_has_no_knee() {
         let arc = |i: u32| math::sin_cos(f64::from(i) / 20.0 * std::f64::consts::FRAC_PI_2);
         let points: Vec<f64> = (0..=20).map(arc).flat_map(|(s, c)| [s, c]).collect();
         assert_eq!(knee(&points, 2), None);

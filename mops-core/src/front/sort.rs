@@ -3,25 +3,26 @@
 use super::compare;
 use super::divide::Divide;
 
-/// Sorts points into fronts: rank 0 is dominated by none, rank 1 only by those of rank 0, and so on. Objectives may be infinite,
-/// and no NaN. Of one and two it keeps its memory between calls.
+/// Sorter of points into fronts: rank 0 is dominated by none, rank 1 only by points of rank 0, and so on.
 ///
-/// Two objectives take `O(n log n)`: the points are swept in the order of the first, and each front remembers the least
-/// second objective so far. More take `O(n log^(m-1) n)` by divide and conquer.
+/// Objectives may be infinite, but not NaN. With one or two objectives, buffers are reused between calls.
+///
+/// Two objectives take `O(n log n)`: the points are swept in the order of the first, and each front keeps the least
+/// second objective so far. More objectives take `O(n log^(m-1) n)` by divide and conquer.
 ///
 /// Source: M. T. Jensen, IEEE Transactions on Evolutionary Computation 7 (2003) 503-515.
 #[derive(Debug, Clone, Default)]
 pub struct FrontSorter {
     order: Vec<u32>,
     ranks: Vec<u32>,
-    /// The least second objective of every front.
+    /// Smallest second objective of every front.
     tails: Vec<f64>,
-    /// Objectives of the different points, in lexicographic order.
+    /// Objectives of the distinct points, in lexicographic order.
     different: Vec<f64>,
 }
 
 impl FrontSorter {
-    /// The rank of every point.
+    /// Returns the rank of every point.
     #[allow(clippy::cast_possible_truncation)]
     pub fn sort(&mut self, objectives: &[f64], m: usize) -> &[u32] {
         let count = objectives.len().checked_div(m).unwrap_or(0);
@@ -29,8 +30,7 @@ impl FrontSorter {
         self.order.clear();
         self.order.extend(0..count as u32);
         if m == 2 {
-            // In the order of the first objective; equal ones by the second.
-            // Zeros of either sign are equal.
+            // Points are ordered by the first objective, equal ones by the second. Zeros of either sign are equal.
             let key = |i: u32| (objectives[2 * i as usize] + 0.0, objectives[2 * i as usize + 1] + 0.0);
             self.order.sort_unstable_by(|&a, &b| {
                 let ((a0, a1), (b0, b1)) = (key(a), key(b));
@@ -50,7 +50,7 @@ impl FrontSorter {
         &self.ranks
     }
 
-    /// Of one objective: equal points share a rank.
+    /// Ranks points by a single objective; equal points share a rank.
     fn levels(&mut self, objectives: &[f64]) {
         let mut rank = 0;
         for pair in self.order.windows(2) {
@@ -84,7 +84,7 @@ impl FrontSorter {
         }
     }
 
-    /// Divides the points, of equal ones the first.
+    /// Ranks the distinct points by divide and conquer.
     #[allow(clippy::cast_possible_truncation)]
     fn divide(&mut self, objectives: &[f64], m: usize) {
         let row = |i: u32| &objectives[i as usize * m..(i as usize + 1) * m];
@@ -109,7 +109,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether `a` dominates `b`.
+    /// Returns true if `a` dominates `b`.
     fn dominates(a: &[f64], b: &[f64]) -> bool {
         let mut better = false;
         for (a, b) in a.iter().zip(b) {
@@ -121,7 +121,7 @@ mod tests {
         better
     }
 
-    /// By the definition: peel off what nothing left dominates.
+    /// Returns the ranks by definition: repeatedly removes the non-dominated points.
     fn peeled(objectives: &[f64], m: usize) -> Vec<u32> {
         let points: Vec<&[f64]> = objectives.chunks_exact(m).collect();
         let mut ranks = vec![u32::MAX; points.len()];
@@ -149,7 +149,7 @@ mod tests {
                 let points: Vec<f64> = (0..m * count).map(|_| f64::from(random.random_range(0..12))).collect();
                 assert_eq!(sorter.sort(&points, m), peeled(&points, m), "{m} objectives, {count} points");
             }
-            // Near a sphere, as a search has them at its end; some with a zero of the other sign.
+            // Points near a sphere, as at the end of a search, some with a negative zero.
             let near = |_| {
                 let point: Vec<f64> = (0..m).map(|_| random.random()).collect();
                 let far = 1.0 + 0.05 * f64::from(random.random_range(0..3));

@@ -1,20 +1,20 @@
-//! What estimates would be if every sample counted alike.
+//! Estimates with every sample weighted by its noise level only.
 
 use super::noise::Noise;
 
-/// Ratio of sample counts from which on the weights of records are worth a word.
+/// Ratio of sample counts from which on the weights of records are reported.
 const UNLIKE: usize = 2;
 
-/// Estimates if every sample counted alike, by its noise, to first order.
+/// Estimates with every sample weighted by its noise level only, to first order.
 #[derive(Debug, Clone)]
 pub struct Alike {
-    /// Samples of the shortest and of the longest record.
+    /// Number of samples of the shortest and of the longest record.
     pub samples: [usize; 2],
     /// Change and standard error of the estimate of every active tuner, in its unit.
     pub tuners: Vec<(f64, f64)>,
 }
 
-/// `None` where records are about as long as each other.
+/// Returns the estimates with equal sample weights, or `None` if the records have similar lengths.
 pub(super) fn alike(noise: &Noise) -> Option<Alike> {
     let counts = || noise.records().filter(|record| record.signal.is_some()).map(|record| record.len());
     let samples = [counts().min()?, counts().max()?];

@@ -1,49 +1,51 @@
-//! Directions along which nothing changes: a readable basis of them, and the words for it.
+//! Non-identifiable directions: a readable basis of them, and their wording.
 
 use nalgebra::DMatrix;
 
 use super::sensitivity::Coordinate;
 use super::words::{coefficient, listed, percent};
 
-/// Entries below this share of the largest take no part, in coordinates in which all columns of the Jacobian are of unit
-/// length.
+/// Share of the largest entry below which a tuner takes no part in a direction, in coordinates with unit-length
+/// Jacobian columns.
 pub(super) const NO_PART: f64 = 1e-5;
 
-/// As above, for entries that are also small as relative changes.
+/// Share of the largest entry below which a tuner takes no part if its relative change is also small.
 const SMALL_PART: f64 = 1e-3;
 
-/// Changes below this share of the largest are not named one by one.
+/// Share of the largest change below which a change is not listed by name.
 const NAMED: f64 = 0.05;
 
-/// Relative changes that differ less are equal.
+/// Difference below which relative changes count as equal.
 const EQUAL: f64 = 2e-3;
 
-/// Why a direction is not determined.
+/// Reason why a direction is not determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
-    /// Nothing changes along it.
+    /// No change along the direction.
     Nothing,
-    /// What changes along it is below the noise.
+    /// Change along the direction below the noise.
     Noise,
-    /// What changes along it is below the accuracy of the slopes.
+    /// Change along the direction below the accuracy of the derivatives.
     Slopes,
 }
 
-/// A direction of the tuners that is not determined, to first order.
+/// Direction of the tuners that is not determined, to first order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlindDirection {
-    /// Why it is not.
+    /// Reason why the direction is not determined.
     pub limit: Limit,
-    /// The change of each tuner that takes part, by index and as a share of [`Coordinate::scale`]; the largest is 1.
+    /// Change of each tuner that takes part, by index and relative to [`Coordinate::scale`]; the largest is 1.
     pub changes: Vec<(usize, f64)>,
-    /// What can be estimated, and what cannot, as a clause.
+    /// Clause that states what can be estimated, and what cannot.
     pub words: String,
-    /// Whether it is a straight line in the tuners; otherwise one in their logarithms, as where they are multiplied.
+    /// True for a straight line in the tuners; false for one in their logarithms, as for products and ratios.
     pub straight: bool,
 }
 
-/// A basis of directions that are not determined, which names as few tuners each as elimination gives. The rows of `null`
-/// span them in coordinates in which column `k` of the Jacobian has unit length instead of `lengths[k]`.
+/// Returns a basis of directions that are not determined, reduced by elimination so that each involves few tuners.
+///
+/// The rows of `null` span the directions in coordinates in which column `k` of the Jacobian has unit length instead of
+/// `lengths[k]`.
 pub(super) fn directions(
     mut null: DMatrix<f64>,
     lengths: &[f64],
@@ -67,7 +69,7 @@ pub(super) fn directions(
             let most = members.iter().map(|&k| shares[k].abs()).fold(0.0, f64::max);
             let changes: Vec<(usize, f64)> = members.iter().map(|&k| (k, first * shares[k] / most)).collect();
             let words = words(&changes, coordinates);
-            // What the sentence says of the names, which stand between backticks.
+            // Text outside the names, which are between backticks.
             let said: String = words.split('`').step_by(2).collect();
             let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| said.contains(sign));
             BlindDirection { limit, straight: !multiplied, words, changes }
@@ -75,7 +77,7 @@ pub(super) fn directions(
         .collect()
 }
 
-/// Gauss-Jordan elimination, each row with its largest entry as the pivot.
+/// Performs Gauss-Jordan elimination, with the largest entry of each row as the pivot.
 fn eliminate(null: &mut DMatrix<f64>) {
     let (rows, n) = null.shape();
     let mut free = vec![true; n];
@@ -100,17 +102,17 @@ fn eliminate(null: &mut DMatrix<f64>) {
     }
 }
 
-/// What can be estimated, and what cannot. Names stand between backticks.
+/// Returns a clause that states what can be estimated, and what cannot. Names are between backticks.
 fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
     let name = |k: usize| format!("`{}`", coordinates[k].name);
     let relative = changes.iter().all(|&(k, _)| coordinates[k].value != 0.0);
     match changes {
-        [] => "nothing is known of this direction".to_owned(),
+        [] => "this direction is not determined".to_owned(),
         [(one, _)] => format!("{} has no effect", name(*one)),
         [(a, x), (b, y)] => {
             let (ratio, near) = (y / x, |wanted: f64| (y / x - wanted).abs() < EQUAL * wanted.abs());
             let [a_name, b_name] = [name(*a), name(*b)];
-            // Along the direction ln a moves by x and ln b by y: a power of a times one of b stays.
+            // Along the direction ln a moves by x and ln b by y, so that a power of a times a power of b is constant.
             let power = [2u8, 3].into_iter().find(|&p| {
                 let times = f64::from(p);
                 let more = if ratio.abs() > 1.0 { times } else { 1.0 / times };
@@ -118,9 +120,7 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
             });
             match power {
                 _ if relative && near(1.0) => {
-                    format!(
-                        "only the ratio {a_name}/{b_name} can be estimated: a common factor of both changes nothing"
-                    )
+                    format!("only the ratio {a_name}/{b_name} can be estimated: a common factor of both has no effect")
                 }
                 _ if relative && near(-1.0) => format!("only the product {a_name} {b_name} can be estimated"),
                 Some(p) if relative => {
@@ -137,11 +137,11 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
         }
         many if relative && many.iter().all(|(_, share)| (share - many[0].1).abs() < EQUAL) => {
             let names: Vec<String> = many.iter().map(|&(k, _)| name(k)).collect();
-            format!("a common factor of {} changes nothing: only their ratios can be estimated", listed(&names))
+            format!("a common factor of {} has no effect: only their ratios can be estimated", listed(&names))
         }
         many => {
             let change = |&(k, share): &(usize, f64)| {
-                let verb = if share < 0.0 { "falls" } else { "rises" };
+                let verb = if share < 0.0 { "decreases" } else { "increases" };
                 let Coordinate { value, unit, .. } = &coordinates[k];
                 let by = match *value {
                     0.0 => format!("{} {unit}", coefficient(0.01 * share.abs() * coordinates[k].scale())),
@@ -155,7 +155,7 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
                 1 => ", with a smaller change of another tuner".to_owned(),
                 count => format!(", with smaller changes of {count} other tuners"),
             };
-            format!("nothing changes where {}{less}", listed(&main))
+            format!("no effect if {}{less}", listed(&main))
         }
     }
 }
@@ -168,7 +168,8 @@ mod tests {
     use super::super::sensitivity::{Sensitivity, TANGENTS};
     use super::*;
 
-    /// Sensitivity of two hundred residuals that depend on the tuners through these combinations: one gradient each.
+    /// Returns the sensitivity of 200 residuals that depend on the tuners through these combinations, one gradient
+    /// each.
     fn found(tuners: &[(&str, f64)], gradients: &[Vec<f64>]) -> Sensitivity {
         let coordinates = tuners
             .iter()
@@ -199,7 +200,7 @@ mod tests {
         assert_eq!(pair(vec![b, a]), "only the product `a` `b` can be estimated");
         assert_eq!(
             pair(vec![1.0 / b, -a / b / b]),
-            "only the ratio `a`/`b` can be estimated: a common factor of both changes nothing"
+            "only the ratio `a`/`b` can be estimated: a common factor of both has no effect"
         );
         assert_eq!(pair(vec![2.0 * a * b, a * a]), "only `a`^2 `b` can be estimated");
         assert_eq!(pair(vec![1.0 / b / b, -2.0 * a / b / b / b]), "only `b`^2/`a` can be estimated");
@@ -207,21 +208,21 @@ mod tests {
 
     #[test]
     fn a_common_scale_of_many_is_named_beside_what_is_determined() {
-        // Seen are a/b, b/c and d: a common factor of a, b, c is not.
+        // Observable: a/b, b/c and d; not observable: a common factor of a, b, c.
         let (a, b, c) = (2.0, 0.5, 1e-3);
         let gradients =
             [vec![1.0 / b, -a / b / b, 0.0, 0.0], vec![0.0, 1.0 / c, -b / c / c, 0.0], vec![0.0, 0.0, 0.0, 1.0]];
         let found = found(&[("a", a), ("b", b), ("c", c), ("d", 1.0)], &gradients);
         assert_eq!(
             found.blind[0].words,
-            "a common factor of `a`, `b` and `c` changes nothing: only their ratios can be estimated"
+            "a common factor of `a`, `b` and `c` has no effect: only their ratios can be estimated"
         );
         assert!(found.together[0].is_nan() && found.together[3].is_finite(), "{:?}", found.together);
     }
 
     #[test]
-    fn two_blind_directions_are_told_apart_and_other_ones_are_said_in_percent() {
-        // Seen: a b and c d^3.
+    fn two_blind_directions_are_separated_and_other_ones_are_given_in_percent() {
+        // Observable: a b and c d^3.
         let (a, b, c, d) = (2.0, 5.0, 1.0, 0.3);
         let gradients = [vec![b, a, 0.0, 0.0], vec![0.0, 0.0, math::powi(d, 3), 3.0 * c * d * d]];
         let mut both = words(&[("a", a), ("b", b), ("c", c), ("d", d)], &gradients);
@@ -229,6 +230,6 @@ mod tests {
         assert_eq!(both, ["only `d`^3 `c` can be estimated", "only the product `a` `b` can be estimated"]);
         let three = words(&[("a", 2.0), ("b", 4.0), ("c", 0.0)], &[vec![1.0, 0.25, 0.0], vec![0.0, 1.0, 8.0]]);
         assert_eq!(three.len(), 1);
-        assert!(three[0].starts_with("nothing changes where `a` rises by"), "{three:?}");
+        assert!(three[0].starts_with("no effect if `a` increases by"), "{three:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Covariance of estimates, and what it makes of predictions.
+//! Covariance of estimates, and its effect on predictions.
 
 use nalgebra::DMatrix;
 
@@ -7,36 +7,39 @@ use super::noise::{Noise, Part, Spread};
 use super::sensitivity::Sensitivity;
 use crate::problem::Problem;
 
-/// Entries of the influence below this share of the largest of their tuner are what rounding leaves of 0.
+/// Share of a tuner's largest influence below which an entry counts as rounding error.
 const ROUNDING: f64 = 1e-12;
 
-/// Covariance of the estimates of the active tuners, to first order: of the minimum of `r' r` over weighted residuals `r` with
-/// the Jacobian `J`,
+/// Covariance of the estimates of the active tuners, to first order.
+///
+/// For the minimum of `r' r` over weighted residuals `r` with the Jacobian `J`:
 /// ```text
 /// C = A^-1 B A^-1,   A = J' J,   B = J' cov(r) J
 /// ```
-/// (the sandwich). It holds for any weights: those of criteria, and those that criteria give to samples. Of the weights that
-/// are inverse variances `A = B`, up to a factor. Directions that slopes do not resolve are left out of it.
+/// This sandwich estimator is valid for any weights, of criteria and of samples. For inverse-variance weights `A = B`,
+/// up to a factor. Directions that the derivatives do not resolve are excluded.
 ///
-/// Source: P. J. Huber, Proceedings of the Fifth Berkeley Symposium (1967) 221-233; H. White, Econometrica 48 (1980) 817-838.
+/// Source: P. J. Huber, Proceedings of the Fifth Berkeley Symposium (1967) 221-233; H. White, Econometrica 48 (1980)
+/// 817-838.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     noise: Noise,
     parts: Vec<Part>,
-    /// Which tuners are not determined.
+    /// True for each tuner that is not determined.
     undetermined: Vec<bool>,
-    /// Number of directions that are left out.
+    /// Number of excluded directions.
     pub left_out: usize,
 }
 
 impl Covariance {
-    /// At estimates; `None` where nothing is measured, a simulation fails, or no residual shows the noise.
+    /// Computes the covariance at the estimates; `None` without measurements, if a simulation fails, or if no residual
+    /// shows the noise.
     pub fn at(problem: &Problem, tuners: &[f64]) -> Option<Self> {
         local(problem, tuners, Point::Minimum, problem.study().tasks.sensitivity.zero)?.covariance
     }
 
-    /// From the noise of the residuals, their Jacobian in the tuners' own units, and the directions that it resolves; `None` where
-    /// no noise is known.
+    /// Computes the covariance from the noise of the residuals, their Jacobian in the tuners' own units, and the
+    /// resolved directions. Returns `None` if no noise level is known.
     pub(super) fn of(noise: Noise, jacobian: &DMatrix<f64>, sensitivity: &Sensitivity) -> Option<Self> {
         let mut influence = jacobian * &sensitivity.inverse;
         for mut column in influence.column_iter_mut() {
@@ -48,12 +51,12 @@ impl Covariance {
         (noise.freedom() >= 1.0).then_some(Self { noise, parts, undetermined, left_out })
     }
 
-    /// Covariance of estimates of which these are not determined.
+    /// Returns the covariance with these tuners marked as not determined.
     pub(super) fn without(self, undetermined: &[bool]) -> Self {
         Self { undetermined: undetermined.to_vec(), ..self }
     }
 
-    /// Spread of a quantity with these slopes along the active tuners.
+    /// Returns the spread of a quantity, given its gradient with respect to the active tuners.
     pub fn spread(&self, slopes: &[f64]) -> Spread {
         let share = |part: &Part| -> f64 {
             let row = |a: usize| (0..slopes.len()).map(|b| part.matrix[(a, b)] * slopes[b]).sum::<f64>();
@@ -62,7 +65,7 @@ impl Covariance {
         Spread::of_sum(self.parts.iter().map(|part| (share(part), part.pool)))
     }
 
-    /// Spread of the estimate of an active tuner, in its unit; NaN where the data do not determine it.
+    /// Returns the spread of the estimate of an active tuner, in its unit; NaN if the data do not determine it.
     pub fn of_tuner(&self, k: usize) -> Spread {
         if self.undetermined[k] {
             return Spread { deviation: f64::NAN, freedom: f64::NAN };
@@ -70,14 +73,14 @@ impl Covariance {
         Spread::of_sum(self.parts.iter().map(|part| (part.matrix[(k, k)], part.pool)))
     }
 
-    /// The matrix, in the tuners' own units, as far as the noise is known.
+    /// Returns the covariance matrix, in the tuners' own units, as far as the noise is known.
     pub(super) fn matrix(&self) -> DMatrix<f64> {
         let n = self.parts.first().map_or(0, |part| part.matrix.nrows());
         let known = self.parts.iter().filter(|part| part.pool.variance.is_finite());
         known.fold(DMatrix::zeros(n, n), |sum, part| sum + &part.matrix * part.pool.variance)
     }
 
-    /// Noise of the residuals.
+    /// Returns the noise of the residuals.
     pub fn noise(&self) -> &Noise {
         &self.noise
     }

@@ -5,25 +5,25 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Largest order that is tested.
 const MOST: usize = 200;
 
-/// Parts of the record that are looked at one by one.
+/// Number of parts of the record that are evaluated separately.
 const PARTS: usize = 16;
 
-/// What excites no more parts than this is a transient: an edge in each of two places, at the border of two parts each.
+/// Largest number of parts that a transient excites: an edge at each of two places, each at the border of two parts.
 const TRANSIENT: usize = 4;
 
-/// Shorter records tell nothing.
+/// Smallest number of samples of a record with a result.
 const LEAST: usize = 24;
 
-/// Share of the power that counts as none: what rounding to four digits leaves.
+/// Share of the power that counts as zero: the rounding error of four digits.
 const ROUNDING: f64 = 1e-8;
 
-/// Share of the power below which a floor that all directions have in common is taken for noise.
+/// Share of the power below which a common floor of all directions counts as noise.
 const NOISE: f64 = 1e-4;
 
-/// How often the floor of noise a direction must exceed.
+/// Factor by which a direction must exceed the noise floor.
 const CLEAR: f64 = 10.0;
 
-/// How rich a signal is: the largest `n` for which the matrix of its empirical covariances
+/// Order of persistent excitation: the largest `n` for which the matrix of the signal's empirical covariances
 ///
 /// ```text
 /// C_n = lim 1/N sum_t phi(t) phi(t)',    phi(t) = (u(t - 1), ..., u(t - n))
@@ -31,54 +31,59 @@ const CLEAR: f64 = 10.0;
 ///
 /// is positive definite. A pulse has order 0, a step 1, a sinusoid 2, a signal of period p at most p, white noise any.
 ///
-/// A record ends, and leaves eigenvalues of the order 1/N where the limit is zero: the edge of a step excites every
-/// order, once. So a direction `a` is judged by the power of `a' phi(t)` in each of sixteen equal parts of the record,
-/// without the four largest: what excites no more than four parts is a transient. Zero is a share of 1e-8 of the power, or
-/// ten times the noise: the one given, or a floor below 1e-4 that all directions have in common.
+/// In a finite record, eigenvalues of order 1/N remain where the limit is zero: the edge of a step excites every order
+/// once. Hence the power of `a' phi(t)` in a direction `a` is computed in sixteen equal parts of the record. The four
+/// largest are dropped: excitation of at most four parts is a transient. Power counts as zero below a share of 1e-8, or
+/// below ten times the noise. The noise is the given one, or a floor below 1e-4 that all directions share.
 ///
-/// N.B.: the rows of the sum are those with a full window, as in the least-squares problem itself, so that a sinusoid is
+/// N.B.: only rows with a full window enter the sum, as in the least-squares problem itself. A sinusoid thus is
 /// singular to rounding at order 3 for every N.
 ///
 /// Source: L. Ljung, System Identification, 2nd edition (1999), definition 13.1; K. J. Astrom, B. Wittenmark, Adaptive
 /// Control, 2nd edition (1995), section 2.4.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
-    /// The order found.
+    /// Order of persistent excitation.
     pub order: usize,
-    /// The largest order tested; an order as large as this is "at least".
+    /// Largest order tested; an equal order means "at least".
     pub tested: usize,
-    /// `c(0)`, mean square of the signal, in its unit squared.
+    /// Mean square `c(0)` of the signal, in its unit squared.
     pub power: f64,
-    /// Smallest eigenvalue of `C_order` that persists, as a share of the power.
+    /// Smallest persistent eigenvalue of `C_order`, relative to the power.
     pub eigenvalue: f64,
-    /// The same of `C_(order + 1)`, the first that counts as zero; none where the order is the largest tested.
+    /// Smallest persistent eigenvalue of `C_(order + 1)`, which counts as zero, relative to the power; `None` at the
+    /// largest order tested.
     pub next: Option<f64>,
-    /// Smallest eigenvalue of `C_(order + 1)` over the whole record and from rest, transients included, as a share of the
+    /// Smallest eigenvalue of `C_(order + 1)` over the whole record from rest, transients included, relative to the
     /// power.
     pub transient: Option<f64>,
     /// Share of the power that counts as zero.
     pub zero: f64,
-    /// Order and smallest persisting eigenvalue as a share of the power, to be drawn.
+    /// Orders and smallest persistent eigenvalues relative to the power, for plotting.
     pub spectrum: Vec<(usize, f64)>,
     /// Number of samples.
     pub samples: usize,
 }
 
 impl Excitation {
-    /// Whether the order is only known to be at least this.
+    /// Returns true if the order is only a lower bound.
     pub fn is_at_least(&self) -> bool {
         self.order > 0 && self.order == self.tested
     }
 
-    /// Whether that many parameters can be estimated consistently: a finite impulse response of length `n` needs order `n`.
-    /// Of more parameters than the largest order tested nothing is known.
+    /// Returns true if that many parameters can be estimated consistently.
+    ///
+    /// A finite impulse response of length `n` needs order `n`. For more parameters than the largest order tested the
+    /// result is undecided and false.
     pub fn suffices(&self, parameters: usize) -> bool {
         self.order >= parameters
     }
 }
 
-/// The order of persistent excitation of equally spaced samples; `noise` is the standard deviation of what was added to
-/// the signal, in its unit, where it is known. Records of fewer than 24 samples have order 0.
+/// Returns the order of persistent excitation of equally spaced samples.
+///
+/// `noise` is the standard deviation of the noise in the signal, in its unit, if known. Records of fewer than 24
+/// samples have order 0.
 #[allow(clippy::cast_precision_loss)]
 pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
     let samples = u.len();
@@ -98,7 +103,7 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
     if samples < LEAST || power == 0.0 || !power.is_finite() {
         return nothing;
     }
-    // Shares of the power in the windows, whatever the unit.
+    // Normalised by the power in the windows, so that the unit does not matter.
     let rows = samples - tested + 1;
     let within = u[tested - 1..].iter().map(|v| v * v).sum::<f64>() / rows as f64;
     let scale = if within > ROUNDING * power { within.sqrt() } else { power.sqrt() };
@@ -121,8 +126,8 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
         spectrum.push((n, smallest(n)));
         n = if n < 24 { n + 1 } else { (n + n / 5).max(n + 1) };
     }
-    // The smallest eigenvalue never grows with the order: C_n is a corner of C_(n + 1). So the first order that fails is
-    // found by halving what is left between two that were looked at.
+    // The smallest eigenvalue never grows with the order, as C_n is a submatrix of C_(n + 1). Bisection therefore finds
+    // the first order that fails.
     let order = match spectrum.iter().position(|(_, share)| *share <= zero) {
         Some(0) => 0,
         Some(first) => {
@@ -148,8 +153,9 @@ pub fn excitation(u: &[f64], noise: Option<f64>) -> Excitation {
     }
 }
 
-/// `1/rows sum_t phi(t) phi(t)'` over all full windows of `n` samples. Neighbouring entries of a diagonal differ by what
-/// enters and leaves the sum.
+/// Returns `1/rows sum_t phi(t) phi(t)'` over all full windows of `n` samples.
+///
+/// Neighbouring entries of a diagonal differ by the terms that enter and leave the sum.
 #[allow(clippy::cast_precision_loss)]
 fn covariances(u: &[f64], n: usize) -> DMatrix<f64> {
     let rows = u.len() - n + 1;
@@ -168,13 +174,13 @@ fn covariances(u: &[f64], n: usize) -> DMatrix<f64> {
     c
 }
 
-/// The smallest eigenvalue of order `n` over all windows, with nothing before the record.
+/// Returns the smallest eigenvalue of order `n` over all windows, with zeros before the record.
 fn from_rest(u: &[f64], n: usize) -> f64 {
     let padded: Vec<f64> = std::iter::repeat_n(0.0, n - 1).chain(u.iter().copied()).collect();
     SymmetricEigen::new(covariances(&padded, n)).eigenvalues.min().max(0.0)
 }
 
-/// What persists of the smallest eigenvalue of the leading block of order `n`.
+/// Returns the persistent part of the smallest eigenvalue of the leading block of order `n`.
 #[allow(clippy::cast_precision_loss)]
 fn smallest(parts: &[DMatrix<f64>], n: usize) -> f64 {
     let least = |of: &[usize]| -> (f64, DVector<f64>) {
@@ -186,7 +192,7 @@ fn smallest(parts: &[DMatrix<f64>], n: usize) -> f64 {
     let mut order: Vec<usize> = (0..parts.len()).collect();
     let (all, mut direction) = least(&order);
     let mut powers: Vec<f64>;
-    // The direction that is weakest without the transients: they are known only once it is.
+    // Weakest direction without the transients, found iteratively because the transients depend on the direction.
     for _ in 0..2 {
         powers = parts.iter().map(|part| (part.view((0, 0), (n, n)) * &direction).dot(&direction)).collect();
         order.sort_by(|&i, &j| powers[j].total_cmp(&powers[i]));
@@ -213,7 +219,8 @@ mod tests {
         (0..samples).map(u).collect()
     }
 
-    /// Maximum-length sequence of seven bits, x^7 + x^6 + 1: period 127.
+    /// Returns a maximum-length sequence of seven bits, x^7 + x^6 + 1: period 127.
+    ///
     /// Source: S. W. Golomb, Shift Register Sequences (1967).
     fn prbs(samples: u32) -> Vec<f64> {
         let mut register = 1u8;
@@ -233,9 +240,9 @@ mod tests {
         for at in [0, 1, 40, 300, 500] {
             assert_eq!(order(&signal(1000, |t| f64::from(u8::from(t >= at)))), 1, "step at {at}");
         }
-        // A step before the record began leaves its edge to a system that was at rest.
+        // For a system initially at rest, the edge of a step before the record still excites.
         assert!(excitation(&[1.0; 1000], None).transient.unwrap() > 1e-4);
-        // Without the parts of the record, the edge alone would make the step exciting of any order.
+        // Without the partition of the record, the edge alone would give the step any order.
         let step = excitation(&signal(1000, |t| f64::from(u8::from(t >= 300))), None);
         assert!(step.next.unwrap() < 1e-12 && step.transient.unwrap() > 1e-4, "{step:?}");
     }
@@ -245,7 +252,7 @@ mod tests {
         for w in [0.01, 0.1, 1.0, 2.5] {
             let found = excitation(&signal(3000, |t| math::sin(w * f64::from(t))), None);
             assert_eq!(found.order, 2, "{w}");
-            // C_2 = 1/2 (1, cos w; cos w, 1): the smaller eigenvalue is 1/2 (1 - |cos w|), of a power of 1/2.
+            // C_2 = 1/2 (1, cos w; cos w, 1): the smaller eigenvalue is 1/2 (1 - |cos w|), relative to a power of 1/2.
             let exact = 1.0 - math::cos(w).abs();
             assert!((found.eigenvalue / exact - 1.0).abs() < 0.5, "{w}: {} {exact}", found.eigenvalue);
         }
@@ -257,7 +264,7 @@ mod tests {
     #[test]
     fn the_period_of_a_signal_bounds_its_order() {
         assert_eq!(order(&signal(1000, |t| [1.0, -0.3, 0.7, 2.0, 0.1][t as usize % 5])), 5);
-        // A square wave of period 6 has the odd harmonics alone: frequencies 1/6 and 1/2.
+        // A square wave of period 6 has odd harmonics only: frequencies 1/6 and 1/2.
         assert_eq!(order(&signal(1000, |t| if t % 6 < 3 { 1.0 } else { -1.0 })), 3);
         assert_eq!(order(&prbs(1000)), 127);
         let found = excitation(&prbs(2000), None);

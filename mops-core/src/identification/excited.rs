@@ -1,4 +1,4 @@
-//! How rich the inputs of a study are, in numbers and sentences.
+//! Excitation reports on the inputs of a study.
 
 use super::excitation;
 use super::local::start_parameters;
@@ -9,7 +9,7 @@ use crate::experiment::Input;
 use crate::study::{ExcitationQuestion, Study};
 use crate::tuner::Tuner;
 
-/// How rich the inputs of every case are.
+/// Returns the excitation reports on the inputs of every case.
 pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<ExcitationReport> {
     let mut reports = Vec::new();
     for (index, case) in study.cases.iter().enumerate() {
@@ -30,8 +30,10 @@ pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<Excitati
     reports
 }
 
-/// The report on one signal: names of its case or file, its own and that of its unit; the time between samples, s; and the
-/// number of parameters that are to be estimated, where there are some.
+/// Returns the report on one signal.
+///
+/// The names are those of the case or file, the signal and its unit; `sample_time` is in s. `parameters` is the number
+/// of parameters to be estimated, if any.
 pub fn excitation_report(
     values: &[f64],
     noise: Option<f64>,
@@ -44,37 +46,41 @@ pub fn excitation_report(
     let order = if found.is_at_least() { format!("at least {}", found.order) } else { found.order.to_string() };
     let mut words = format!("`{input}` in `{case}` is persistently exciting of order {order}");
     match found.next {
-        None => words += &format!(" (smallest eigenvalue {} of its power)", percent(found.eigenvalue)),
+        None => words += &format!(" (smallest eigenvalue: {} of the signal power)", percent(found.eigenvalue)),
         Some(next) if found.order > 0 => {
             words += &format!(
-                ": its weakest direction carries {} of its power, the next order {}",
+                ": the weakest direction has {} of the signal power, the next order {}",
                 percent(found.eigenvalue),
                 if next <= 1e-3 * found.zero { "none".to_owned() } else { percent(next) }
             );
         }
-        Some(_) => words += ": it stays excited in no direction",
+        Some(_) => words += ": no direction is excited persistently",
     }
     words += ". ";
     let linear =
         |n: usize| format!("a linear model (impulse response, transfer function) with {}", counted(n, "parameter"));
     words += &match (parameters, suffices) {
-        (None, _) => format!("In the long run that suffices for {}.", linear(found.order)),
-        (Some(0), _) => "No tuner depends on it.".to_owned(),
+        (None, _) => format!("Asymptotically this suffices for {}.", linear(found.order)),
+        (Some(0), _) => "No tuner acts in this case.".to_owned(),
         (Some(n), true) => format!(
-            "In the long run that suffices for {}, as many as tuners act here; what it tells of these, the sensitivities say.",
+            "Asymptotically this suffices for {}, as many as tuners act here; for their accuracy see the sensitivities.",
             linear(n)
         ),
         (Some(n), false) if found.is_at_least() => {
-            format!("Whether it suffices for {} cannot be told from {} samples.", linear(n), values.len())
+            format!(
+                "For {} the result is undecided: the order is known only up to a third of {} samples, at most 200.",
+                linear(n),
+                values.len()
+            )
         }
         (Some(n), false) => {
             let once = match found.transient {
-                Some(share) if share > found.zero => " What happens only once (an edge) excites more.",
+                Some(share) if share > found.zero => " Transients such as an edge excite more.",
                 _ => "",
             };
             format!(
-                "In the long run that does not suffice for {}, as many as tuners act here.{once} A model that is nonlinear, or \
-                 whose parameters are tied by physics, may need less: what the data tell of the tuners, the sensitivities say.",
+                "Asymptotically this does not suffice for {}, as many as tuners act here.{once} A nonlinear model, or one whose \
+                 parameters are related by physics, may need less: see the sensitivities.",
                 linear(n)
             )
         }
@@ -99,14 +105,14 @@ pub fn excitation_report(
     }
 }
 
-/// Active tuners that act in a case; start values are not excited by inputs and do not count.
+/// Returns the number of active tuners that act in a case. Initial states do not count, as inputs do not excite them.
 fn tuners_in(study: &Study, case: usize) -> usize {
     let starts = start_parameters(study);
     let acts = |t: &&Tuner| t.active && t.case.is_none_or(|c| c == case) && !starts.contains(&t.parameter.as_str());
     study.tuners.iter().filter(acts).count()
 }
 
-/// Equally spaced samples of an input and the time between them, s; `None` where nothing says how long it lasts.
+/// Returns equally spaced samples of an input and their sample time, s; `None` if its duration is unknown.
 fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>) -> Option<(Vec<f64>, f64)> {
     let recorded = match input {
         Input::Sampled { times, .. } => Some(times.as_slice()),
@@ -123,7 +129,7 @@ fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>
     if !(step > 0.0 && end > first) {
         return None;
     }
-    // No record is so long that this many samples would not tell its order.
+    // This number of samples suffices for the order of any record.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let count = (((end - first) / step + 1e-6).floor() as usize + 1).min(1_000_000);
     #[allow(clippy::cast_precision_loss)]
@@ -131,7 +137,7 @@ fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>
     Some((values, step))
 }
 
-/// The time between samples that are equally spaced, to a thousandth of it.
+/// Returns the sample time of equally spaced samples, with a tolerance of 0.1 % of it; `None` otherwise.
 pub fn spacing(times: &[f64]) -> Option<f64> {
     let step = median_step(times);
     let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= 1e-3 * step;

@@ -8,10 +8,10 @@ use super::words::{coefficient, counted, percent};
 use super::{Recursive, Regression, RegressionTooShort, excitation, least_squares, whiteness};
 use crate::study::{RegressionTask, Study};
 
-/// Initial covariance of the recursion by the mean squares of output and regressors: as good as nothing known.
+/// Initial covariance of the recursion, relative to the mean square of the regressors: practically no prior knowledge.
 const UNKNOWN: f64 = 1e8;
 
-/// The models that a study asks for, each on its experiment.
+/// Returns the regression models of a study, each on its experiment.
 pub fn regressions(study: &Study) -> Vec<RegressionReport> {
     study.tasks.excitation.regressions.iter().map(|task| fitted(study, task)).collect()
 }
@@ -36,7 +36,10 @@ fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
     };
     let model = Regression { a: task.a, b: task.b, delay: task.delay };
     let Some(step) = spacing(&channel.times) else {
-        report.words = format!("`{}` is not equally spaced in time: there is no sampled model of it.", task.output);
+        report.words = format!(
+            "`{}` is not equally spaced in time: a discrete-time model needs a constant sample time.",
+            task.output
+        );
         return report;
     };
     report.sample_time = step;
@@ -44,7 +47,7 @@ fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
         Ok(rows) => rows,
         Err(RegressionTooShort(least)) => {
             report.words =
-                format!("{} are too few: the model takes more than {least}.", counted(channel.values.len(), "sample"));
+                format!("{} are too few: the model needs more than {least}.", counted(channel.values.len(), "sample"));
             return report;
         }
     };
@@ -72,7 +75,7 @@ fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
         )
     } else {
         format!(
-            "`{}`: the experiment tells all {} apart; one step ahead they predict {} of `{}`.{}",
+            "`{}`: the experiment determines all {}; fit of the one-step-ahead prediction {} for `{}`.{}",
             task.name,
             counted(n, "parameter"),
             percent(0.01 * report.fit_percent),
@@ -83,21 +86,23 @@ fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
     report
 }
 
-/// What is to be known of the estimates of an ARX model: least squares is consistent only where the equation errors are
-/// white, and noise on the output is not. Source: L. Ljung, System Identification, 2nd edition (1999), section 7.3.
+/// Returns the warning on the bias of ARX estimates.
+///
+/// Least squares is consistent only for white equation errors, and output noise makes them coloured. Source: L. Ljung,
+/// System Identification, 2nd edition (1999), section 7.3.
 fn bias(errors: &[f64], deviation: f64, spread: f64) -> String {
-    const WHY: &str = " Least squares is consistent only where the equation errors are white; noise on the measured output \
+    const WHY: &str = " Least squares is consistent only for white equation errors; noise on the measured output \
                        makes them coloured and biases ARX (Ljung, System Identification, 2nd ed. 1999, section 7.3).";
-    // An exact fit leaves rounding errors, which tell nothing.
+    // The residuals of an exact fit are rounding errors without information.
     let found = if deviation > 1e-9 * spread { whiteness(errors) } else { None };
     let verdict = match found {
-        Some(found) if found.is_white() => " Here they look white".to_owned(),
+        Some(found) if found.is_white() => " Here they are consistent with white noise".to_owned(),
         Some(found) => format!(" Here they are not white (lag-1 autocorrelation {})", coefficient(found.lag1)),
         None => return WHY.to_owned(),
     };
     let rest = match found {
         Some(found) if found.is_white() => ".",
-        _ => ": do not take the numbers and their standard errors as right.",
+        _ => ": the estimates and their standard errors are unreliable.",
     };
     format!("{WHY}{verdict}{rest}")
 }

@@ -1,4 +1,4 @@
-//! What the data of a problem tell of its tuners: sensitivities at a point, in numbers and sentences.
+//! Sensitivities of a problem's tuners at a point, as numbers and sentences.
 
 use nalgebra::DMatrix;
 
@@ -11,17 +11,18 @@ use crate::evaluation::Evaluation;
 use crate::math;
 use crate::problem::Problem;
 
-/// Share of the value up to which an estimate counts as determined.
+/// Relative standard error up to which an estimate counts as determined.
 const TRUSTED: f64 = 0.1;
 
-/// What the data tell of the active tuners at given values of all tuners; `zero` is the share of the largest singular value that
-/// slopes still resolve, where another than that of their accuracy is wanted.
+/// Returns the sensitivity report on the active tuners at given values of all tuners.
+///
+/// `zero` replaces the default share of the largest singular value that the derivatives still resolve.
 pub fn sensitivity_at(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>) -> Option<SensitivityReport> {
     let local = local(problem, tuners, point, zero)?;
     Some(report(problem, tuners, &local))
 }
 
-/// The report on sensitivities that were found.
+/// Returns the report on computed sensitivities.
 pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> SensitivityReport {
     let found = &local.sensitivity;
     let directions: Vec<DirectionReport> = found
@@ -59,12 +60,12 @@ pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> Sensitivit
     }
 }
 
-/// Why a direction is not determined, as the end of a clause.
+/// Returns the reason why a direction is not determined, as the end of a clause.
 fn suffix(limit: Limit) -> &'static str {
     match limit {
         Limit::Nothing => "",
         Limit::Noise => ", within the noise",
-        Limit::Slopes => ", to the accuracy of the slopes",
+        Limit::Slopes => ", within the accuracy of the derivatives",
     }
 }
 
@@ -73,7 +74,7 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     let coordinate = &found.coordinates[k];
     let [alone, together] = [found.alone[k], found.together[k]];
     let std_error = local.spread(k).deviation;
-    // A start value near zero is as good as known where it is so by its range.
+    // An initial state may be near zero, so its error is related to its range.
     let by_range = local.starts[k] || coordinate.value == 0.0;
     let scale = if by_range { coordinate.range } else { coordinate.scale() };
     let relative_error = std_error / scale;
@@ -95,7 +96,8 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     }
 }
 
-/// What the residuals still change a tenth along a blind direction, as a share of what its tuners change one by one.
+/// Returns the remaining change of the residuals for a 10 % step along a blind direction, relative to steps of its
+/// single tuners.
 fn remaining(problem: &Problem, at: &[f64], blind: &BlindDirection, coordinates: &[Coordinate]) -> f64 {
     let study = problem.study();
     let vector = |evaluation: Evaluation| -> Option<Vec<f64>> {

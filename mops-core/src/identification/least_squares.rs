@@ -3,33 +3,35 @@
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this share of the largest are zero, for columns of unit length: what rounding leaves.
+/// Share of the largest singular value below which one counts as zero, for unit-length columns: rounding error.
 const ZERO: f64 = 1e-10;
 
-/// An estimate by least squares.
+/// Least-squares estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// The parameters; where they are not unique, the shortest solution for columns of unit length.
+    /// Parameters; if not unique, the minimum-norm solution for unit-length columns.
     pub parameters: Vec<f64>,
-    /// Standard errors for white residuals; NaN where a parameter is not unique or nothing is left to judge the noise by.
+    /// Standard errors for white residuals; NaN if a parameter is not unique or no degree of freedom is left.
     pub std_errors: Vec<f64>,
-    /// Standard deviation of the residuals, `sqrt(sum e^2 / (N - rank))`; NaN where `N` is the rank.
+    /// Standard deviation of the residuals, `sqrt(sum e^2 / (N - rank))`; NaN if `N` is the rank.
     pub residual: f64,
     /// Number of independent columns.
     pub rank: usize,
 }
 
-/// The parameters that minimise `sum (y(t) - phi(t)' theta)^2`; `regressors` has a row `phi(t)'` per sample.
+/// Returns the parameters that minimise `sum (y(t) - phi(t)' theta)^2`; `regressors` has a row `phi(t)'` per sample.
 ///
-/// By QR of the scaled columns, then SVD of the triangle, so that the condition is not squared as in the normal
-/// equations. Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 5.5.
+/// Uses QR of the scaled columns, then SVD of the triangle, so that the condition is not squared as in the normal
+/// equations.
+///
+/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 5.5.
 ///
 /// # Panics
-/// If there is not one value of `y` per row, or no column.
+/// If `y` does not have one value per row, or if there is no column.
 #[allow(clippy::cast_precision_loss)]
 pub fn least_squares(regressors: &DMatrix<f64>, y: &DVector<f64>) -> Estimate {
     let (rows, n) = regressors.shape();
-    assert!(rows == y.len() && n > 0, "a row for every value, and a column");
+    assert!(rows == y.len() && n > 0, "one row per value, and at least one column");
     let norms: Vec<f64> = regressors.column_iter().map(|c| c.norm()).map(|v| if v > 0.0 { v } else { 1.0 }).collect();
     let mut scaled = regressors.clone();
     scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
@@ -42,7 +44,7 @@ pub fn least_squares(regressors: &DMatrix<f64>, y: &DVector<f64>) -> Estimate {
         (scaled.clone(), y.clone())
     };
     let svd = triangle.svd(true, true);
-    let (u, v_t) = (svd.u.as_ref().expect("asked for"), svd.v_t.as_ref().expect("asked for"));
+    let (u, v_t) = (svd.u.as_ref().expect("the SVD computes U"), svd.v_t.as_ref().expect("the SVD computes V"));
     let largest = svd.singular_values.max();
     let kept: Vec<usize> = (0..svd.singular_values.len())
         .filter(|&i| svd.singular_values[i] > ZERO * largest && svd.singular_values[i] > 0.0)
@@ -76,7 +78,8 @@ pub fn least_squares(regressors: &DMatrix<f64>, y: &DVector<f64>) -> Estimate {
 mod tests {
     use super::*;
 
-    /// Longley's data, made to break least-squares programs. Certified values: NIST Statistical Reference Datasets, Longley.
+    /// Checks Longley's data, an ill-conditioned benchmark. Certified values: NIST Statistical Reference Datasets,
+    /// Longley.
     #[test]
     fn longleys_regression_has_its_certified_values() {
         #[rustfmt::skip]

@@ -14,46 +14,46 @@ use crate::solver::Oracle;
 use crate::study::Study;
 use crate::tuner::{Grid, Tuner};
 
-/// Where sensitivities are taken.
+/// Kind of point at which sensitivities are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Point {
-    /// At a minimum of the sum of squares: residuals show the noise.
+    /// Minimum of the sum of squares: residuals show the noise.
     Minimum,
-    /// Elsewhere: residuals are mostly misfit, and only declared noise counts.
+    /// Any other point: residuals are mostly misfit, so that only declared noise counts.
     Elsewhere,
 }
 
-/// Sensitivities at a point, and what the noise of the residuals makes of estimates there.
+/// Sensitivities at a point, and the resulting accuracy of the estimates.
 pub struct Local {
-    /// The sensitivity matrix and all that follows from it.
+    /// Sensitivity matrix and derived quantities.
     pub sensitivity: Sensitivity,
-    /// Covariance of the estimates; `None` without residuals, or where they do not show the noise.
+    /// Covariance of the estimates; `None` without residuals, or if they do not show the noise.
     pub covariance: Option<Covariance>,
-    /// Estimates if every sample counted alike, where records differ much in length.
+    /// Estimates with equal sample weights, if records differ much in length.
     pub(super) alike: Option<Alike>,
-    /// Standard error of every tuner for the noise of the residuals, were all others known; NaN without a covariance.
+    /// Standard error of every tuner if all others were known; NaN without a covariance.
     pub(super) alone: Vec<f64>,
-    /// Whether slopes are exact.
+    /// True if the derivatives are exact.
     pub(super) exact: bool,
-    /// Whether they are slopes of residuals; else of the scaled criteria that count.
+    /// True for derivatives of residuals; false for those of the scaled criteria that count.
     pub(super) residuals: bool,
-    /// Which tuners are start values of an experiment.
+    /// True for each tuner that is an initial state of an experiment.
     pub(super) starts: Vec<bool>,
 }
 
 impl Local {
-    /// Spread of the estimate of an active tuner; NaN where the data do not determine it.
+    /// Returns the spread of the estimate of an active tuner; NaN if the data do not determine it.
     pub fn spread(&self, k: usize) -> Spread {
         let unknown = Spread { deviation: f64::NAN, freedom: f64::NAN };
         self.covariance.as_ref().map_or(unknown, |covariance| covariance.of_tuner(k))
     }
 }
 
-/// Sensitivities of the active tuners; `None` where there is no tuner, no criterion that counts, or no slope.
+/// Returns the sensitivities of the active tuners; `None` without tuners, criteria that count, or derivatives.
 pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>) -> Option<Local> {
     let study = problem.study();
     let n = problem.active().len();
-    // A run of its own: slopes are computed even when the budget is spent.
+    // A separate run, so that derivatives are computed even if the budget is exhausted.
     let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, &());
     let found = probe.linearise(&problem.point_of(tuners), 1.0).ok().flatten()?;
     let exact = probe.linearisations() > 0;
@@ -99,7 +99,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
     Some(Local { sensitivity, covariance, alike, alone, exact, residuals, starts })
 }
 
-/// Derivative of a tuner along its coordinate of the unit box.
+/// Returns the derivative of a tuner with respect to its unit-box coordinate.
 fn unit_slope(tuner: &Tuner, value: f64) -> f64 {
     match tuner.grid {
         Grid::List(_) => tuner.bounds[1] - tuner.bounds[0],
@@ -107,13 +107,13 @@ fn unit_slope(tuner: &Tuner, value: f64) -> f64 {
     }
 }
 
-/// Rows that enter the objective or a constraint.
+/// Returns the indices of rows that enter the objective or a constraint.
 pub(super) fn counting(problem: &Problem) -> Vec<usize> {
     let rows = problem.shape().rows.iter().enumerate();
     rows.filter(|(_, (usage, _))| *usage != Usage::Monitor).map(|(i, _)| i).collect()
 }
 
-/// Parameters that set where a simulation begins.
+/// Returns the names of parameters that are initial states.
 pub(super) fn start_parameters(study: &Study) -> Vec<&str> {
     study.models.iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect()
 }

@@ -1,5 +1,5 @@
-//! The theory of identification as tools: is an input rich enough, which parameters do the data determine, and the
-//! linear regressions (FIR, ARX) that answer without a simulation. Pure computation on numbers and Jacobians.
+//! Identification tools: persistent excitation, parameter identifiability, and linear regressions (FIR, ARX) without
+//! simulation. Pure computation on numbers and Jacobians.
 
 mod alike;
 mod blind;

@@ -1,4 +1,4 @@
-//! Noise of the residuals of a calibration, record by record: what the standard errors of estimates rest on.
+//! Noise of the residuals of a calibration, record by record: the basis of the standard errors of estimates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,72 +9,74 @@ use super::words::coefficient;
 use crate::math;
 use crate::study::Study;
 
-/// Largest leverage of a sample whose residual still shows its noise. A sample beyond is fitted by a parameter of its own, and
-/// its residual is 0 up to rounding.
+/// Largest leverage of a sample whose residual still shows its noise.
+///
+/// A sample with higher leverage is fitted by a parameter of its own; its residual is 0 up to rounding.
 const FITTED_ALONE: f64 = 0.999;
 
 /// Noise of all residuals.
 ///
-/// A record whose residuals are white and of constant size has one variance (`Sharing::variances`):
-/// - records without a declared noise have a variance each;
-/// - records with a declared noise share one factor on their declared variances, except those that contradict the others
-///   (F test): these have a variance each too.
+/// A record whose residuals are white with constant variance has a single variance (`Sharing::variances`):
+/// - Each record without a declared noise level has its own variance.
+/// - Records with a declared noise level share one factor on their declared variances. Records that contradict the
+///   others (F test) have their own variance too.
 ///
-/// Every other record enters by its own residuals, corrected for leverage, `e_s / sqrt(1 - h_s)`: by their squares, and where
-/// they are not white also by products of neighbours, weighted by Bartlett's window. That estimate is uncertain and on average
-/// too small; it counts for no less than white noise of the same size.
+/// Every other record enters with its own residuals, corrected for leverage, `e_s / sqrt(1 - h_s)`. Their squares enter
+/// and, if they are not white, also products of neighbours with Bartlett's window. That estimate is uncertain and
+/// biased low; it never counts for less than white noise of the same magnitude.
 ///
-/// Sources: H. White, Econometrica 48 (1980) 817-838 (sandwich); J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985)
-/// 305-325 (HC2, leverage); W. K. Newey, K. D. West, Econometrica 55 (1987) 703-708 (correlated residuals).
+/// Sources: H. White, Econometrica 48 (1980) 817-838 (sandwich); J. G. MacKinnon, H. White, Journal of Econometrics 29
+/// (1985) 305-325 (HC2, leverage); W. K. Newey, K. D. West, Econometrica 55 (1987) 703-708 (correlated residuals).
 #[derive(Debug, Clone)]
 pub struct Noise {
     sources: Vec<Source>,
     pools: Vec<Pool>,
-    /// Change and standard error of the estimate of every tuner where samples count by their noise alone, to first order.
+    /// Change and standard error of the estimate of every tuner with samples weighted by their noise level only, to
+    /// first order.
     weighted: Vec<(f64, f64)>,
 }
 
-/// A record and how its noise is described.
+/// Record and its noise model.
 #[derive(Debug, Clone)]
 struct Source {
     record: Record,
     shape: Shape,
-    /// Index of the pool whose variance it has.
+    /// Index of the pool that defines the variance of the record.
     pool: usize,
-    /// Whether its residuals contradict the noise declared for it.
+    /// True if the residuals contradict the declared noise level.
     disputed: bool,
-    /// Whether its residuals are white, but change in size.
+    /// True if the residuals are white but their variance changes.
     changing: bool,
 }
 
-/// Noise of a record, up to the variance of its pool.
+/// Noise model of a record, up to the variance of its pool.
 #[derive(Debug, Clone)]
 enum Shape {
-    /// White, with this standard deviation.
+    /// White noise with this standard deviation.
     White(f64),
-    /// By these deviations, corrected for leverage; products of samples less than `bandwidth` apart count.
+    /// Sampled noise: deviations corrected for leverage; products of samples less than `bandwidth` apart count.
     Sampled { deviations: Vec<f64>, bandwidth: usize },
 }
 
-/// A contribution to the covariance of estimates: `variance * matrix`, of which the variance is known to within so many degrees
-/// of freedom.
+/// Contribution `variance * matrix` to the covariance of estimates; the pool has the variance and its degrees of
+/// freedom.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub matrix: DMatrix<f64>,
     pub pool: Pool,
 }
 
-/// Standard deviation of a quantity, and the degrees of freedom that it is known with.
+/// Standard deviation of a quantity, with its degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
-    /// Standard deviation; NaN where the data do not show the noise.
+    /// Standard deviation; NaN if the data do not show the noise.
     pub deviation: f64,
-    /// Degrees of freedom of Student's t; infinite where the noise is known.
+    /// Degrees of freedom of Student's t; infinite if the noise is known.
     pub freedom: f64,
 }
 
 impl Spread {
-    /// Half the width of the interval that holds the truth with the probability `level`: t quantile times deviation. NaN
+    /// Returns half the width of the confidence interval of the given `level`: t quantile times standard deviation. NaN
     /// below one degree of freedom.
     pub fn half_width(&self, level: f64) -> f64 {
         if self.freedom < 1.0 || self.freedom.is_nan() {
@@ -83,11 +85,11 @@ impl Spread {
         self.deviation * crate::statistics::t_quantile(0.5 + 0.5 * level, self.freedom)
     }
 
-    /// Root of a sum of variances, each a share of that of a pool. Source: F. E. Satterthwaite, Biometrics
-    /// Bulletin 2 (1946) 110-114.
+    /// Returns the square root of a weighted sum of pool variances. Source: F. E. Satterthwaite, Biometrics Bulletin 2
+    /// (1946) 110-114.
     pub(super) fn of_sum(shares: impl Iterator<Item = (f64, Pool)>) -> Self {
         let (mut total, mut uncertain) = (0.0, 0.0);
-        // N.B.: an unknown variance does not count where it has no share.
+        // N.B.: an unknown variance with weight zero does not count.
         for (share, pool) in shares.filter(|(share, _)| *share != 0.0) {
             let variance = share * pool.variance;
             total += variance;
@@ -99,8 +101,10 @@ impl Spread {
 }
 
 impl Noise {
-    /// From residuals and their Jacobian; `basis` spans the directions of the tuners that it resolves, such that `J basis` has
-    /// orthonormal columns.
+    /// Estimates the noise from residuals and their Jacobian.
+    ///
+    /// `basis` spans the directions of the tuners that the Jacobian resolves, such that `J basis` has orthonormal
+    /// columns.
     pub(super) fn of(records: Vec<Record>, residuals: &[f64], jacobian: &DMatrix<f64>, basis: &DMatrix<f64>) -> Self {
         let fitted = |record: Record| {
             let deviations = DVector::from_vec(record.deviations(residuals));
@@ -108,7 +112,7 @@ impl Noise {
             Fitted::new(record, deviations, slopes)
         };
         let fitted: Vec<Fitted> = records.into_iter().map(fitted).collect();
-        // Every record by itself shows what it is like.
+        // Each record alone shows the character of its noise.
         let alone = Sharing::none(fitted.len());
         let own = alone.variances(&fitted);
         let found: Vec<Character> =
@@ -123,7 +127,8 @@ impl Noise {
             let pool = &mut pools[sharing.of_record[i]];
             match &mut found.shape {
                 Shape::White(deviation) => *deviation = sharing.relative[i],
-                // The window leaves about as many independent products: the reciprocal of the integral of its square, 2/3.
+                // The window leaves about that many independent products: the reciprocal of the integral of its square,
+                // 2/3.
                 #[allow(clippy::cast_precision_loss)]
                 Shape::Sampled { bandwidth, .. } => {
                     let window = (2.0 * *bandwidth as f64 / 3.0).max(1.0);
@@ -147,7 +152,7 @@ impl Noise {
         Self { sources, pools, weighted }
     }
 
-    /// The noise that a study declares, of records whose residuals show none; of `tuners` tuners.
+    /// Returns the noise declared in a study, for records whose residuals show none; `tuners` is the number of tuners.
     pub(super) fn declared(records: Vec<Record>, tuners: usize) -> Self {
         let known = Pool { variance: 1.0, freedom: f64::INFINITY };
         let unknown = Pool { variance: f64::NAN, freedom: 0.0 };
@@ -162,7 +167,7 @@ impl Noise {
         Self { sources, pools: vec![known, unknown], weighted: vec![(f64::NAN, f64::NAN); tuners] }
     }
 
-    /// Covariance of `columns' * residuals`, in parts of independent noise.
+    /// Returns the covariance of `columns' * residuals`, in parts of independent noise.
     pub(super) fn parts(&self, columns: &DMatrix<f64>) -> Vec<Part> {
         let n = columns.ncols();
         let mut matrices = vec![DMatrix::zeros(n, n); self.pools.len()];
@@ -172,14 +177,14 @@ impl Noise {
         matrices.into_iter().zip(&self.pools).map(|(matrix, pool)| Part { matrix, pool: *pool }).collect()
     }
 
-    /// Spread of a weighted sum of the residuals, with one weight for each.
+    /// Returns the spread of a weighted sum of the residuals, with one weight each.
     pub fn along(&self, weights: &[f64]) -> Spread {
         let column = DMatrix::from_column_slice(weights.len(), 1, weights);
         let parts = self.parts(&column);
         Spread::of_sum(parts.iter().map(|part| (part.matrix[(0, 0)], part.pool)))
     }
 
-    /// Degrees of freedom of all noise together; infinite where some is known.
+    /// Returns the degrees of freedom of all noise together; infinite if the noise of some record is known.
     pub fn freedom(&self) -> f64 {
         let is_known = |pool: &usize| self.pools[*pool].variance.is_finite();
         let mut pools: Vec<usize> = self.sources.iter().map(|source| source.pool).filter(is_known).collect();
@@ -188,39 +193,42 @@ impl Noise {
         pools.into_iter().map(|pool| self.pools[pool].freedom).sum()
     }
 
-    /// Standard deviation of the noise of one sample of a channel in a case; NaN where the data do not show it, `None` where
-    /// the channel is not fitted.
+    /// Returns the noise level of one sample of a channel in a case. NaN if the data do not show it, `None` if the
+    /// channel is not fitted.
     pub fn of_channel(&self, case: usize, signal: &str) -> Option<f64> {
         let is_wanted =
             |source: &&Source| (source.record.case, source.record.signal.as_deref()) == (case, Some(signal));
         self.sources.iter().find(is_wanted).map(|source| self.deviation(source))
     }
 
-    /// What a reader should know of the noise of records, a sentence each.
+    /// Returns remarks on the noise of records, a sentence each.
     pub(super) fn remarks(&self, study: &Study) -> Vec<String> {
         let remark = |source: &Source| {
             let place = format!("`{}` in `{}`", source.record.signal.as_ref()?, study.cases[source.record.case].name);
             if source.disputed {
                 let [shown, declared] = [self.deviation(source), source.record.noise?].map(coefficient);
                 return Some(format!(
-                    "The residuals of {place} show a noise of {shown}, not {declared} as declared: the standard errors rest on \
-                     the residuals."
+                    "The residuals of {place} show a noise level of {shown}, not {declared} as declared: the standard errors are \
+                     based on the residuals."
                 ));
             }
             source.changing.then(|| {
-                format!("The residuals of {place} are white, but change in size: the standard errors allow for it.")
+                format!("The residuals of {place} are white, but their variance changes: the standard errors allow for this.")
             })
         };
         self.sources.iter().filter_map(remark).collect()
     }
 
-    /// Change and standard error of the estimate of every tuner, in its unit, were every sample to count by its noise alone: one
-    /// Gauss-Newton step. Source: E. L. Lehmann, G. Casella, Theory of Point Estimation, 2nd edition (1998), section 6.4.
+    /// Returns the change and standard error of the estimate of every tuner, in its unit, with samples weighted by
+    /// their noise level only.
+    ///
+    /// The change is one Gauss-Newton step. Source: E. L. Lehmann, G. Casella, Theory of Point Estimation, 2nd edition
+    /// (1998), section 6.4.
     pub(super) fn weighted(&self) -> &[(f64, f64)] {
         &self.weighted
     }
 
-    /// Every record.
+    /// Returns all records.
     pub(super) fn records(&self) -> impl Iterator<Item = &Record> {
         self.sources.iter().map(|source| &source.record)
     }
@@ -234,23 +242,23 @@ impl Noise {
     }
 }
 
-/// What residuals are like.
+/// Character of the residuals of a record.
 struct Character {
     shape: Shape,
-    /// Whether they are white, but change in size.
+    /// True if the residuals are white but their variance changes.
     changing: bool,
 }
 
 impl Character {
-    /// From a record in the fit that weighs samples by their noise, where residuals show nothing but their own: `variance` is that
-    /// of the record.
+    /// Determines the character of a record from the noise-weighted fit, whose residuals are not distorted by other
+    /// records. `variance` is that of the record.
     fn of(of: &Fitted, fit: &Weighted, variance: f64) -> Self {
         let deviations = &of.deviations + &of.slopes * &fit.step;
         let squares: Vec<f64> = deviations.iter().map(|e| e * e).collect();
         let is_white = |values: &[f64]| whiteness(values).is_none_or(|found| found.is_white());
         let white = is_white(deviations.as_slice());
-        // Squares that are not white show a changing size. Source: A. I. McLeod, W. K. Li, Journal of Time Series Analysis 4
-        // (1983) 269-273.
+        // Squares that are not white indicate a changing variance. Source: A. I. McLeod, W. K. Li, Journal of Time
+        // Series Analysis 4 (1983) 269-273.
         let changing = white && !is_white(&squares);
         if white && !changing {
             return Self { shape: Shape::White(1.0), changing };
@@ -264,8 +272,7 @@ impl Character {
 }
 
 impl Shape {
-    /// Covariance of sums over samples that noise of this shape brings; `pull` has a row for every sample, and a column for every
-    /// sum.
+    /// Returns the covariance of sums over samples under this noise; `pull` has a row per sample and a column per sum.
     fn covariance(&self, pull: DMatrix<f64>) -> DMatrix<f64> {
         match self {
             Self::White(deviation) => pull.tr_mul(&pull) * (deviation * deviation),
@@ -291,8 +298,10 @@ impl Shape {
     }
 }
 
-/// Sums over all windows of so many neighbours, over the root of their number; windows that reach beyond the samples count. Their
-/// sum of squares is that of products of samples with the weights `1 - lag/bandwidth`: the estimate of Newey and West.
+/// Returns sums over all windows of `bandwidth` neighbours, divided by the square root of `bandwidth`; partial windows
+/// at the ends count.
+///
+/// Their sum of squares equals products of samples with the weights `1 - lag/bandwidth`: the Newey-West estimate.
 fn window_sums(scores: &DMatrix<f64>, bandwidth: usize) -> DMatrix<f64> {
     let count = scores.nrows();
     let mut sums = DMatrix::zeros(count + bandwidth - 1, scores.ncols());
@@ -318,7 +327,8 @@ fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
 
-/// Deviations over the roots of `1 - leverage`, so that their squares have the variance of the noise where it is constant.
+/// Returns the deviations divided by `sqrt(1 - leverage)`, so that their squares have the variance of homoscedastic
+/// noise.
 #[allow(clippy::cast_precision_loss)]
 fn corrected(deviations: &[f64], leverages: &[f64]) -> Vec<f64> {
     let free = || deviations.iter().zip(leverages).filter(|(_, h)| **h < FITTED_ALONE);
@@ -327,14 +337,17 @@ fn corrected(deviations: &[f64], leverages: &[f64]) -> Vec<f64> {
     deviations.iter().zip(leverages).map(|(e, h)| if *h < FITTED_ALONE { correct((e, h)) } else { usual }).collect()
 }
 
-/// Number of neighbours whose products count, for correlated deviations: that of Andrews for noise of first order with their
-/// autocorrelation, at least the rule of thumb of Newey and West, and at most a third of the record.
+/// Returns the bandwidth for correlated deviations, in samples.
 ///
-/// Sources: D. W. K. Andrews, Econometrica 59 (1991) 817-858, equations 6.2 and 6.4; W. K. Newey, K. D. West, Review of Economic
-/// Studies 61 (1994) 631-653.
+/// The value is Andrews' for first-order noise with the lag-1 autocorrelation of the deviations. It is at least the
+/// Newey-West rule of thumb, and at most a third of the record.
+///
+/// Sources: D. W. K. Andrews, Econometrica 59 (1991) 817-858, equations 6.2 and 6.4; W. K. Newey, K. D. West, Review of
+/// Economic Studies 61 (1994) 631-653.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn bandwidth(deviations: &[f64]) -> usize {
-    /// Beyond, the rule grows without bounds. Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966.
+    /// Largest autocorrelation; beyond it the rule grows without bounds. Source: D. W. K. Andrews, J. C. Monahan,
+    /// Econometrica 60 (1992) 953-966.
     const MOST: f64 = 0.97;
     let n = deviations.len() as f64;
     let rho = whiteness(deviations).map_or(0.0, |found| found.lag1.clamp(-MOST, MOST));
@@ -364,7 +377,7 @@ mod tests {
         }
     }
 
-    /// Welch's two-sample test: (1 + 2)^2 / (1^2/9 + 2^2/4) degrees of freedom.
+    /// Checks Welch's two-sample test: (1 + 2)^2 / (1^2/9 + 2^2/4) degrees of freedom.
     #[test]
     fn a_sum_of_variances_has_the_freedom_of_satterthwaite() {
         let pool = |variance: f64, freedom: f64| Pool { variance, freedom };

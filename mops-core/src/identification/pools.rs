@@ -1,4 +1,4 @@
-//! Which records share a variance, and these variances by restricted maximum likelihood.
+//! Pooling of record variances, and their estimation by restricted maximum likelihood.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -6,41 +6,41 @@ use super::records::Record;
 use crate::math;
 use crate::statistics::f_cdf;
 
-/// Probability below which a record contradicts the noise declared for it and for the others.
+/// Probability below which a record contradicts the noise level declared for it and for the others.
 const CONTRADICTED: f64 = 0.01;
 
 /// Degrees of freedom below which residuals do not show their noise.
 pub(super) const SHOWN: f64 = 1.0;
 
-/// Relative change of variances that ends the iteration: far below what any degrees of freedom leave.
+/// Relative change of the variances that ends the iteration: far below their uncertainty at any degrees of freedom.
 const ACCURATE: f64 = 1e-6;
 
-/// Rounds of the iteration, at most. It converges by about the share of the degrees of freedom that estimates take.
+/// Maximum number of iterations. The convergence rate is about the share of the degrees of freedom that estimates take.
 const ROUNDS: usize = 200;
 
-/// Eigenvalues of the augmented information below this share, for a unit diagonal, are what rounding leaves of 0.
+/// Eigenvalue of the augmented information, for a unit diagonal, below which it counts as rounding error.
 const DEPENDENT: f64 = 1e-9;
 
-/// Smallest variance of a record, as a share of the largest, that counts in weights: that of rounding.
+/// Smallest variance of a record in weights, relative to the largest: rounding.
 const ROUNDING: f64 = 1e-30;
 
-/// Variance that records share: a factor on the squares of their relative deviations.
+/// Variance shared by records: a factor on the squares of their relative deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pool {
-    /// Variance; NaN where too few degrees of freedom are left.
+    /// Variance; NaN with too few degrees of freedom.
     pub variance: f64,
-    /// Degrees of freedom it is known with; infinite where it was declared.
+    /// Degrees of freedom of the variance; infinite if declared.
     pub freedom: f64,
 }
 
-/// A record beside the fitted model, in coordinates of the tuners in which the estimates are uncorrelated.
+/// Record with its fitted model, in tuner coordinates in which the estimates are uncorrelated.
 pub(super) struct Fitted {
     pub record: Record,
-    /// Simulated minus measured, for every sample.
+    /// Simulated minus measured value of every sample.
     pub deviations: DVector<f64>,
-    /// Slopes of the simulated signal along the coordinates.
+    /// Derivatives of the simulated signal with respect to the coordinates.
     pub slopes: DMatrix<f64>,
-    /// `slopes' slopes`, `slopes' deviations`, and the sum of squared deviations.
+    /// Products `slopes' slopes` and `slopes' deviations`, and the sum of squared deviations.
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
     squares: f64,
@@ -52,7 +52,7 @@ impl Fitted {
         Self { squares: deviations.norm_squared(), record, deviations, slopes, matrix, gradient }
     }
 
-    /// Sum of squared deviations after a step of the coordinates.
+    /// Returns the sum of squared deviations after a step of the coordinates.
     fn squares_at(&self, step: &DVector<f64>) -> f64 {
         (self.squares + 2.0 * self.gradient.dot(step) + step.dot(&(&self.matrix * step))).max(0.0)
     }
@@ -63,18 +63,18 @@ impl Fitted {
     }
 }
 
-/// How records share variances.
+/// Assignment of records to shared variances.
 #[derive(Debug, Clone)]
 pub(super) struct Sharing {
     /// Index of the pool of every record.
     pub of_record: Vec<usize>,
-    /// Standard deviation of every record where the variance of its pool is 1.
+    /// Standard deviation of every record for a pool variance of 1.
     pub relative: Vec<f64>,
     /// Number of pools.
     pub count: usize,
 }
 
-/// Variances, and the fit in which every sample counts by them.
+/// Variances, and the fit weighted by them.
 pub(super) struct Weighted {
     pub pools: Vec<Pool>,
     /// Change of the coordinates from the estimates to that fit.
@@ -84,19 +84,20 @@ pub(super) struct Weighted {
 }
 
 impl Sharing {
-    /// A variance for each.
+    /// Creates one pool per record.
     pub fn none(count: usize) -> Self {
         Self { of_record: (0..count).collect(), relative: vec![1.0; count], count }
     }
 
-    /// Variance of a record.
+    /// Returns the variance of a record.
     pub fn variance(&self, pools: &[Pool], record: usize) -> f64 {
         pools[self.of_record[record]].variance * math::powi(self.relative[record], 2)
     }
 
-    /// Variances of restricted maximum likelihood: of every pool, the sum of squares in the fit that weighs samples by their
-    /// variances, over the degrees of freedom that this fit leaves. Of the residuals of that fit, only what is independent of the
-    /// estimates counts ([`Sharing::independent`]).
+    /// Returns the variances of the pools by restricted maximum likelihood.
+    ///
+    /// Each is the sum of squares in the variance-weighted fit divided by the remaining degrees of freedom. Of the
+    /// residuals of that fit, only the part independent of the estimates counts ([`Sharing::independent`]).
     ///
     /// Source: H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554.
     pub fn variances(&self, fitted: &[Fitted]) -> Weighted {
@@ -123,16 +124,18 @@ impl Sharing {
         found
     }
 
-    /// Variances from residuals that are independent of the estimates, so that estimate over standard error has Student's t
-    /// distribution: of noise `V`, estimates with the weights `W` depend on `X' W y` alone, and contrasts of `y` on which neither
-    /// they nor the tuners act are the residuals of a fit with the columns `X` and `V W X`. A pool that such a fit leaves no degree
-    /// of freedom keeps its variance.
+    /// Updates the variances from residuals that are independent of the estimates, so that estimate over standard error
+    /// has Student's t distribution.
+    ///
+    /// For noise `V`, estimates with the weights `W` depend on `X' W y` only. The residuals of a fit with the columns
+    /// `X` and `V W X` are contrasts of `y` independent of the estimates and the tuners. A pool without degrees of
+    /// freedom in that fit keeps its variance.
     fn independent(&self, fitted: &[Fitted], least: f64, pools: &mut [Pool]) {
         let n = fitted.first().map_or(0, |of| of.slopes.ncols());
         let variances: Vec<f64> = (0..fitted.len()).map(|i| self.variance(pools, i).max(least)).collect();
         let ratios: Vec<f64> = fitted.iter().zip(&variances).map(|(of, v)| v * of.record.weight()).collect();
         let largest = ratios.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        // Columns of a record: its slopes, and as many times its ratio.
+        // Columns of a record: its derivatives, and these times its ratio.
         let factors = |i: usize| [1.0, ratios[i] / largest];
         let (mut information, mut gradient) = (DMatrix::zeros(2 * n, 2 * n), DVector::zeros(2 * n));
         for (i, of) in fitted.iter().enumerate() {
@@ -164,7 +167,7 @@ impl Sharing {
         }
     }
 
-    /// One round; the largest relative change of a variance.
+    /// Performs one iteration and returns the largest relative change of a variance.
     fn iterate(&self, fitted: &[Fitted], least: f64, found: &mut Weighted) -> f64 {
         let n = found.step.len();
         let weights: Vec<f64> = (0..fitted.len()).map(|i| 1.0 / self.variance(&found.pools, i).max(least)).collect();
@@ -186,7 +189,7 @@ impl Sharing {
         let mut change = 0.0f64;
         for (pool, known) in found.pools.iter_mut().enumerate() {
             known.freedom = freedom[pool];
-            // What residuals do not show keeps its weight.
+            // A pool whose residuals do not show the noise keeps its weight.
             if known.freedom >= SHOWN {
                 let variance = squares[pool] / known.freedom;
                 change = change.max((variance - known.variance).abs() / variance.max(f64::MIN_POSITIVE));
@@ -197,7 +200,7 @@ impl Sharing {
     }
 }
 
-/// Pseudo-inverse of a symmetric matrix that is nowhere negative, scaled to a unit diagonal.
+/// Returns the pseudo-inverse of a positive semidefinite matrix, scaled to a unit diagonal.
 fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     if n == 0 {
@@ -212,12 +215,13 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |a, b| found[(a, b)] * scale[a] * scale[b])
 }
 
-/// Records that share a variance, and those whose residuals contradict the noise declared for them. `own` has the variance of
-/// each by itself; records that are not `white` share none.
+/// Returns the pools of records, and the records whose residuals contradict the declared noise level.
+///
+/// `own` has the variance of each record alone. Records that are not `white` share no pool.
 pub(super) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Sharing, Vec<usize>) {
     let declares = |&i: &usize| white[i] && fitted[i].record.noise.is_some();
     let (declared, disputed) = undisputed((0..fitted.len()).filter(declares).collect(), fitted, own);
-    // A channel of which a record is too short to show its noise has one variance in all experiments.
+    // If a record is too short to show its noise, all records of that channel share one variance.
     let same_channel = |i: usize, j: usize| {
         let [a, b] = [i, j].map(|i| &fitted[i].record.signal);
         white[j] && !declared.contains(&j) && a.is_some() && a == b
@@ -235,7 +239,7 @@ pub(super) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Shari
     kept.sort_unstable();
     kept.dedup();
     let sharing = Sharing {
-        of_record: leaders.iter().map(|leader| kept.binary_search(leader).expect("it was kept")).collect(),
+        of_record: leaders.iter().map(|leader| kept.binary_search(leader).expect("leaders are in the list")).collect(),
         relative: (0..fitted.len())
             .map(|i| fitted[i].record.noise.filter(|_| declared.contains(&i)).unwrap_or(1.0))
             .collect(),
@@ -244,12 +248,12 @@ pub(super) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Shari
     (sharing, disputed)
 }
 
-/// Splits records with a declared noise into those whose residuals agree and those that contradict the rest, the worst first.
+/// Splits records with a declared noise level into those that agree and those that contradict the others, worst first.
 fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usize>, Vec<usize>) {
     let mut disputed = Vec::new();
     let ratio = |i: usize| own[i].variance / math::powi(fitted[i].record.noise.unwrap_or(1.0), 2);
     loop {
-        // Probability of a variance as far from that of the others, either way, by the F test.
+        // Two-sided p-value of the F test of this variance against the others.
         let chance = |i: usize| -> f64 {
             let others = || kept.iter().filter(|&&j| j != i && own[j].freedom >= SHOWN);
             let freedom: f64 = others().map(|&j| own[j].freedom).sum();
@@ -262,7 +266,7 @@ fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usi
             2.0 * below.min(1.0 - below)
         };
         let least = kept.iter().map(|&i| (i, chance(i))).min_by(|a, b| a.1.total_cmp(&b.1));
-        // Of two, which contradict each other, it is the one farther from its own.
+        // Of two contradicting records, the one farther from its declared noise level is disputed.
         let least = match (kept.as_slice(), least) {
             ([a, b], Some((_, chance))) if math::ln(ratio(*a)).abs() > math::ln(ratio(*b)).abs() => Some((*a, chance)),
             ([_, b], Some((_, chance))) => Some((*b, chance)),
@@ -282,7 +286,7 @@ fn undisputed(mut kept: Vec<usize>, fitted: &[Fitted], own: &[Pool]) -> (Vec<usi
 mod tests {
     use super::*;
 
-    /// A record of a channel measured `deviations.len()` times, whose mean is the one coordinate.
+    /// Returns a record of `deviations.len()` samples of a channel; their mean is the only coordinate.
     fn constant(signal: &str, noise: Option<f64>, first: usize, deviations: &[f64]) -> Fitted {
         let n = deviations.len();
         let record = Record::new(0, Some(signal.into()), noise, first, vec![1.0; n]);
@@ -303,7 +307,8 @@ mod tests {
         assert!((found.step[0] + mean).abs() < 1e-12);
     }
 
-    /// Were both weighed by their noise, the estimate would take one degree of freedom; of two means, it depends on both records.
+    /// Checks that an estimate which depends on two records takes a degree of freedom of both, unlike a noise-weighted
+    /// one.
     #[test]
     fn a_shared_estimate_takes_a_degree_of_freedom_of_every_record_that_it_depends_on() {
         let fitted = [constant("y", None, 0, &chirp(100, 1e-3)), constant("z", None, 100, &chirp(10, 1.0))];

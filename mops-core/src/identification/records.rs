@@ -1,65 +1,67 @@
-//! Records: the measured samples behind the rows of a residual vector.
+//! Records: the measured samples behind the entries of a residual vector.
 
 use nalgebra::DMatrix;
 
 use crate::problem::Problem;
 
-/// Samples of one channel in one experiment, with the residuals that they enter. Noise in sample `s` moves all residuals of
-/// that sample, whatever criterion or model they belong to.
+/// Samples of one channel in one experiment, with the residuals that they enter.
+///
+/// Noise in sample `s` changes all residuals of that sample, for every criterion and model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// Index of the experiment's case.
     pub case: usize,
     /// Measured signal; `None` for a criterion that names no samples.
     pub signal: Option<String>,
-    /// Standard deviation of the noise of one sample that the study declares, in the unit of the signal.
+    /// Declared noise level of one sample, in the unit of the signal.
     pub noise: Option<f64>,
-    /// Consecutive residuals, one for every sample.
+    /// Blocks of consecutive residuals, one residual per sample.
     blocks: Vec<Block>,
 }
 
 /// Residuals of one row of the study.
 #[derive(Debug, Clone, PartialEq)]
 struct Block {
-    /// Index of the first in the residual vector.
+    /// Index of the first residual in the residual vector.
     first: usize,
-    /// Residual divided by (simulated - measured), for every sample.
+    /// Residual divided by (simulated - measured), per sample.
     weights: Vec<f64>,
 }
 
 impl Record {
-    /// A record of one block of residuals that begins at index `first`.
+    /// Creates a record of one block of residuals that starts at index `first`.
     pub fn new(case: usize, signal: Option<String>, noise: Option<f64>, first: usize, weights: Vec<f64>) -> Self {
         Self { case, signal, noise, blocks: vec![Block { first, weights }] }
     }
 
-    /// Number of samples.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.blocks[0].weights.len()
     }
 
-    /// Mean weight of squared deviations in the sum of squared residuals.
+    /// Returns the mean weight of squared deviations in the sum of squared residuals.
     #[allow(clippy::cast_precision_loss)]
     pub fn weight(&self) -> f64 {
         self.blocks.iter().flat_map(|block| &block.weights).map(|w| w * w).sum::<f64>() / self.len() as f64
     }
 
-    /// Simulated minus measured, for every sample; the mean where several models simulate it.
+    /// Returns simulated minus measured values per sample, averaged over the models that simulate the signal.
     pub fn deviations(&self, residuals: &[f64]) -> Vec<f64> {
         let column = DMatrix::from_column_slice(residuals.len(), 1, residuals);
         self.per_deviation(&column).as_slice().to_vec()
     }
 
-    /// Rows of the residual vector divided by their weights: of the Jacobian, the slopes of the simulated signal. Shape:
-    /// samples x columns.
+    /// Returns rows of the residual vector divided by their weights; for the Jacobian, the derivatives of the simulated
+    /// signal. Shape: samples x columns.
     #[allow(clippy::cast_precision_loss)]
     pub fn per_deviation(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         let share = 1.0 / self.blocks.len() as f64;
         self.summed(rows, |weight| if weight > 0.0 { share / weight } else { 0.0 })
     }
 
-    /// Rows of the residual vector times their weights, summed over the residuals of every sample: what the noise of a sample
-    /// brings into `rows' * residuals`. Shape: samples x columns.
+    /// Returns rows of the residual vector times their weights, summed over the residuals of every sample.
+    ///
+    /// The result is the effect of a sample's noise on `rows' * residuals`. Shape: samples x columns.
     pub fn collected(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         self.summed(rows, |weight| weight)
     }
@@ -71,8 +73,9 @@ impl Record {
     }
 }
 
-/// The records of a calibration at given values of all tuners; together they hold every residual once. `None` where the
-/// objective is no sum of squares, or a simulation fails.
+/// Returns the records of a calibration at given values of all tuners; together they contain every residual once.
+///
+/// Returns `None` if the objective is not a sum of squares, or if a simulation fails.
 pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
     let study = problem.study();
     let (mut records, mut first): (Vec<Record>, usize) = (Vec::new(), 0);

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Least squares, one sample at a time: old samples count `lambda^age`.
+/// Recursive least squares with exponential forgetting: a sample has the weight `lambda^age`.
 ///
 /// ```text
 /// e        = y - phi' theta
@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 /// theta   <- theta + P phi e
 /// ```
 ///
-/// Begun with `P = p I` and `theta = 0` it minimises `sum lambda^(N - t) (y(t) - phi(t)' theta)^2 + lambda^N |theta|^2 / p`
-/// exactly, so that with `lambda = 1` and a large `p` it agrees with [`super::least_squares`].
+/// From `P = p I` and `theta = 0` the recursion minimises `sum lambda^(N - t) (y(t) - phi(t)' theta)^2 + lambda^N
+/// |theta|^2 / p` exactly. With `lambda = 1` and a large `p` it agrees with [`super::least_squares`].
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Adaptive Control, 2nd edition (1995), section 2.2, theorem 2.4.
 #[derive(Debug, Clone)]
@@ -22,35 +22,35 @@ pub struct Recursive {
 }
 
 impl Recursive {
-    /// Begins for `n` parameters with forgetting factor `lambda` in (0, 1] and the initial covariance `p` I; a large `p`
-    /// says that nothing is known.
+    /// Creates the recursion for `n` parameters, with forgetting factor `lambda` in (0, 1] and the initial covariance
+    /// `p` I. A large `p` means no prior knowledge.
     ///
     /// # Panics
     /// If the forgetting factor is outside (0, 1].
     pub fn new(n: usize, forgetting: f64, p: f64) -> Self {
-        assert!(forgetting > 0.0 && forgetting <= 1.0, "a forgetting factor lies in (0, 1]");
+        assert!(forgetting > 0.0 && forgetting <= 1.0, "the forgetting factor must be in (0, 1]");
         Self { theta: DVector::zeros(n), p: DMatrix::identity(n, n) * p, forgetting }
     }
 
-    /// Takes a sample in: lines 2 and 3 of the recursion. Returns the error of its prediction.
+    /// Processes a sample: lines 2 and 3 of the recursion. Returns the prediction error.
     pub fn update(&mut self, phi: &DVector<f64>, y: f64) -> f64 {
         let error = y - phi.dot(&self.theta);
         let p_phi = &self.p * phi;
         let gain = self.forgetting + phi.dot(&p_phi);
         self.p = (&self.p - &p_phi * p_phi.transpose() / gain) / self.forgetting;
-        // Rounding must not make it lopsided.
+        // Restores the symmetry lost by rounding.
         self.p = (&self.p + self.p.transpose()) * 0.5;
-        // P phi with the new P is the old P phi by the gain.
+        // P phi with the new P is P phi with the old P, divided by the gain.
         self.theta += p_phi * (error / gain);
         error
     }
 
-    /// The estimate so far.
+    /// Returns the current estimate.
     pub fn parameters(&self) -> &[f64] {
         self.theta.as_slice()
     }
 
-    /// `P`: covariance of the estimate by the variance of the noise.
+    /// Returns `P`: the covariance of the estimate divided by the noise variance.
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.p
     }

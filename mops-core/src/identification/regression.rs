@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 /// y(t) + a_1 y(t - 1) + ... + a_na y(t - na) = b_1 u(t - d) + ... + b_nb u(t - d - nb + 1) + e(t)
 /// ```
 ///
-/// with `na` = `a`, `nb` = `b` and `d` = `delay`. Without `a` it is a finite impulse response.
+/// with `na` = `a`, `nb` = `b` and `d` = `delay`. With `a` = 0 the model is a finite impulse response.
 ///
 /// Source: L. Ljung, System Identification, 2nd edition (1999), section 4.2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,24 +17,25 @@ pub struct Regression {
     pub a: usize,
     /// Number of past inputs.
     pub b: usize,
-    /// Samples from an input to the first output that it moves; 1 for a sampled system without a direct path.
+    /// Delay from an input to the first output that it affects, in samples; 1 for a sampled system without feedthrough.
     pub delay: usize,
 }
 
-/// The record is too short for the orders: it needs more samples than this.
+/// Error for a record that is too short for the orders: it needs more samples than this.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegressionTooShort(pub usize);
 
 impl Regression {
-    /// Names of the parameters: `a1`, ..., `b1`, ...
+    /// Returns the names of the parameters: `a1`, ..., `b1`, ...
     pub fn names(&self) -> Vec<String> {
         (1..=self.a).map(|i| format!("a{i}")).chain((1..=self.b).map(|i| format!("b{i}"))).collect()
     }
 
-    /// The rows `phi(t)' = (-y(t - 1), ..., u(t - d), ...)` and the outputs `y(t)`, from the first sample with a full past.
+    /// Returns the rows `phi(t)' = (-y(t - 1), ..., u(t - d), ...)` and the outputs `y(t)`, from the first sample with
+    /// a complete past.
     ///
     /// # Errors
-    /// The record has no more samples than parameters and past together.
+    /// If the record has no more samples than parameters and past values together.
     pub fn rows(&self, u: &[f64], y: &[f64]) -> Result<(DMatrix<f64>, DVector<f64>), RegressionTooShort> {
         let past = self.a.max((self.b + self.delay).saturating_sub(1));
         let (n, samples) = (self.a + self.b, u.len().min(y.len()));
@@ -72,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_step_determines_the_gain_of_an_impulse_response_and_nothing_else_in_the_long_run() {
-        // y(t) = u(t - 1) + 2 u(t - 2), with u constant: only b1 + b2 can be seen.
+        // y(t) = u(t - 1) + 2 u(t - 2) with constant u: only b1 + b2 is identifiable.
         let (rows, target) = Regression { a: 0, b: 2, delay: 1 }.rows(&[1.0; 50], &[3.0; 50]).unwrap();
         let found = least_squares(&rows, &target);
         assert!(found.rank == 1 && (found.parameters.iter().sum::<f64>() - 3.0).abs() < 1e-12, "{found:?}");

@@ -1,145 +1,146 @@
-//! What the tools of identification leave in `result.json`. Numbers that are not finite are written as null.
+//! Identification results in `result.json`. Non-finite numbers are written as null.
 
 use serde::Serialize;
 
-/// What the data tell of the tuners at a point.
+/// Identifiability of the tuners at a point.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensitivityReport {
-    /// The findings in sentences; names stand between backticks.
+    /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
-    /// Where the slopes come from: `tangents` or `differences`.
+    /// Source of the derivatives: `tangents` or `differences`.
     pub slopes: &'static str,
-    /// What is sensitive: `residuals` of measurements, or scaled `criteria`.
+    /// Sensitive quantities: `residuals` of measurements, or scaled `criteria`.
     pub of: &'static str,
-    /// Number of directions that are determined.
+    /// Number of determined directions.
     pub rank: usize,
-    /// Singular values of the Jacobian with columns of unit length, falling.
+    /// Singular values of the Jacobian with unit-length columns, descending.
     pub singular_values: Vec<f64>,
-    /// Share of the largest below which one counts as zero.
+    /// Share of the largest singular value below which one counts as zero.
     pub zero: f64,
-    /// Every tuner.
+    /// Sensitivity of every tuner.
     pub tuners: Vec<TunerSensitivity>,
-    /// The sensitivity matrix `J' J` in the tuners' own units.
+    /// Sensitivity matrix `J' J` in the tuners' own units.
     pub matrix: Vec<Vec<f64>>,
-    /// Its eigenvalues, falling.
+    /// Eigenvalues of the sensitivity matrix, descending.
     pub eigenvalues: Vec<f64>,
-    /// An eigenvector of unit length for each, with one number per tuner.
+    /// Unit-length eigenvector of each eigenvalue, with one number per tuner.
     pub eigenvectors: Vec<Vec<f64>>,
-    /// The same for relative changes.
+    /// Eigenvalues and eigenvectors for relative changes.
     pub relative: RelativeReport,
-    /// Directions along which nothing changes.
+    /// Directions that are not determined.
     pub directions: Vec<DirectionReport>,
-    /// Correlation of the estimates; null where undetermined.
+    /// Correlations of the estimates; null where undetermined.
     pub correlations: Vec<Vec<f64>>,
 }
 
 /// Eigenvalues and eigenvectors for relative changes of the tuners.
 #[derive(Debug, Clone, Serialize)]
 pub struct RelativeReport {
-    /// What one relative change is: the value, or the range of a tuner that is 0.
+    /// Scale of a relative change: the value, or the range of a tuner that is 0.
     pub scales: Vec<f64>,
-    /// Eigenvalues, falling.
+    /// Eigenvalues, descending.
     pub eigenvalues: Vec<f64>,
-    /// An eigenvector of unit length for each.
+    /// Unit-length eigenvector of each eigenvalue.
     pub eigenvectors: Vec<Vec<f64>>,
 }
 
-/// What the data tell of one tuner.
+/// Sensitivity and accuracy of one tuner.
 #[derive(Debug, Clone, Serialize)]
 pub struct TunerSensitivity {
-    /// Name.
+    /// Name of the tuner.
     pub name: String,
-    /// Value.
+    /// Value of the tuner.
     pub value: f64,
-    /// Unit of value and errors.
+    /// Unit of the value and the errors.
     pub unit: String,
-    /// Root of the sum of squared slopes, per relative change of the tuner.
+    /// Root of the sum of squared derivatives, per relative change of the tuner.
     pub effect: f64,
-    /// Standard error; null where undetermined, or where nothing was measured.
+    /// Standard error; null if undetermined or without measurements.
     pub std_error: f64,
-    /// The same, were all other tuners known.
+    /// Standard error if all other tuners were known.
     pub std_error_alone: f64,
-    /// Standard error as a share of what `relative_to` says.
+    /// Standard error relative to the quantity named in `relative_to`.
     pub relative_error: f64,
-    /// `value`, or `range`: of a start value, which may well be near zero, and of a tuner that is 0.
+    /// Reference of the relative error: `value`, or `range` for an initial state, which may be near zero, and for a
+    /// tuner that is 0.
     pub relative_to: &'static str,
-    /// How much wider the error is because the others are not known: at least 1.
+    /// Factor by which the error grows because the other tuners are unknown: at least 1.
     pub inflation: f64,
-    /// `determined`, `weak` (uncertain by more than a tenth), or `undetermined`.
+    /// Class of the estimate: `determined`, `weak` (standard error above 10 %), or `undetermined`.
     pub trust: &'static str,
 }
 
-/// A direction along which nothing changes.
+/// Direction that is not determined.
 #[derive(Debug, Clone, Serialize)]
 pub struct DirectionReport {
-    /// What can be estimated, and what cannot.
+    /// Clause that states what can be estimated, and what cannot.
     pub words: String,
-    /// Tuners that take part, with their change as a share of their scale; the largest is 1.
+    /// Tuners that take part, with their change relative to their scale; the largest is 1.
     pub changes: Vec<(String, f64)>,
-    /// How much the residuals change when one goes a tenth along it, as a share of what its tuners change one by one.
+    /// Change of the residuals for a 10 % step along the direction, relative to steps of its single tuners.
     pub remaining: f64,
 }
 
-/// How rich an input is.
+/// Persistent excitation of an input.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExcitationReport {
-    /// The finding in a sentence or two.
+    /// Finding in a sentence or two.
     pub words: String,
-    /// The case or experiment, or the file.
+    /// Name of the case, experiment or file.
     pub case: String,
-    /// The input.
+    /// Name of the input.
     pub input: String,
-    /// Its unit.
+    /// Unit of the input.
     pub unit: String,
-    /// Number of samples looked at.
+    /// Number of samples used.
     pub samples: usize,
-    /// Time between two of them, s.
+    /// Sample time, s.
     pub sample_time: f64,
     /// Order of persistent excitation.
     pub order: usize,
-    /// Whether it may be higher: nothing above was tested.
+    /// True if the order may be higher because no higher order was tested.
     pub at_least: bool,
-    /// Mean square, in the unit squared.
+    /// Mean square of the signal, in the unit squared.
     pub power: f64,
-    /// Smallest eigenvalue of the covariances of that order, as a share of the power.
+    /// Smallest eigenvalue of the covariance matrix of that order, relative to the power.
     pub eigenvalue: f64,
-    /// The same of the next order, which counts as zero.
+    /// Smallest eigenvalue of the next order, which counts as zero, relative to the power.
     pub next_eigenvalue: Option<f64>,
-    /// The same over the whole record, with what happens only once.
+    /// Smallest eigenvalue of the next order over the whole record, transients included, relative to the power.
     pub transient: Option<f64>,
     /// Share of the power that counts as zero.
     pub zero: f64,
-    /// Number of parameters that are to be estimated, start values not counted; null where none are known.
+    /// Number of parameters to be estimated, initial states excluded; null if unknown.
     pub parameters: Option<usize>,
-    /// Whether the order suffices for a linear model with as many parameters.
+    /// True if the order suffices for a linear model with that many parameters.
     pub suffices: bool,
-    /// Order and smallest eigenvalue as a share of the power.
+    /// Orders and smallest eigenvalues relative to the power.
     pub spectrum: Vec<(usize, f64)>,
 }
 
-/// A FIR or ARX model by least squares.
+/// FIR or ARX model estimated by least squares.
 #[derive(Debug, Clone, Serialize)]
 pub struct RegressionReport {
-    /// Name.
+    /// Name of the model.
     pub name: String,
-    /// The finding in a sentence or two.
+    /// Finding in a sentence or two.
     pub words: String,
-    /// The experiment.
+    /// Name of the experiment.
     pub experiment: String,
-    /// The input.
+    /// Name of the input.
     pub input: String,
-    /// The output.
+    /// Name of the output.
     pub output: String,
-    /// Time between two samples, s.
+    /// Sample time, s.
     pub sample_time: f64,
     /// Forgetting factor of the recursive estimate.
     pub forgetting: f64,
     /// Name, least-squares estimate, standard error, and recursive estimate of every parameter.
     pub parameters: Vec<(String, f64, f64, f64)>,
-    /// Number of parameters that are determined.
+    /// Number of determined parameters.
     pub rank: usize,
     /// Standard deviation of the residuals, in the unit of the output.
     pub residual: f64,
-    /// `100 (1 - |e| / |y - mean y|)` of the prediction one step ahead.
+    /// Fit `100 (1 - |e| / |y - mean y|)` of the one-step-ahead prediction.
     pub fit_percent: f64,
 }

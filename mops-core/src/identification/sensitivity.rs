@@ -1,121 +1,124 @@
-//! The sensitivity matrix: what the data say of the tuners, and what they do not.
+//! Sensitivity matrix: which directions of the tuners the data determine.
 
 use nalgebra::{DMatrix, DVector, RowDVector, SymmetricEigen};
 
 use super::blind::{self, BlindDirection, Limit, NO_PART};
 use super::covariance::Covariance;
 
-/// Singular values that slopes do not resolve where they are tangents of the simulation: these keep the digits of the
-/// integration, 1e-8 at its default tolerance.
+/// Relative singular value that tangents of the simulation do not resolve: their accuracy is that of the integration,
+/// 1e-8 at its default tolerance.
 pub const TANGENTS: f64 = 1e-8;
 
-/// Singular values that slopes do not resolve where they come from differences: noise of 1e-9 over steps of 2e-4 leaves 5e-6 of
-/// a strong tuner's slope, and more of a weak one's.
+/// Relative singular value that differences do not resolve.
+///
+/// Noise of 1e-9 over steps of 2e-4 causes an error of 5e-6 of a strong tuner's derivative, and more of a weak one's.
 pub const DIFFERENCES: f64 = 1e-4;
 
-/// Columns below this share of the largest, over the tuners' ranges, are what rounding leaves of no effect.
+/// Share of the largest column, scaled by the tuners' ranges, below which a column is rounding error: no effect.
 const NO_EFFECT: f64 = 1e-15;
 
-/// A tuner as the sensitivity matrix sees it.
+/// Tuner as a coordinate of the sensitivity matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinate {
-    /// Name.
+    /// Name of the tuner.
     pub name: String,
-    /// Value at which the slopes were taken.
+    /// Value at which the derivatives are evaluated.
     pub value: f64,
-    /// Largest minus smallest value; stands for the value where that is 0.
+    /// Largest minus smallest value; replaces the value if that is 0.
     pub range: f64,
-    /// Change over the whole range at the slope of the tuner's scale: the range, or of a logarithmic tuner
-    /// `value ln(max/min)`.
+    /// Change over the whole range at the derivative of the tuner's scale: the range, or `value ln(max/min)` for a
+    /// logarithmic tuner.
     pub span: f64,
-    /// Unit of both.
+    /// Unit of value and range.
     pub unit: String,
 }
 
 impl Coordinate {
-    /// What one relative change is: the value, or the range of a tuner that is 0.
+    /// Returns the scale of a relative change: the value, or the range of a tuner that is 0.
     pub fn scale(&self) -> f64 {
         if self.value == 0.0 { self.range } else { self.value.abs() }
     }
 }
 
-/// Eigenvalues, falling, with their eigenvectors of unit length.
+/// Eigenvalues, descending, with their unit-length eigenvectors.
 pub type Eigen = Vec<(f64, Vec<f64>)>;
 
-/// The sensitivity matrix `J' J` of residuals `r` with `J = dr/dtuner`: half the Hessian of `r' r` where the residuals are
-/// small or nearly linear, and the information of the data by the variance of white noise. An eigenvector of eigenvalue
-/// zero is a direction along which, to first order, nothing changes: the tuners are not locally identifiable.
+/// Sensitivity matrix `J' J` of residuals `r` with `J = dr/dtuner`.
 ///
-/// A direction counts as determined where the slopes resolve it and the noise leaves it (`Sensitivity::judge`). Slopes resolve
-/// singular values of `J` with columns of unit length, so that no choice of units matters, down to `zero` times the largest: below
-/// is what their accuracy leaves of an exact zero.
+/// The matrix is half the Hessian of `r' r` if the residuals are small or nearly linear. Divided by the variance of
+/// white noise it is the Fisher information. Along an eigenvector of eigenvalue zero nothing changes to first order:
+/// the tuners are not locally identifiable.
 ///
-/// Source: E. Walter, L. Pronzato, Identification of Parametric Models from Experimental Data (1997), sections 2.6, 5.2;
-/// A. van der Sluis, Numerische Mathematik 14 (1969) 14-23 (columns of unit length are nearly the best scaling).
+/// A direction counts as determined if the derivatives resolve it and the noise does not hide it
+/// (`Sensitivity::judge`). Derivatives resolve singular values of `J` down to `zero` times the largest; smaller ones
+/// may be exact zeros within their accuracy. The columns of `J` have unit length, so that units do not matter.
+///
+/// Source: E. Walter, L. Pronzato, Identification of Parametric Models from Experimental Data (1997), sections 2.6,
+/// 5.2; A. van der Sluis, Numerische Mathematik 14 (1969) 14-23 (columns of unit length are nearly the best scaling).
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
-    /// The tuners.
+    /// Tuners.
     pub coordinates: Vec<Coordinate>,
-    /// `J' J` in the tuners' own units.
+    /// Matrix `J' J` in the tuners' own units.
     pub matrix: DMatrix<f64>,
-    /// Its eigenvalues and eigenvectors.
+    /// Eigenvalues and eigenvectors of the matrix.
     pub own: Eigen,
-    /// The same for relative changes of the tuners: eigenvalues in the unit of `r' r`.
+    /// Eigenvalues and eigenvectors for relative changes of the tuners; eigenvalues in the unit of `r' r`.
     pub relative: Eigen,
-    /// Singular values for columns of unit length, falling.
+    /// Singular values of `J` with unit-length columns, descending.
     pub singular_values: Vec<f64>,
     /// Number of directions that the data determine.
     pub rank: usize,
-    /// What counts as zero.
+    /// Share of the largest singular value that counts as zero.
     pub zero: f64,
     /// Directions that are not determined.
     pub blind: Vec<BlindDirection>,
-    /// Whether a tuner takes part in one of them.
+    /// True for each tuner that takes part in one of them.
     pub undetermined: Vec<bool>,
-    /// `(J' J)^-1` in the tuners' own units, over the directions that slopes resolve.
+    /// Inverse `(J' J)^-1` in the tuners' own units, over the resolved directions.
     pub inverse: DMatrix<f64>,
-    /// These directions: `basis basis' = (J' J)^-1`, and `J basis` has orthonormal columns.
+    /// Resolved directions: `basis basis' = (J' J)^-1`, and `J basis` has orthonormal columns.
     pub basis: DMatrix<f64>,
-    /// Standard error of each tuner for residuals of unit variance, were all others known: `1/|J_k|`.
+    /// Standard error of each tuner for residuals of unit variance if all others were known: `1/|J_k|`.
     pub alone: Vec<f64>,
-    /// Standard error of each tuner for residuals of unit variance with all others estimated too: root of the diagonal of
-    /// `(J' J)^-1`; NaN where undetermined.
+    /// Standard error of each tuner for residuals of unit variance with all others estimated too: root of the diagonal
+    /// of `(J' J)^-1`; NaN if undetermined.
     pub together: Vec<f64>,
-    /// Correlation of the estimates; NaN where undetermined.
+    /// Correlations of the estimates; NaN if undetermined.
     pub correlation: DMatrix<f64>,
-    /// Directions that slopes do not resolve, as rows, in coordinates in which column `k` of `J` has unit length instead of
+    /// Unresolved directions, as rows, in coordinates in which column `k` of `J` has unit length instead of
     /// `lengths[k]`.
     null: DMatrix<f64>,
-    /// Lengths of the columns of `J`; 1 of a column without effect.
+    /// Lengths of the columns of `J`; 1 for a column without effect.
     lengths: Vec<f64>,
 }
 
 impl Sensitivity {
-    /// From the Jacobian in the tuners' own units: one column per coordinate.
+    /// Computes the sensitivity matrix from the Jacobian in the tuners' own units: one column per coordinate.
     ///
     /// # Panics
-    /// If there is no tuner, no residual, or another number of columns than of coordinates.
+    /// If there is no tuner or no residual, or if the number of columns is not that of the coordinates.
     pub fn of(jacobian: &DMatrix<f64>, coordinates: Vec<Coordinate>, zero: f64) -> Self {
         let n = coordinates.len();
-        assert!(n > 0 && jacobian.ncols() == n && jacobian.nrows() > 0, "a column for every tuner");
+        assert!(n > 0 && jacobian.ncols() == n && jacobian.nrows() > 0, "one column per tuner");
         let scales: Vec<f64> = coordinates.iter().map(Coordinate::scale).collect();
         let strength: Vec<f64> = (0..n).map(|k| jacobian.column(k).norm() * coordinates[k].range).collect();
         let strongest = strength.iter().copied().fold(0.0, f64::max);
         let norms: Vec<f64> =
             (0..n).map(|k| if strength[k] > NO_EFFECT * strongest { jacobian.column(k).norm() } else { 0.0 }).collect();
-        // Fewer residuals than tuners leave directions that no singular value stands for: rows of zeros make them seen.
+        // Rows of zeros give a singular value to each direction if there are fewer residuals than tuners.
         let rows = jacobian.nrows().max(n);
         let unit = DMatrix::from_fn(rows, n, |i, k| {
             if i < jacobian.nrows() && norms[k] > 0.0 { jacobian[(i, k)] / norms[k] } else { 0.0 }
         });
         let svd = unit.svd(false, true);
-        let v_t = svd.v_t.as_ref().expect("asked for");
+        let v_t = svd.v_t.as_ref().expect("the SVD computes V");
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&i, &j| svd.singular_values[j].total_cmp(&svd.singular_values[i]));
         let singular_values: Vec<f64> = order.iter().map(|&i| svd.singular_values[i]).collect();
         let rank = singular_values.iter().filter(|&&s| s > zero * singular_values[0] && s > 0.0).count();
         let null = DMatrix::from_fn(n - rank, n, |i, k| v_t[(order[rank + i], k)]);
-        // An effect that was too small to count has no length: any will do, since it stands alone.
+        // A negligible column is a direction of its own, so that any length is valid.
         let lengths: Vec<f64> = norms.iter().map(|&norm| if norm > 0.0 { norm } else { 1.0 }).collect();
         let basis = DMatrix::from_fn(n, rank, |k, i| v_t[(order[i], k)] / (svd.singular_values[order[i]] * lengths[k]));
         let inverse = &basis * basis.transpose();
@@ -145,16 +148,16 @@ impl Sensitivity {
         }
     }
 
-    /// Number of directions that slopes do not resolve.
+    /// Returns the number of unresolved directions.
     pub fn unresolved(&self) -> usize {
         self.null.nrows()
     }
 
-    /// Judges directions against the noise of the residuals, given the covariance of the estimates.
+    /// Compares directions with the noise of the residuals, given the covariance of the estimates.
     ///
-    /// A direction is not determined where, going along it, one standard error moves a tuner through its whole range: the change
-    /// that the data show of it is below the noise. Where slopes do not resolve a direction, and the change that they have of it
-    /// would be above the noise, nothing is known of it.
+    /// A direction is not determined if one standard error along it moves a tuner through its whole range. The change
+    /// of the residuals is then below the noise. An unresolved direction is unknown if its computed change would be
+    /// above the noise.
     pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, covariance: &Covariance) {
         let n = self.coordinates.len();
         let spans: Vec<f64> = self.coordinates.iter().map(|coordinate| coordinate.span).collect();
@@ -163,7 +166,7 @@ impl Sensitivity {
             let farthest = (0..n).map(|k| (step[k] / spans[k]).abs()).fold(0.0, f64::max);
             let change = jacobian * step;
             let size = change.norm();
-            // N.B.: a noise that is not known hides everything.
+            // N.B.: an unknown noise level hides everything.
             let noise = covariance.noise().along((&change / size.max(f64::MIN_POSITIVE)).as_slice()).deviation;
             size / farthest <= noise || noise.is_nan()
         };
@@ -192,7 +195,8 @@ impl Sensitivity {
         self.correlation = correlation(&matrix, &self.undetermined);
     }
 
-    /// From the matrix `J' J` itself, in the tuners' own units: half of its digits are lost where it is near singular.
+    /// Computes the sensitivities from the matrix `J' J`, in the tuners' own units. Half of the digits are lost if the
+    /// matrix is nearly singular.
     pub fn of_matrix(matrix: &DMatrix<f64>, coordinates: Vec<Coordinate>, zero: f64) -> Self {
         let eigen = SymmetricEigen::new(matrix.clone());
         let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
@@ -202,7 +206,7 @@ impl Sensitivity {
     }
 }
 
-/// Correlations of estimates with this covariance; NaN where a tuner is undetermined.
+/// Returns the correlations of estimates with this covariance; NaN if a tuner is undetermined.
 fn correlation(covariance: &DMatrix<f64>, undetermined: &[bool]) -> DMatrix<f64> {
     DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |a, b| match undetermined[a] || undetermined[b] {
         _ if a == b => 1.0,
@@ -211,7 +215,7 @@ fn correlation(covariance: &DMatrix<f64>, undetermined: &[bool]) -> DMatrix<f64>
     })
 }
 
-/// Eigenvalues, falling; of every eigenvector the largest entry is positive.
+/// Returns the eigenvalues, descending; the largest entry of every eigenvector is positive.
 fn eigen(matrix: &DMatrix<f64>) -> Eigen {
     let eigen = SymmetricEigen::new(matrix.clone());
     let mut pairs: Eigen = (0..matrix.nrows())
@@ -241,11 +245,11 @@ mod tests {
         values.iter().map(of).collect()
     }
 
-    /// The matrix printed for the inertia about the centre of mass and the mass of an arm, 0.1225 m apart.
+    /// Checks the published matrix for the inertia about the centre of mass and the mass of an arm, 0.1225 m apart.
     #[test]
     fn of_inertia_and_mass_of_an_arm_only_one_combination_can_be_estimated() {
         let matrix = DMatrix::from_row_slice(2, 2, &[431_064.0, 6456.3, 6456.3, 97.0671]);
-        // The digits printed leave 1e-3 of a singular value.
+        // The printed digits limit a singular value to 1e-3.
         let found = Sensitivity::of_matrix(&matrix, coordinates(&[("J_c", 0.0014), ("m_arm", 0.165)]), 0.05);
         let [(large, along), (small, across)] = &found.own[..] else { panic!("two of them") };
         assert!((large - 431_160.70).abs() < 0.01 && (small - 0.367_20).abs() < 1e-4, "{large} {small}");
@@ -259,7 +263,7 @@ mod tests {
 
     #[test]
     fn standard_errors_and_correlations_are_those_of_a_straight_line() {
-        // y = a + b t at t = 0, ..., 9: covariance of a and b is the inverse of (n, sum t; sum t, sum t^2).
+        // y = a + b t at t = 0, ..., 9: the covariance of a and b is the inverse of (n, sum t; sum t, sum t^2).
         let jacobian = DMatrix::from_fn(10, 2, |t, k| if k == 0 { 1.0 } else { t as f64 });
         let found = Sensitivity::of(&jacobian, coordinates(&[("a", 1.0), ("b", 2.0)]), TANGENTS);
         let determinant: f64 = 10.0 * 285.0 - 45.0 * 45.0;

@@ -6,20 +6,20 @@ use super::report::{DirectionReport, TunerSensitivity};
 use super::words::{coefficient, counted, estimate, listed, percent};
 use crate::problem::Problem;
 
-/// Correlations above this are mentioned.
+/// Correlation above which a pair is reported.
 const CORRELATED: f64 = 0.95;
 
-/// Correlated pairs that are mentioned, and estimates beside others, at most.
+/// Maximum number of reported correlated pairs, and of reported changes of estimates.
 const MOST: usize = 5;
 
-/// The findings: what is determined, what is not and why, how well, and what else the estimates rest on.
+/// Returns the findings: the determined directions, the others with reasons, the accuracy, and further assumptions.
 pub(super) fn sentences(
     problem: &Problem,
     local: &Local,
     tuners: &[TunerSensitivity],
     directions: &[DirectionReport],
 ) -> Vec<String> {
-    // Start values belong to a recording: nobody asks how far they can be trusted.
+    // Initial states belong to a recording; their accuracy is not of interest.
     let asked: Vec<usize> = (0..tuners.len()).filter(|&k| !local.starts[k]).collect();
     let (vague, rest): (Vec<usize>, Vec<usize>) = asked.into_iter().partition(|&k| is_vague(local, tuners, k));
     let named = |of: &[usize]| listed(&of.iter().map(|&k| format!("`{}`", tuners[k].name)).collect::<Vec<_>>());
@@ -34,7 +34,7 @@ pub(super) fn sentences(
     sentences.extend(extremes(local, tuners, &rest));
     let weak: Vec<usize> = rest.into_iter().filter(|&k| tuners[k].trust == "weak").collect();
     if !weak.is_empty() {
-        sentences.push(format!("Do not trust the numbers of {}: uncertain by more than 10 %.", named(&weak)));
+        sentences.push(format!("Poorly determined: {} (standard error above 10 %).", named(&weak)));
     }
     sentences.extend(pairs(local, tuners));
     if let Some(covariance) = &local.covariance {
@@ -44,8 +44,8 @@ pub(super) fn sentences(
     sentences
 }
 
-/// Whether the noise leaves nothing of a tuner: its standard error exceeds its value, or what the noise hides moves it through
-/// its whole range.
+/// Returns true if the noise hides a tuner: its standard error exceeds its value, or a direction below the noise moves
+/// it through its whole range.
 fn is_vague(local: &Local, tuners: &[TunerSensitivity], k: usize) -> bool {
     let hidden = |direction: &BlindDirection| {
         direction.limit == Limit::Noise && direction.changes.iter().any(|&(member, _)| member == k)
@@ -54,7 +54,7 @@ fn is_vague(local: &Local, tuners: &[TunerSensitivity], k: usize) -> bool {
     of_value || (local.sensitivity.undetermined[k] && local.sensitivity.blind.iter().any(hidden))
 }
 
-/// How many directions are determined, and what is known of the others.
+/// Returns the number of determined directions, and the reasons for the others.
 fn determined(local: &Local, all_practically: bool) -> String {
     let found = &local.sensitivity;
     let n = found.coordinates.len();
@@ -62,19 +62,19 @@ fn determined(local: &Local, all_practically: bool) -> String {
     if found.rank < n {
         let along = |(limit, what): (Limit, &str)| {
             let count = found.blind.iter().filter(|blind| blind.limit == limit).count();
-            (count > 0).then(|| format!("along {} {what}", counted(count, "direction")))
+            (count > 0).then(|| format!("{what} along {}", counted(count, "direction")))
         };
         let open = [
-            (Limit::Nothing, "nothing changes"),
-            (Limit::Noise, "the change is below the noise"),
-            (Limit::Slopes, "the slopes are not accurate enough to tell"),
+            (Limit::Nothing, "no effect"),
+            (Limit::Noise, "a change below the noise"),
+            (Limit::Slopes, "derivatives of insufficient accuracy"),
         ];
-        let what = if local.residuals { "The data determine" } else { "The criteria react to" };
+        let what = if local.residuals { "The data determine" } else { "The criteria depend on" };
         let open: Vec<String> = open.into_iter().filter_map(along).collect();
         return format!("{what} {} of the {}; {}.", found.rank, counted(n, "direction"), listed(&open));
     }
     match (local.residuals, n) {
-        (false, _) => format!("The criteria react to all {} (condition number {condition}).", counted(n, "direction")),
+        (false, _) => format!("The criteria depend on all {} (condition number {condition}).", counted(n, "direction")),
         (true, 1) => "The tuner is locally identifiable.".to_owned(),
         (true, _) if all_practically => {
             format!("All {n} tuners are locally identifiable (condition number {condition}).")
@@ -83,33 +83,33 @@ fn determined(local: &Local, all_practically: bool) -> String {
     }
 }
 
-/// A direction that is not determined, and the way out.
+/// Returns the finding on a direction that is not determined, and the remedy.
 fn undetermined(local: &Local, direction: &DirectionReport) -> String {
     let mut sentence = format!("{}.", capital(&direction.words));
     if direction.changes.len() > 1 {
         sentence += match local.residuals {
-            true => " Hold one of them, or measure something that tells them apart.",
-            false => " There the criteria leave the design free.",
+            true => " Fix one of them, or measure a signal that distinguishes them.",
+            false => " The criteria do not constrain this direction.",
         };
         if direction.remaining.is_finite() {
             let remaining = percent(direction.remaining);
             sentence += &format!(
-                " (Checked by going a tenth along it: the change is {remaining} of that of its tuners one by one.)"
+                " (Check: a 10 % step along it causes {remaining} of the change that steps of its single tuners cause.)"
             );
         }
     }
     sentence
 }
 
-/// The best and the least known of some tuners.
+/// Returns the most and the least accurate of some tuners.
 fn extremes(local: &Local, tuners: &[TunerSensitivity], of: &[usize]) -> Option<String> {
     let known = || of.iter().map(|&k| &tuners[k]).filter(|t| t.relative_error.is_finite());
     let by_error = |a: &&TunerSensitivity, b: &&TunerSensitivity| a.relative_error.total_cmp(&b.relative_error);
     let (best, worst) = (known().min_by(by_error)?, known().max_by(by_error)?);
-    let aside = if local.starts.contains(&true) { "; start values aside" } else { "" };
+    let aside = if local.starts.contains(&true) { ", initial states excluded" } else { "" };
     (best.name != worst.name).then(|| {
         format!(
-            "Best known is `{}`, to {}; least `{}`, to {} (one standard error{aside}).",
+            "Most accurate is `{}`, to {}; least accurate `{}`, to {} (one standard error{aside}).",
             best.name,
             relative(best),
             worst.name,
@@ -118,9 +118,9 @@ fn extremes(local: &Local, tuners: &[TunerSensitivity], of: &[usize]) -> Option<
     })
 }
 
-/// What counting every sample alike would change, where records differ much in length.
+/// Returns the changes with equal sample weights, if records differ much in length.
 fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
-    /// Changes of an estimate below this share of its standard error, and of the error, are none.
+    /// Relative change below which an estimate, in standard errors, and its error count as unchanged.
     const SAME: f64 = 0.2;
     let found = local.alike.as_ref()?;
     let [least, most] = found.samples;
@@ -129,9 +129,9 @@ fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
         !local.starts[k] && now.is_finite() && (step.abs() > SAME * now || (error / now - 1.0).abs() > SAME)
     };
     let changed: Vec<usize> = (0..tuners.len()).filter(changes).collect();
-    let begin = format!("The records have {least} to {most} samples. With every sample counted alike");
+    let begin = format!("The records have {least} to {most} samples. With equal weight for every sample");
     if changed.is_empty() {
-        return Some(format!("{begin}, the estimates and their errors would be about the same."));
+        return Some(format!("{begin}, the estimates and their standard errors would be about the same."));
     }
     let would_be = |&k: &usize| {
         let ((step, error), tuner) = (found.tuners[k], &tuners[k]);
@@ -140,11 +140,11 @@ fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
     };
     let more = changed.len().saturating_sub(MOST);
     let mut parts: Vec<String> = changed.iter().take(MOST).map(would_be).collect();
-    parts.extend((more > 0).then(|| format!("so on for {more} more")));
+    parts.extend((more > 0).then(|| format!("{more} more")));
     Some(format!("{begin}, to first order: {}.", listed(&parts)))
 }
 
-/// Sentences about tuners that are hard to tell apart, the closest pairs first.
+/// Returns sentences about correlated tuners, the strongest correlation first.
 fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
     let found = &local.sensitivity;
     let n = tuners.len();
@@ -156,10 +156,10 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
         let [a, b] = [&tuners[i], &tuners[j]];
         let error = |k: usize| local.covariance.as_ref().map_or(found.together[k], |c| c.of_tuner(k).deviation);
         let share = |k: usize| error(k) / found.coordinates[k].scale();
-        // The axis of the ellipse of confidence: both move by their errors.
+        // Major axis of the confidence ellipse: both move by their standard errors.
         let (most, least) = if share(i) >= share(j) { (i, j) } else { (j, i) };
         let change = |k: usize, sign: f64| {
-            // The sign of a relative change is that of the value's.
+            // A relative change has the sign of the value's change.
             if sign * found.coordinates[k].value.signum() < 0.0 { "decrease" } else { "increase" }
         };
         let by = percent(0.01 * share(least) / share(most));
@@ -174,13 +174,13 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
         );
         let is_known = tuners[most].relative_error.is_finite() && !local.starts[most];
         if let Some(covariance) = local.covariance.as_ref().filter(|_| is_known) {
-            // With one of them held, the estimate of the other loses what the first brings into it.
+            // With one of them fixed, the estimate of the other loses the uncertainty due to the first.
             let mut slopes = vec![0.0; n];
             slopes[most] = 1.0;
             slopes[least] = -found.inverse[(most, least)] / found.inverse[(least, least)];
             let held = tuners[most].relative_error * covariance.spread(&slopes).deviation / error(most);
             text += &format!(
-                " With `{}` held, `{}` would be known to {} instead of {}.",
+                " With `{}` fixed, the standard error of `{}` would be {} instead of {}.",
                 tuners[least].name,
                 tuners[most].name,
                 percent(held),
@@ -192,7 +192,7 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
     pairs.iter().take(MOST).map(sentence).collect()
 }
 
-/// A relative error in words.
+/// Returns the relative error as text.
 fn relative(tuner: &TunerSensitivity) -> String {
     let of = if tuner.relative_to == "range" { " of its range" } else { "" };
     format!("{}{of}", percent(tuner.relative_error))

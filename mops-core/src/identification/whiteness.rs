@@ -1,4 +1,4 @@
-//! Whether residuals are white: what standard errors assume of them.
+//! Whiteness test of residuals, an assumption of standard errors.
 
 use serde::Serialize;
 
@@ -8,23 +8,23 @@ use crate::math;
 /// Probability below which residuals do not count as white.
 const UNLIKELY: f64 = 0.01;
 
-/// How residuals are correlated with those before them.
+/// Autocorrelation of residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Whiteness {
-    /// Autocorrelation of neighbours, between -1 and 1; 0 for white residuals.
+    /// Lag-1 autocorrelation, between -1 and 1; 0 for white residuals.
     pub lag1: f64,
-    /// `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the lags 1 to [`Whiteness::lags`].
+    /// Ljung-Box statistic `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the lags 1 to [`Whiteness::lags`].
     pub ljung_box: f64,
     /// Number of lags, in samples.
     pub lags: usize,
-    /// Probability of a larger `Q`, were the residuals white.
+    /// Probability of a larger `Q` for white residuals.
     pub probability: f64,
 }
 
-/// Tests residuals about their mean; `None` for fewer than 20, or where they do not vary. Gaps are passed over.
+/// Tests residuals about their mean; returns `None` for fewer than 20, or if they do not vary. Gaps are ignored.
 ///
+/// `Q` is compared with chi-squared with as many degrees of freedom as lags: ten, or fewer for fewer than 50 residuals.
 /// Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series models, Biometrika 65 (1978), 297-303.
-/// `Q` is compared with chi-squared of as many degrees of freedom as lags: ten, or fewer for fewer than 50 residuals.
 #[allow(clippy::cast_precision_loss)]
 pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
     let n = residuals.len();
@@ -37,7 +37,7 @@ pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
     if !(power.is_finite() && power > 0.0) {
         return None;
     }
-    // An even number: then the tail of chi-squared is a finite sum.
+    // With an even number the tail of chi-squared is a finite sum.
     let lags = (n / 10 * 2).min(10);
     let correlation = |k: usize| about.iter().zip(&about[k..]).map(|(a, b)| a * b).sum::<f64>() / power;
     let sum: f64 = (1..=lags).map(|k| math::powi(correlation(k), 2) / (n - k) as f64).sum();
@@ -45,7 +45,7 @@ pub fn whiteness(residuals: &[f64]) -> Option<Whiteness> {
     Some(Whiteness { lag1: correlation(1), ljung_box, lags, probability: tail(ljung_box, lags) })
 }
 
-/// Probability that chi-squared with an even number of degrees of freedom exceeds `q`:
+/// Returns the probability that chi-squared with an even number of degrees of freedom exceeds `q`:
 /// `exp(-q/2) sum_{k < freedom/2} (q/2)^k / k!`.
 fn tail(q: f64, freedom: usize) -> f64 {
     let (mut term, mut sum) = (1.0, 0.0);
@@ -59,31 +59,31 @@ fn tail(q: f64, freedom: usize) -> f64 {
 }
 
 impl Whiteness {
-    /// Whether nothing speaks against it.
+    /// Returns true if the test does not reject whiteness.
     pub fn is_white(&self) -> bool {
         self.probability >= UNLIKELY
     }
 
-    /// The finding on a channel of an experiment in a sentence.
+    /// Returns the finding on a channel of an experiment as a sentence.
     pub fn words(&self, channel: &str, experiment: &str) -> String {
         let chance = match self.probability {
-            p if p < 1e-4 => "less than 0.01 %".to_owned(),
-            p => percent(p),
+            p if p < 1e-4 => "< 0.01 %".to_owned(),
+            p => format!("= {}", percent(p)),
         };
         let numbers = format!(
-            "lag-1 autocorrelation {}, Ljung-Box {} over {} lags: white ones exceed that with probability {chance}",
+            "lag-1 autocorrelation {}, Ljung-Box {} over {} lags, p {chance}",
             coefficient(self.lag1),
             coefficient(self.ljung_box),
             self.lags
         );
         let place = format!("The residuals of `{channel}` in `{experiment}`");
         if self.is_white() {
-            format!("{place} look white ({numbers}), as the standard errors assume.")
+            format!("{place} are consistent with white noise ({numbers}), as the standard errors assume.")
         } else {
             format!(
-                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but intervals still \
-                 hold the truth less often than they say: look for an effect that the model lacks, a delay, or an input that is \
-                 held wrongly."
+                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but \
+                 intervals still cover the truth less often than stated: look for an effect that the model lacks, a \
+                 delay, or an input with the wrong `hold`."
             )
         }
     }
@@ -93,7 +93,7 @@ impl Whiteness {
 mod tests {
     use super::*;
 
-    /// `n` values without a pattern.
+    /// Returns `n` values without a pattern.
     fn chirp(n: i32) -> Vec<f64> {
         (0..n).map(|i| math::sin(f64::from(i * i))).collect()
     }
@@ -108,9 +108,9 @@ mod tests {
         assert!((tail(18.307, 10) - 0.05).abs() < 1e-5);
     }
 
-    // Reference: the formulas, computed apart; the tail by integrating the density numerically.
+    // Checks against the formulas, computed independently; the tail by numerical integration of the density.
     #[test]
-    fn white_and_coloured_residuals_are_told_apart() {
+    fn white_and_coloured_residuals_are_distinguished() {
         let white = whiteness(&chirp(60)).unwrap();
         close(white.lag1, -0.163_995_667_7);
         close(white.ljung_box, 8.027_409_057);
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_or_constant_residuals_tell_nothing() {
+    fn too_few_or_constant_residuals_have_no_result() {
         assert_eq!(whiteness(&chirp(19)), None);
         assert_eq!(whiteness(&[1.0; 100]), None);
     }

@@ -1,13 +1,13 @@
-//! Numbers and lists inside sentences.
+//! Formatting of numbers and lists in sentences.
 
 use crate::math;
 
-/// A number to three significant digits: `0.0150`, `4.00`, `1230`, `3.20e-7`.
+/// Formats a number with three significant digits: `0.0150`, `4.00`, `1230`, `3.20e-7`.
 pub(super) fn coefficient(value: f64) -> String {
     digits(value, 3)
 }
 
-/// A number to so many significant digits, at least one.
+/// Formats a number with `count` significant digits, at least one.
 fn digits(value: f64, count: usize) -> String {
     let decimals = count - 1;
     let scientific = format!("{value:.decimals$e}");
@@ -21,7 +21,7 @@ fn digits(value: f64, count: usize) -> String {
     }
 }
 
-/// An estimate and its standard error, to two digits of the error: `0.9989 +- 0.0011`.
+/// Formats an estimate and its standard error, to two digits of the error: `0.9989 +- 0.0011`.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub(super) fn estimate(value: f64, error: f64) -> String {
     let more = math::log10(value.abs() / error).floor().clamp(-1.0, 13.0);
@@ -29,13 +29,13 @@ pub(super) fn estimate(value: f64, error: f64) -> String {
     format!("{} +- {}", digits(value, count.max(1)), digits(error, 2))
 }
 
-/// A share in percent, to two digits.
+/// Formats a share in percent, with two digits.
 pub(super) fn percent(share: f64) -> String {
     let rounded: f64 = format!("{:.1e}", 100.0 * share).parse().unwrap_or(f64::NAN);
     if rounded.abs() < 1e-4 || rounded.abs() >= 1e6 { format!("{rounded:e} %") } else { format!("{rounded} %") }
 }
 
-/// `a, b and c`.
+/// Joins parts to `a, b and c`.
 pub(super) fn listed(parts: &[String]) -> String {
     match parts {
         [] => String::new(),
@@ -44,7 +44,7 @@ pub(super) fn listed(parts: &[String]) -> String {
     }
 }
 
-/// `1 parameter`, `3 parameters`.
+/// Formats a count with its noun: `1 parameter`, `3 parameters`.
 pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,43 +1,43 @@
-//! Bounds of a response over ranges of frequencies: what no grid can miss.
+//! Bounds of a frequency response over ranges of frequencies; unlike a grid, they miss no peak or crossing.
 
 use super::{Complex, FrequencyResponse, StateSpace, zeros};
 use crate::math::{self, complex};
 
-/// Gain below which a response counts as nothing: -200 dB.
+/// Gain below which a response counts as zero: -200 dB.
 const FAINT: f64 = 1e-10;
 
-/// Decades above the highest corner to which a response is always looked at, and below the lowest one.
+/// Number of decades above the highest and below the lowest corner frequency that are always searched.
 const BEYOND: i32 = 4;
 
-/// Relative error of the gain by the poles and zeros from which on they bound nothing. Rounding makes one far smaller; zeros
-/// that are wrongly found make one of the size of the gain.
+/// Largest relative gain error of the pole-zero form with which poles and zeros are used as bounds.
+///
+/// Rounding causes far smaller errors; wrong zeros cause errors of the magnitude of the gain.
 const INACCURATE: f64 = 1e-3;
 
-/// Share of the terms it is the sum of below which a response is inaccurate itself.
+/// Ratio of a response to the sum of its terms' magnitudes below which the response is inaccurate (cancellation).
 const LOST: f64 = 1e-10;
 
-/// Error of bounds by rounding, rad or a share of the gain: far above that of a sum over some hundred poles and zeros.
+/// Rounding error of bounds, rad or relative gain: far above that of a sum over some hundred poles and zeros.
 const ROUNDING: f64 = 1e-12;
 
-/// A response `L(j w)` of one input and output with its poles and zeros, which bound how much it changes from one frequency
-/// to another.
+/// Single-input, single-output response `L(j w)` with its poles and zeros, which bound its change between frequencies.
 #[derive(Debug, Clone)]
 pub(super) struct BoundedResponse {
     response: FrequencyResponse,
-    /// Zeros with 1, poles with -1.
+    /// Zeros with weight 1, poles with weight -1.
     roots: Vec<(Complex, f64)>,
     delay: f64,
-    /// Lowest and highest frequency at which the response has a corner, rad/s.
+    /// Lowest and highest corner frequency, rad/s.
     corners: [f64; 2],
-    /// See [`BoundedResponse::inaccuracy`].
+    /// Value of [`BoundedResponse::inaccuracy`].
     inaccuracy: f64,
 }
 
 impl BoundedResponse {
-    /// The response of a system with one input and one output.
+    /// Computes the bounded response of a system with one input and one output.
     ///
     /// # Errors
-    /// An entry that is not finite; poles and zeros that do not explain the response, so that they bound nothing.
+    /// If an entry is not finite, or if poles and zeros do not reproduce the response, so that they give no bounds.
     pub fn new(system: &StateSpace) -> Result<Self, String> {
         let zeros = zeros(system)?.into_iter().map(|z| (z, 1.0));
         let roots: Vec<(Complex, f64)> = zeros.chain(system.poles()?.into_iter().map(|p| (p, -1.0))).collect();
@@ -52,28 +52,30 @@ impl BoundedResponse {
         Ok(found)
     }
 
-    /// The response at an angular frequency, rad/s.
+    /// Returns the response at an angular frequency, rad/s.
     pub fn at(&self, omega: f64) -> Complex {
         self.response.scalar(omega)
     }
 
-    /// Number of poles and zeros.
+    /// Returns the number of poles and zeros.
     pub fn order(&self) -> usize {
         self.roots.len()
     }
 
-    /// Lowest and highest frequency at which the response has a corner, rad/s.
+    /// Returns the lowest and highest corner frequency, rad/s.
     pub fn corners(&self) -> [f64; 2] {
         self.corners
     }
 
-    /// How far a response may lie outside of its bounds, rad or as a share of its gain: rounding, and errors of poles and zeros.
+    /// Returns the largest distance of a response from its bounds, rad or relative gain, due to rounding and to errors
+    /// of poles and zeros.
     pub fn inaccuracy(&self) -> f64 {
         self.inaccuracy
     }
 
-    /// Ranges that together are all frequencies at which the response matters: from 0 to where it only falls any more, and
-    /// is faint, or is as good as that of infinite frequency.
+    /// Returns ranges that cover all relevant frequencies, from 0 upwards.
+    ///
+    /// They end where the response is negligible, or has reached its value at infinite frequency.
     pub fn spans(&self) -> Vec<Span> {
         let decade = |power: i32| math::powi(10.0, power);
         let start = self.corners[0] * decade(-BEYOND);
@@ -93,7 +95,7 @@ impl BoundedResponse {
         }
     }
 
-    /// The response over the frequencies from `low` to `high`.
+    /// Returns the response over the frequencies from `low` to `high`.
     pub fn over(&self, low: f64, high: f64) -> Span {
         let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
         let mut slope = Complex::new(0.0, -self.delay * half);
@@ -103,7 +105,7 @@ impl BoundedResponse {
             let distance = Complex::new(-root.re, center - root.im);
             let x = half / complex::norm(distance);
             if x <= 0.5 {
-                // ln(1 + u) = u + r with |r| <= |u|^2/(2 (1 - |u|)), of which the imaginary part is small where u is nearly
+                // ln(1 + u) = u + r with |r| <= |u|^2/(2 (1 - |u|)). The imaginary part of r is small if u is nearly
                 // real: |Im u^k| <= k |sin arg u| |u|^k.
                 slope += Complex::new(0.0, sign * half) / distance;
                 let curved = x * x / (1.0 - x);
@@ -129,20 +131,21 @@ impl BoundedResponse {
         }
     }
 
-    /// Compares the change of the gain from frequency to frequency with that of the poles and zeros: the largest difference, as
-    /// a share of the gain.
+    /// Compares the change of the gain between frequencies with that of the pole-zero form.
+    ///
+    /// Returns the largest difference, relative to the gain.
     fn check(&self) -> Result<f64, String> {
         let [low, high] = self.corners;
         let mut largest = 0.0f64;
         let mut before: Option<f64> = None;
         let steps = math::log10(high / low).ceil().max(1.0);
         for i in 0..=(2.0 * steps) as i32 {
-            // Between the corners, off those that are round numbers.
+            // Frequencies between the corners, offset to avoid round numbers.
             let omega = 1.07 * low * math::powf(10.0, 0.5 * f64::from(i));
             let s = Complex::new(0.0, omega);
             let rational: f64 = self.roots.iter().map(|(root, sign)| sign * math::ln(complex::norm(s - root))).sum();
             let gain = complex::norm(self.at(omega));
-            // Where the response is what rounding leaves of a sum it says nothing.
+            // A response that is the rounding error of a sum carries no information.
             let lost = gain <= LOST * self.response.terms(s);
             if lost || !(gain > FAINT && gain.is_finite() && rational.is_finite()) {
                 continue;
@@ -158,8 +161,10 @@ impl BoundedResponse {
     }
 }
 
-/// Bounds of the change of `ln |j w - root|` from the middle frequency to any other, and of its angle: the distance is
-/// convex in w, and the angle monotone.
+/// Returns bounds of the change of `ln |j w - root|` from the centre frequency to any other, and of the change of its
+/// angle.
+///
+/// The distance is convex in w, and the angle monotone.
 fn whole_change(root: Complex, [low, center, high]: [f64; 3]) -> ([f64; 2], f64) {
     let from = |omega: f64| Complex::new(-root.re, omega - root.im);
     let middle = from(center);
@@ -173,39 +178,40 @@ fn whole_change(root: Complex, [low, center, high]: [f64; 3]) -> ([f64; 2], f64)
     (change, angle(low).max(angle(high)))
 }
 
-/// What a response is bounded by over a range of frequencies: `ln L` is its value at the centre, plus a part that is linear
-/// in the frequency, plus a rest.
+/// Bounds of a response over a range of frequencies: `ln L` is its value at the centre, plus a part linear in the
+/// frequency, plus a remainder.
 #[derive(Debug, Clone)]
 pub(super) struct Span {
-    /// Lowest and highest angular frequency, rad/s.
+    /// Lowest angular frequency, rad/s.
     pub low: f64,
+    /// Highest angular frequency, rad/s.
     pub high: f64,
-    /// L at the centre.
+    /// Value of L at the centre.
     pub response: Complex,
-    /// The linear part at the upper end.
+    /// Linear part of `ln L` at the upper end.
     slope: Complex,
-    /// Bound of what is left of `ln L`, as a complex number.
+    /// Bound of the remainder of `ln L`, as a complex number.
     rest: f64,
     /// Bounds of the change of `ln |L|`.
     gain: [f64; 2],
-    /// Bound of the turn of L, rad.
+    /// Bound of the phase change of L, rad.
     turn: f64,
 }
 
-/// A transfer function of the closed loop with unity negative feedback.
+/// Transfer function of the closed loop with unity negative feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Closed {
-    /// `S = 1/(1 + L)`.
+    /// Sensitivity `S = 1/(1 + L)`.
     Sensitivity,
-    /// `T = L/(1 + L)`.
+    /// Complementary sensitivity `T = L/(1 + L)`.
     Complementary,
 }
 
 impl Closed {
-    /// The gain at a value of L.
+    /// Returns the gain for a value of L.
     pub fn gain(self, l: Complex) -> f64 {
         match self {
-            // Where L is infinite.
+            // L is infinite.
             Self::Sensitivity if !l.is_finite() => 0.0,
             Self::Complementary if !l.is_finite() => 1.0,
             Self::Sensitivity => complex::norm((l + 1.0).inv()),
@@ -215,12 +221,12 @@ impl Closed {
 }
 
 impl Span {
-    /// The frequency in the middle, rad/s.
+    /// Returns the centre frequency, rad/s.
     pub fn center(&self) -> f64 {
         0.5 * (self.low + self.high)
     }
 
-    /// Two halves: of the logarithm where the ends are far apart.
+    /// Returns two halves, split at the geometric mean if the ends are far apart.
     pub fn split(&self, of: &BoundedResponse) -> [Self; 2] {
         let middle = match () {
             () if self.low == 0.0 => 0.1 * self.high,
@@ -230,26 +236,27 @@ impl Span {
         [of.over(self.low, middle), of.over(middle, self.high)]
     }
 
-    /// Bounds of `ln |L|`.
+    /// Returns bounds of `ln |L|`.
     pub fn gain(&self) -> [f64; 2] {
         let here = math::ln(complex::norm(self.response));
         [here + self.gain[0], here + self.gain[1]]
     }
 
-    /// Bounds of the angle from -1 to L, rad, 0 where L is real and negative; from -pi to pi where it may be any.
+    /// Returns bounds of the angle from the negative real axis to L, rad: 0 where L is real and negative, and -pi to pi
+    /// if unbounded.
     pub fn angle(&self) -> [f64; 2] {
         use std::f64::consts::PI;
         let here = complex::arg(-self.response);
         if self.turn < PI { [here - self.turn, here + self.turn] } else { [-PI, PI] }
     }
 
-    /// Bounds of the logarithm of the gain of the closed loop.
+    /// Returns bounds of the logarithm of the closed-loop gain.
     pub fn closed(&self, of: Closed) -> [f64; 2] {
         let (around, along) = (self.by_sector(of), self.by_slope(of));
         [around[0].max(along[0]), around[1].min(along[1])]
     }
 
-    /// Bounds of the closed loop by those of the gain and the angle of L.
+    /// Returns bounds of the closed loop from bounds of the gain and the angle of L.
     fn by_sector(&self, of: Closed) -> [f64; 2] {
         use std::f64::consts::PI;
         let [low, high] = self.gain().map(math::exp);
@@ -269,7 +276,7 @@ impl Span {
         [-math::ln(farthest), -math::ln(nearest)]
     }
 
-    /// Bounds of the closed loop by its own linear part, with those of the rest.
+    /// Returns bounds of the closed loop from its linear part and the bound of the remainder.
     fn by_slope(&self, of: Closed) -> [f64; 2] {
         let l = self.response;
         let t = l / (l + 1.0);
@@ -279,7 +286,7 @@ impl Span {
         if u.is_nan() || u > 0.9 {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
-        // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) where ln L changes by e.
+        // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) if ln L changes by e.
         let curved = complex::norm(t) * (growth - size) + 0.5 * u * u / (1.0 - u);
         let (linear, rest) = match of {
             Closed::Sensitivity => ((t * self.slope).re, self.rest * complex::norm(t)),

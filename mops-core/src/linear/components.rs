@@ -1,15 +1,16 @@
-//! The strong components of a matrix: states that act on each other.
+//! Strongly connected components of a matrix: groups of states that act on each other.
 
 use nalgebra::DMatrix;
 
-/// Groups of indices that reach each other through entries that are not 0, by their smallest index.
+/// Returns the groups of indices that reach each other through nonzero entries, ordered by smallest index.
 ///
-/// With the indices in a suitable order the matrix is block triangular, one block per group, so that its eigenvalues are
-/// those of the blocks, without any rounding between them. A chain of integrators has poles at exactly 0 that way, and
-/// equal lags in series have equal poles.
+/// With the indices in a suitable order the matrix is block triangular, one block per group. Its eigenvalues are then
+/// those of the blocks, without rounding between blocks. Hence a chain of integrators has poles at exactly 0, and equal
+/// lags in series have equal poles.
 ///
-/// Source: I. S. Duff, J. K. Reid, An implementation of Tarjan's algorithm for the block triangularization of a matrix, ACM
-/// Transactions on Mathematical Software 4 (1978) 137-147; here by Warshall's transitive closure, as matrices are small.
+/// Source: I. S. Duff, J. K. Reid, An implementation of Tarjan's algorithm for the block triangularization of a matrix,
+/// ACM Transactions on Mathematical Software 4 (1978) 137-147. The matrices are small, so Warshall's transitive closure
+/// is used here.
 pub(super) fn strong_components(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let n = a.nrows();
     let mut reaches = a.map(|x| x != 0.0);
@@ -32,7 +33,7 @@ pub(super) fn strong_components(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
     components
 }
 
-/// The block of a matrix with these rows and columns.
+/// Returns the block of a matrix with these rows and columns.
 pub(super) fn block(a: &DMatrix<f64>, indices: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(indices.len(), indices.len(), |i, j| a[(indices[i], indices[j])])
 }
@@ -43,7 +44,7 @@ mod tests {
 
     #[test]
     fn states_that_act_on_each_other_are_one_component_and_a_chain_is_many() {
-        // 0 <-> 2 -> 1 -> 3, and 4 alone.
+        // 0 <-> 2 -> 1 -> 3, and 4 isolated.
         let mut a = DMatrix::zeros(5, 5);
         [(0, 2), (2, 0), (2, 1), (1, 3)].iter().for_each(|&(i, j)| a[(i, j)] = 1.0);
         assert_eq!(strong_components(&a), [vec![0, 2], vec![1], vec![3], vec![4]]);

@@ -1,27 +1,28 @@
-//! Whether inputs can move every mode, and how directly.
+//! Controllability of a linear system: staircase form, indices and uncontrollable modes.
 
 use nalgebra::DMatrix;
 
 use super::eigen::balance;
 use super::eigenvalues;
 
-/// Singular value, relative to the size of the scaled system, that still counts as an influence.
+/// Singular value, relative to the norm of the scaled system, below which an influence counts as zero.
 const SMALL: f64 = 1e-12;
 
-/// A system `x' = A x + B u` with states and inputs in units of like size, so that numbers can be compared.
+/// System `x' = A x + B u` with states and inputs scaled to similar magnitude, so that entries are comparable.
 #[derive(Debug, Clone)]
 pub(super) struct Scaled {
-    /// `D^-1 A D` for the states `z = D^-1 x`.
+    /// Matrix `D^-1 A D`, for the states `z = D^-1 x`.
     pub a: DMatrix<f64>,
-    /// `D^-1 B S` for the inputs `v = S^-1 u`.
+    /// Matrix `D^-1 B S`, for the inputs `v = S^-1 u`.
     pub b: DMatrix<f64>,
     states: Vec<f64>,
     inputs: Vec<f64>,
 }
 
 impl Scaled {
-    /// The system balanced as if every state were fed back to every input: what only a chain of small influences moves is
-    /// given units in which they are not small.
+    /// Balances the system as if every state were fed back to every input.
+    ///
+    /// A state reached only through a chain of small influences thus gets units in which they are not small.
     pub fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Self {
         let (n, m) = (a.nrows(), b.ncols());
         let mut all = DMatrix::zeros(n + m, n + m);
@@ -37,39 +38,39 @@ impl Scaled {
         }
     }
 
-    /// `D m D`, for a matrix over the states.
+    /// Returns `D m D` for a states x states matrix `m`.
     pub fn by_states(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| self.states[i] * m[(i, j)] * self.states[j])
     }
 
-    /// `D^-1 m D^-1`, for a matrix over the states.
+    /// Returns `D^-1 m D^-1` for a states x states matrix `m`.
     pub fn per_states(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / self.states[i] / self.states[j])
     }
 
-    /// The feedback `u = -K x` that is `v = -k z`.
+    /// Returns the gain `K` of `u = -K x` that is equivalent to `v = -k z`.
     pub fn feedback(&self, k: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| self.inputs[i] * k[(i, j)] / self.states[j])
     }
 }
 
-/// How inputs move the states: those that they move directly, those that these move, and so on, each step by the rank of
-/// its influence; and what is left.
+/// Controllability staircase: ranks of the states reached directly by the inputs, then by those states, and so on, and
+/// the uncontrollable part.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability, IEEE Transactions on
 /// Automatic Control 26 (1981) 130-138; A. Varga, Numerically stable algorithm for standard controllability form
 /// determination, Electronics Letters 17 (1981) 74-75.
 #[derive(Debug, Clone)]
 pub(super) struct Staircase {
-    /// Ranks of the steps, which do not rise.
+    /// Ranks of the steps, in non-increasing order.
     ranks: Vec<usize>,
     states: usize,
-    /// The part of A that no input moves.
+    /// Uncontrollable part of `A`.
     fixed: DMatrix<f64>,
 }
 
 impl Staircase {
-    /// The staircase of a scaled system.
+    /// Computes the staircase of a scaled system.
     pub fn of(scaled: &Scaled) -> Self {
         let (mut a, mut b) = (scaled.a.clone(), scaled.b.clone());
         let states = a.nrows();
@@ -77,7 +78,7 @@ impl Staircase {
         let mut ranks = Vec::new();
         while a.nrows() > 0 {
             let n = a.nrows();
-            // Padded to be square, so that the left vectors are complete.
+            // Padded to a square matrix, so that the left singular vectors form a complete basis.
             let mut square = DMatrix::zeros(n, n.max(b.ncols()));
             square.columns_mut(0, b.ncols()).copy_from(&b);
             let svd = square.svd(true, false);
@@ -86,7 +87,7 @@ impl Staircase {
                 break;
             }
             ranks.push(rank);
-            let u = svd.u.expect("it was asked for");
+            let u = svd.u.expect("the SVD computes U");
             let turned = u.transpose() * a * u;
             b = turned.view((rank, 0), (n - rank, rank)).into_owned();
             a = turned.view((rank, rank), (n - rank, n - rank)).into_owned();
@@ -94,16 +95,17 @@ impl Staircase {
         Self { ranks, states, fixed: a }
     }
 
-    /// The controllability indices, which do not rise: of every independent input, how many states it takes.
+    /// Returns the controllability indices, in non-increasing order: the number of states assigned to each independent
+    /// input.
     pub fn indices(&self) -> Vec<usize> {
         let inputs = self.ranks.first().copied().unwrap_or(0);
         (1..=inputs).map(|i| self.ranks.iter().filter(|&&rank| rank >= i).count()).collect()
     }
 
-    /// Checks that inputs move every state.
+    /// Checks that the inputs control every state.
     ///
     /// # Errors
-    /// The rank, and the modes that no input moves.
+    /// If not, with the rank and the uncontrollable modes.
     pub fn check(&self) -> Result<(), String> {
         let rank: usize = self.ranks.iter().sum();
         if rank == self.states {
@@ -118,18 +120,17 @@ impl Staircase {
             .collect();
         modes.dedup();
         Err(format!(
-            "the system is not controllable: its controllability matrix has rank {rank} of {}, and no input moves the mode at \
-             {} 1/s",
+            "the system is not controllable: its controllability matrix has rank {rank} of {}; uncontrollable mode at {} 1/s",
             self.states,
-            modes.join(" and at ")
+            modes.join(" and ")
         ))
     }
 }
 
-/// Checks that inputs can move every mode.
+/// Checks that the inputs control every mode.
 ///
 /// # Errors
-/// The rank and the modes that no input moves, in one sentence.
+/// If not, with the rank and the uncontrollable modes.
 pub fn check_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<(), String> {
     Staircase::of(&Scaled::of(a, b)).check()
 }
@@ -144,8 +145,8 @@ mod tests {
         let a = DMatrix::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, 0.0, -3.0, 0.0, 4.0, 5.0, -6.0]);
         let b = DMatrix::from_row_slice(3, 1, &[1.0, 0.0, 0.0]);
         let fact = check_controllable(&a, &b).unwrap_err();
-        let expected = "the system is not controllable: its controllability matrix has rank 2 of 3, and no input moves the \
-                        mode at -3.000000 1/s";
+        let expected = "the system is not controllable: its controllability matrix has rank 2 of 3; uncontrollable mode at \
+                        -3.000000 1/s";
         assert_eq!(fact, expected);
     }
 
@@ -159,7 +160,7 @@ mod tests {
 
     #[test]
     fn units_of_states_and_inputs_change_no_rank() {
-        // A chain of four whose influences are 1e-9 each, and one whose states have units from 1e-12 to 1e12.
+        // A chain of four states with influences of 1e-9 each, and one whose states have units from 1e-12 to 1e12.
         let chain = |unit: f64| DMatrix::from_fn(4, 4, |i, j| if j == i + 1 { unit } else { 0.0 });
         let last = DMatrix::from_column_slice(4, 1, &[0.0, 0.0, 0.0, 1e-20]);
         assert_eq!(check_controllable(&chain(1e-9), &last), Ok(()));
@@ -173,8 +174,8 @@ mod tests {
     }
 
     #[test]
-    fn the_indices_say_how_many_states_each_input_takes() {
-        // An axis of three states and one of one: (3, 1); two of two: (2, 2).
+    fn the_indices_are_the_numbers_of_states_per_input() {
+        // A chain of three states and one of one state: (3, 1); two of two: (2, 2).
         let indices = |lengths: &[usize]| {
             let n: usize = lengths.iter().sum();
             let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, lengths.len()));

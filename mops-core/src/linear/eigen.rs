@@ -10,13 +10,14 @@ use super::components::{block, strong_components};
 use super::qr_steps::hessenberg_eigenvalues;
 use crate::math;
 
-/// The eigenvalues of a square matrix, complex ones as exact conjugate pairs, the one above the real axis first.
+/// Returns the eigenvalues of a square matrix, complex ones as exact conjugate pairs, upper one first.
 ///
-/// The matrix is split into its strong components, each of them balanced, freed from eigenvalues that are 0, brought to
-/// Hessenberg form and treated by QR steps. An eigenvalue of a component of one state is its diagonal entry, exactly.
+/// The matrix is split into its strongly connected components. Each is balanced, deflated of zero eigenvalues, reduced
+/// to Hessenberg form and treated by QR steps. The eigenvalue of a component of one state is its diagonal entry,
+/// exactly.
 ///
 /// # Errors
-/// An entry that is not finite, or, hardly ever, no convergence.
+/// If an entry is not finite or, very rarely, the QR steps do not converge.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     let mut roots = Vec::with_capacity(a.nrows());
     for part in balanced_blocks(a)? {
@@ -26,15 +27,16 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     Ok(roots)
 }
 
-/// The eigenvalues that rounding cannot tell from numbers on the imaginary axis: a perturbation of the size of the rounding
-/// errors moves them there. Those of a component of one state are exact, and so are those that are 0 as rows depend on one
-/// another: they are never among them.
+/// Returns the eigenvalues that a perturbation of rounding size moves onto the imaginary axis.
 ///
-/// An eigenvalue `z` is among them where the smallest singular value of `A - s` is at most `n eps |A|` all the way from
-/// `s = z` to `s = i Im z`. Source: L. N. Trefethen, M. Embree, Spectra and Pseudospectra (2005), section 2.
+/// Eigenvalues of components of one state are exact, and so are zeros from dependent rows: neither is ever returned. An
+/// eigenvalue `z` is returned if the smallest singular value of `A - s` is at most `n eps |A|` all the way from `s = z`
+/// to `s = i Im z`.
+///
+/// Source: L. N. Trefethen, M. Embree, Spectra and Pseudospectra (2005), section 2.
 ///
 /// # Errors
-/// As [`eigenvalues`].
+/// See [`eigenvalues`].
 pub fn undecided(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     let mut found = Vec::new();
     for part in balanced_blocks(a)?.into_iter().filter(|part| part.matrix.nrows() > 1) {
@@ -48,7 +50,7 @@ pub fn undecided(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     Ok(found)
 }
 
-/// A strong component of a matrix, balanced and divided by `scale`.
+/// Strongly connected component of a matrix, balanced and divided by `scale`.
 struct Block {
     matrix: DMatrix<f64>,
     scale: f64,
@@ -62,7 +64,7 @@ impl Block {
         Ok(roots.into_iter().map(|root| root * self.scale).collect())
     }
 
-    /// Whether a perturbation of the size of the rounding errors makes `z` an eigenvalue of the matrix.
+    /// Returns true if a perturbation of rounding size makes `z` an eigenvalue of the matrix.
     fn is_nearly_eigenvalue(&self, z: Complex) -> bool {
         let n = self.matrix.nrows();
         let mut shifted = self.matrix.map(|x| Complex::new(x, 0.0));
@@ -71,7 +73,7 @@ impl Block {
     }
 }
 
-/// The strong components but for eigenvalues that are 0, which are left out.
+/// Returns the strongly connected components, deflated of zero eigenvalues.
 fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
     if a.iter().any(|x| !x.is_finite()) {
         return Err("a matrix with an entry that is not finite has no eigenvalues".to_owned());
@@ -81,7 +83,7 @@ fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
     while let Some(a) = open.pop() {
         for indices in strong_components(&a.entries) {
             let mut part = a.map(|m| block(m, &indices));
-            // A power of two, so that nothing is rounded; squares of entries then stay within the range of numbers.
+            // A power of two avoids rounding; squares of the scaled entries stay within the number range.
             let scale = math::exp2(math::log2(part.entries.amax()).floor());
             let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
             part = part.map(|m| m / scale);
@@ -99,11 +101,11 @@ fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
     Ok(blocks)
 }
 
-/// Scales rows and columns by powers of two, so that their norms agree: a similarity, without rounding. Returns the factors
-/// of the columns.
+/// Scales rows and columns by powers of two so that their norms agree, and returns the factors of the columns. This is
+/// a similarity without rounding.
 ///
-/// Norms include the diagonal, so that entries which are rounding errors are not blown up. Source: R. James, J. Langou, B.
-/// R. Lowery, On matrix balancing and eigenvector computation, arXiv:1401.5766 (2014).
+/// Norms include the diagonal, so that entries at rounding level are not amplified. Source: R. James, J. Langou, B. R.
+/// Lowery, On matrix balancing and eigenvector computation, arXiv:1401.5766 (2014).
 pub(super) fn balance(a: &mut DMatrix<f64>) -> Vec<f64> {
     let n = a.nrows();
     let mut scales = vec![1.0; n];
@@ -125,7 +127,7 @@ pub(super) fn balance(a: &mut DMatrix<f64>) -> Vec<f64> {
     scales
 }
 
-/// The power of two by which a column is multiplied and its row divided; 1 where little would be won.
+/// Returns the power of two by which a column is multiplied and its row divided; 1 if the gain is small.
 pub(super) fn balancing_factor(row: f64, column: f64) -> f64 {
     if row == 0.0 || column == 0.0 || !(row + column).is_finite() {
         return 1.0;

@@ -1,4 +1,4 @@
-//! Where a system can rest.
+//! Equilibria of a system.
 
 use std::fmt;
 
@@ -8,25 +8,25 @@ use rand::Rng;
 use crate::math;
 use crate::random::stream;
 
-/// What must vanish, with its slopes.
+/// Residual of the equilibrium condition, with its derivatives.
 #[derive(Debug, Clone)]
 pub struct Balance {
-    /// The rates of change of the states.
+    /// Rates of change of the states.
     pub rates: Vec<f64>,
-    /// Their derivative by states, then inputs: as many rows as rates.
+    /// Derivatives of the rates with respect to states, then inputs; one row per rate.
     pub slopes: DMatrix<f64>,
 }
 
-/// Why a search ended without an equilibrium.
+/// Reason why a search found no equilibrium.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoEquilibrium {
-    /// The rates are not defined at the start.
+    /// Rates undefined at the initial guess.
     Undefined(String),
-    /// The search ends where this state changes fastest, at this rate per s.
+    /// Search that ended without an equilibrium, with the state that changes fastest.
     Restless {
         /// Index of the state.
         state: usize,
-        /// Its rate of change, positive.
+        /// Rate of change of the state, per s, positive.
         rate: f64,
     },
 }
@@ -36,34 +36,35 @@ impl fmt::Display for NoEquilibrium {
         match self {
             Self::Undefined(why) => f.write_str(why),
             Self::Restless { state, rate } => {
-                write!(f, "no equilibrium was found: the search ends where state {state} changes by {rate:.3e} per s")
+                write!(f, "no equilibrium found: the search ends where state {state} changes by {rate:.3e} per s")
             }
         }
     }
 }
 
-/// Weighted rates that are rounding, relative to the largest coordinate.
+/// Weighted rates that count as rounding, relative to the largest coordinate.
 const SMALL: f64 = 1e-12;
 
-/// Step that moves a point by rounding only, relative to the largest coordinate.
+/// Step size that counts as rounding, relative to the largest coordinate.
 const SHORT: f64 = 1e-10;
 
-/// Weighted rates up to which a point counts as an equilibrium where no step brings them down any more.
+/// Weighted rates up to which a point counts as an equilibrium if no step reduces them.
 const ROUNDING: f64 = 1e-9;
 
-/// How far from the start further searches begin, as parts of a coordinate, or absolutely where it is 0.
+/// Distances of further initial guesses from the first, relative to a coordinate, or absolute if it is 0.
 const AROUND: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e4];
 
-/// Points looked at until there counts as no equilibrium.
+/// Maximum number of points evaluated before the search fails.
 const MOST: usize = 4_000;
 
-/// A point near `start` at which all rates vanish, where only the `free` ones of states and inputs move.
+/// Returns a point near `start` at which all rates vanish; only the `free` states and inputs vary.
 ///
-/// Newton's method from the start; where it fails, as where a slope is 0 or infinite there, from points around it, farther
-/// and farther away. Of the points at one distance the equilibrium nearest to the start counts.
+/// Newton's method starts from `start`. If it fails, for example at a zero or infinite derivative, it restarts from
+/// points around it at increasing distances. Of the equilibria found from one distance, the one nearest to `start` is
+/// returned.
 ///
 /// # Errors
-/// What the rates refuse at the start; no point found.
+/// If the rates are undefined at `start`, or if no equilibrium is found.
 pub fn equilibrium(
     rates: impl FnMut(&[f64]) -> Result<Balance, String>,
     start: &[f64],
@@ -85,23 +86,23 @@ pub fn equilibrium(
             return Ok(x);
         }
     }
-    // Where nothing moves a rate, it may vanish but for rounding.
+    // If nothing changes a rate, it may be zero up to rounding.
     search.looked = 0;
     search.newton(start, true).map_err(|_| first)
 }
 
-/// The size of a coordinate.
+/// Returns the magnitude of a coordinate.
 fn size(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { x.abs() }
 }
 
 struct Search<'a, R> {
     rates: R,
-    /// Coordinates that are free.
+    /// Indices of the free coordinates.
     moving: Vec<usize>,
-    /// Where it all began.
+    /// Initial guess.
     origin: &'a [f64],
-    /// Points looked at so far.
+    /// Number of points evaluated so far.
     looked: usize,
 }
 
@@ -110,15 +111,16 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         self.looked += 1;
         let here = (self.rates)(x)?;
         let finite = here.rates.iter().chain(here.slopes.iter()).all(|x| x.is_finite());
-        if finite { Ok(here) } else { Err("the rates and their slopes are not finite".to_owned()) }
+        if finite { Ok(here) } else { Err("the rates or their derivatives are not finite".to_owned()) }
     }
 
-    /// The distance of a point from the origin, in sizes of coordinates.
+    /// Returns the distance of a point from the initial guess, relative to the magnitudes of the coordinates.
     fn distance(&self, x: &[f64]) -> f64 {
         x.iter().zip(self.origin).map(|(a, b)| math::powi((a - b) / size(*b), 2)).sum::<f64>().sqrt()
     }
 
-    /// Points at a distance from the origin: every free coordinate up and down, and all of them at once in a few ways.
+    /// Returns points at a distance from the initial guess: each free coordinate up and down, and all together in a few
+    /// directions.
     fn around(&self, distance: f64) -> Vec<Vec<f64>> {
         let mut stream = stream(0, "equilibrium");
         let n = self.moving.len();
@@ -134,8 +136,10 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         directions.iter().flat_map(|direction| [point(direction, 1.0), point(direction, -1.0)]).collect()
     }
 
-    /// Newton's method, with the shortest step where several points are possible, and shorter steps where a whole one does
-    /// not bring the rates down. With `lenient` a rate that nothing moves may be small, else it must be 0.
+    /// Performs Newton's method with the minimum-norm step and backtracking where a full step does not reduce the
+    /// rates.
+    ///
+    /// With `lenient`, a rate that nothing changes may be small; otherwise it must be 0.
     ///
     /// Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition (2006), sections 10.3, 11.2.
     fn newton(&mut self, start: &[f64], lenient: bool) -> Result<Vec<f64>, NoEquilibrium> {
@@ -143,7 +147,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         let from_beside = start != self.origin;
         let mut here = self.look(&x).map_err(NoEquilibrium::Undefined)?;
         let moving = self.moving.clone();
-        // Rates of different units are weighed by what moves them.
+        // Rates in different units are weighted by their largest derivative.
         let reach = |at: &Balance, i: usize| moving.iter().map(|&j| at.slopes[(i, j)].abs()).fold(0.0, f64::max);
         let weights: Vec<f64> = (0..here.rates.len())
             .map(|i| match reach(&here, i) {
@@ -168,7 +172,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
             if far <= SMALL * largest && !stuck && (far == 0.0 || step.amax() <= SHORT * largest) {
                 return Ok(self.without_rounding(x, far, distance));
             }
-            // Beside a place where a slope is 0 whole steps lead far away; they may grow tenfold from one to the next.
+            // Near a zero derivative full steps go far; a step may be ten times the distance covered so far.
             let gone = self.distance(&x);
             let reached: Vec<f64> = moving.iter().zip(step.iter()).map(|(&j, dx)| dx / size(self.origin[j])).collect();
             let length = reached.iter().map(|dx| dx * dx).sum::<f64>().sqrt();
@@ -177,7 +181,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
             loop {
                 let mut next = x.clone();
                 moving.iter().zip(step.iter()).for_each(|(&j, dx)| next[j] += share * dx);
-                // A point at which the rates are not defined is too far.
+                // A point with undefined rates is too far.
                 if let Ok(there) = self.look(&next)
                     && distance(&there) < far * (1.0 - 1e-4 * share)
                 {
@@ -186,7 +190,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
                 }
                 share *= 0.5;
                 if share < least || self.looked > MOST {
-                    // Rounding leaves what cannot be brought down further.
+                    // Rates at rounding level cannot be reduced further.
                     if far <= ROUNDING * largest && !stuck {
                         return Ok(self.without_rounding(x, far, distance));
                     }
@@ -197,7 +201,7 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         Err(no_equilibrium(&here))
     }
 
-    /// The point with coordinates at 0 that are 0 but for rounding, where the rates are no larger there.
+    /// Returns the point with coordinates set to 0 where they are 0 up to rounding and the rates do not increase.
     fn without_rounding(&mut self, mut x: Vec<f64>, mut far: f64, distance: impl Fn(&Balance) -> f64) -> Vec<f64> {
         let largest = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
         for j in self.moving.clone() {
@@ -229,7 +233,7 @@ mod tests {
     use super::*;
     use crate::linear::testing::assert_near;
 
-    /// A pendulum with torque: x = (angle, speed), u = torque; `9.81 sin(angle) + torque = 0` at rest.
+    /// Pendulum with torque: x = (angle, speed), u = torque; `9.81 sin(angle) + torque = 0` at equilibrium.
     fn pendulum(z: &[f64]) -> Result<Balance, String> {
         Ok(Balance {
             rates: vec![z[1], 9.81 * math::sin(z[0]) - 0.1 * z[1] + z[2]],
@@ -245,13 +249,13 @@ mod tests {
     }
 
     #[test]
-    fn with_the_state_held_the_input_that_keeps_it_is_found() {
+    fn with_a_fixed_state_the_input_of_the_equilibrium_is_found() {
         let x = equilibrium(pendulum, &[0.5, 0.0, 0.0], &[false, true, true]).unwrap();
         assert_near(x[2], -9.81 * math::sin(0.5), 1e-12);
         assert_eq!(x[0], 0.5);
     }
 
-    /// One state x and one input u: `x' = f(x, u)` with its slopes.
+    /// Returns one state x and one input u: `x' = f(x, u)` with its derivatives.
     fn scalar(f: impl Fn(f64, f64) -> [f64; 3]) -> impl Fn(&[f64]) -> Result<Balance, String> {
         move |z| {
             let [rate, by_state, by_input] = f(z[0], z[1]);
@@ -268,12 +272,12 @@ mod tests {
             let x = equilibrium(f, &[start, u], &[true, false]).unwrap();
             assert_near(x[0], expected, 1e-8 * (1.0 + expected.abs()));
         };
-        // u - 2 x^3, from the flat place; of tiny and of large inputs.
+        // u - 2 x^3 from x = 0, where it is flat; tiny and large inputs.
         let cubic = scalar(|x, u| [u - 2.0 * math::powi(x, 3), -6.0 * x * x, 1.0]);
         for u in [54.0, -54.0, 1e-6, 2e-15, 2e9] {
             near(&cubic, u, 0.0, math::cbrt(0.5 * u));
         }
-        // A tank, u - 3 sqrt(x): the slope at 0 counts as 0, or is infinite.
+        // A tank, u - 3 sqrt(x): the derivative at 0 is given as 0 or infinite.
         for slope in [0.0, f64::NEG_INFINITY] {
             let tank = scalar(move |x, u| [u - 3.0 * x.sqrt(), if x == 0.0 { slope } else { -1.5 / x.sqrt() }, 1.0]);
             for u in [0.9, 3.0, 60.0, 1e-4] {
@@ -281,14 +285,14 @@ mod tests {
             }
             near(&tank, 0.9, -1e-3, 0.09);
         }
-        // Flat on both sides of a dead zone, a saturation whose slope is 0 at the start, a cosine at its top.
+        // A dead zone with flat sides, a saturation with zero derivative at the initial guess, a cosine at its maximum.
         let dead = scalar(|x, u| [u - (x - 1.0).max(0.0), if x > 1.0 { -1.0 } else { 0.0 }, 1.0]);
         near(&dead, 0.25, 0.0, 1.25);
         let saturated = scalar(|x, u| [u - x.clamp(-1.0, 1.0), if x.abs() < 1.0 { -1.0 } else { 0.0 }, 1.0]);
         near(&saturated, 0.5, 3.0, 0.5);
         let top = scalar(|x, u| [u + math::cos(x), -math::sin(x), 1.0]);
         near(&top, 0.5, 0.0, 2.0 * PI / 3.0);
-        // ln x, not defined at the start.
+        // ln x, undefined at the initial guess.
         near(&scalar(|x, u| [u + math::ln(x), 1.0 / x, 1.0]), 2.0, 0.0, math::exp(-2.0));
     }
 
@@ -302,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn without_an_equilibrium_the_search_says_so() {
+    fn without_an_equilibrium_the_search_reports_the_fastest_state() {
         let error = equilibrium(pendulum, &[0.5, 0.0, 20.0], &[true, true, false]).unwrap_err();
         assert!(matches!(error, NoEquilibrium::Restless { state: 1, rate } if rate > 10.0), "{error}");
     }

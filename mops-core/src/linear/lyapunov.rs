@@ -1,4 +1,4 @@
-//! The Lyapunov equation, and the H2 norm that follows from it.
+//! Lyapunov equation and H2 norm.
 
 use nalgebra::DMatrix;
 
@@ -6,17 +6,17 @@ use super::norms::check_stable;
 use super::{Complex, Schur, StateSpace};
 use crate::math::complex;
 
-/// The symmetric solution `X` of `A X + X A^T + Q = 0` for a symmetric `Q`.
+/// Returns the symmetric solution `X` of `A X + X A^T + Q = 0` for a symmetric `Q`.
 ///
-/// By the Schur form of `A`, column by column. Source: R. H. Bartels, G. W. Stewart, Solution of the matrix equation AX +
-/// XB = C, Communications of the ACM 15 (1972) 820-826.
+/// Uses the Schur form of `A`, column by column. Source: R. H. Bartels, G. W. Stewart, Solution of the matrix equation
+/// AX + XB = C, Communications of the ACM 15 (1972) 820-826.
 ///
 /// # Errors
-/// Two eigenvalues of `A` that sum to zero, so that there is no unique solution; an entry that is not finite.
+/// If two eigenvalues of `A` sum to zero, so that no unique solution exists, or if an entry is not finite.
 pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
     let n = a.nrows();
     let Schur { q: u, t } = Schur::of(a)?;
-    // T Y + Y T^H + F = 0, from the last column to the first.
+    // T Y + Y T^H + F = 0, solved from the last column to the first.
     let f = u.adjoint() * q.map(|x| Complex::new(x, 0.0)) * &u;
     let mut y = DMatrix::<Complex>::zeros(n, n);
     for j in (0..n).rev() {
@@ -37,21 +37,23 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Stri
     Ok((&x + x.transpose()) * 0.5)
 }
 
-/// Relative difference of the two ways to the H2 norm from which on neither can be trusted.
+/// Relative difference of the two Gramian results from which on the H2 norm is rejected.
 const DIFFERENT: f64 = 1e-6;
 
-/// The H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`: the root mean square of the outputs for white noise of unit
-/// intensity at the inputs. The delay does not matter.
+/// Returns the H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`.
 ///
-/// From the controllability Gramian, and once more from the observability Gramian. Source: K. Zhou, J. C. Doyle, Essentials
-/// of Robust Control (1998), section 4.3.
+/// The H2 norm is the root mean square of the outputs for white noise of unit intensity at the inputs. The delay has no
+/// influence. Both the controllability and the observability Gramian are used, as a check.
+///
+/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 ///
 /// # Errors
-/// A system that is not stable, or passes its input on directly: the norm is infinite. Gramians that do not agree.
+/// If the system is not stable or has direct feedthrough: the norm is infinite. If the results from the two Gramians
+/// differ.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
     check_stable(system, "H2 norm")?;
     if system.d.iter().any(|&d| d != 0.0) {
-        return Err("the system passes its input on directly (D is not 0): its H2 norm is infinite".to_owned());
+        return Err("the system has direct feedthrough (D is not 0): its H2 norm is infinite".to_owned());
     }
     let StateSpace { a, b, c, .. } = system.balanced();
     let controllability = lyapunov(&a, &(&b * b.transpose()))?;
@@ -60,7 +62,9 @@ pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
     let first = norm((&c * controllability * c.transpose()).trace());
     let second = norm((b.transpose() * observability * &b).trace());
     if (first - second).abs() > DIFFERENT * first.max(second) {
-        return Err(format!("the H2 norm is too inaccurate: the two Gramians give {first:.6e} and {second:.6e}"));
+        return Err(format!(
+            "the H2 norm is inaccurate: the controllability Gramian gives {first:.6e}, the observability Gramian {second:.6e}"
+        ));
     }
     Ok(first)
 }
@@ -91,19 +95,19 @@ mod tests {
         assert_near(norm(&[3.0], &[1.0, 2.0]).unwrap(), 1.5, 1e-14);
         assert_near(norm(&[25.0], &[1.0, 2.0 * 0.1 * 5.0, 25.0]).unwrap(), (5.0f64 / 0.4).sqrt(), 1e-13);
         assert!(norm(&[1.0], &[1.0, -2.0]).unwrap_err().contains("not stable"));
-        assert!(norm(&[1.0, 1.0], &[1.0, 2.0]).unwrap_err().contains("directly"));
+        assert!(norm(&[1.0, 1.0], &[1.0, 2.0]).unwrap_err().contains("feedthrough"));
     }
 
     #[test]
     fn units_of_the_states_change_no_norm_and_a_pole_that_rounding_decides_on_has_none() {
-        // w^2/(s^2 + 2 z w s + w^2) with the states in units a billion apart.
+        // w^2/(s^2 + 2 z w s + w^2), with states whose units differ by a factor of 1e9.
         let (z, w) = (0.1, 5.0f64);
         let a = DMatrix::from_row_slice(2, 2, &[0.0, 1e9, -w * w * 1e-9, -2.0 * z * w]);
         let (b, c) =
             (DMatrix::from_column_slice(2, 1, &[0.0, w * w * 1e-9]), DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
         let system = StateSpace::new(a, b, c, DMatrix::zeros(1, 1));
         assert_near(h2_norm(&system).unwrap(), (w / (4.0 * z)).sqrt(), 1e-12);
-        // Two masses that drift, in coordinates that hide it: the double pole at 0 is computed as a small one.
+        // Two free masses in coordinates that hide the drift: the double pole at 0 is computed as a small nonzero one.
         let hidden = DMatrix::from_row_slice(2, 2, &[0.3, -0.1, 0.9, -0.3 - 1e-16]);
         let drifting = StateSpace { a: hidden, ..system };
         assert!(h2_norm(&drifting).is_err());

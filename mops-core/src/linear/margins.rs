@@ -1,4 +1,5 @@
-//! Margins of a feedback loop: how far its loop transfer function stays from -1, or what would bring it back to stability.
+//! Stability margins of a feedback loop: distance of the loop transfer function from -1, or the change that restores
+//! stability.
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
@@ -8,41 +9,43 @@ use super::search::passes;
 use super::{Complex, StateSpace};
 use crate::math::{self, complex};
 
-/// Gain of a loop from which on nothing is looked for: 200 dB.
+/// Loop gain above which crossings are ignored: 200 dB.
 pub(super) const STRONG: f64 = 1e10;
 
-/// Where the response of a loop passes something.
+/// Crossing of a level or of the negative real axis by the response of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Angular frequency, rad/s; 0 and infinity are crossings too where the response ends on the negative real axis.
+    /// Angular frequency, rad/s. 0 and infinity also count as crossings if the response ends on the negative real axis.
     pub frequency: f64,
-    /// The loop transfer function there.
+    /// Loop transfer function at the crossing.
     pub response: Complex,
-    /// Whether what is passed is passed upwards, by a gain or a phase that rises with frequency.
+    /// True if the gain or phase rises with frequency at the crossing.
     pub rises: bool,
 }
 
-/// A loop transfer function L with unity negative feedback around it, its delay included.
+/// Loop transfer function L, including its delay, with unity negative feedback.
 ///
-/// Crossings are found by bounds of L over ranges of frequencies, from 0 to where L is faint, and made exact by bisection.
-/// The number of unstable closed-loop poles is exact with a delay too: they cross the imaginary axis only where `|L| = 1`,
-/// whatever the delay. Source: K. Walton, J. E. Marshall, Direct method for TDS stability analysis, IEE Proceedings D 134
-/// (1987) 101-107.
+/// Crossings are located by bounds of L over ranges of frequencies, from 0 to where L is negligible, and refined by
+/// bisection. The number of unstable closed-loop poles is exact with a delay too: poles cross the imaginary axis only
+/// where `|L| = 1`, for any delay.
+///
+/// Source: K. Walton, J. E. Marshall, Direct method for TDS stability analysis, IEE Proceedings D 134 (1987) 101-107.
 #[derive(Debug, Clone)]
 pub struct Loop {
     pub(super) system: StateSpace,
     pub(super) response: BoundedResponse,
-    /// Where `|L| = 1`, by rising frequency.
+    /// Crossings of `|L| = 1`, by ascending frequency.
     pub gain_crossovers: Vec<Crossing>,
-    /// Number of closed-loop poles with a real part of 0 or more; none where it is infinite.
+    /// Number of closed-loop poles with a real part of 0 or more; `None` if infinite.
     pub unstable: Option<usize>,
 }
 
 impl Loop {
-    /// The loop with this transfer function.
+    /// Creates the loop with this transfer function.
     ///
     /// # Errors
-    /// Several inputs or outputs; an entry that is not finite; a loop without a solution.
+    /// If there are several inputs or outputs, an entry is not finite, the delay is negative, or the loop is not
+    /// well-posed.
     pub fn new(system: StateSpace) -> Result<Self, String> {
         if system.inputs.len() != 1 || system.outputs.len() != 1 {
             return Err("a loop transfer function has one input and one output".to_owned());
@@ -57,17 +60,17 @@ impl Loop {
         Ok(found)
     }
 
-    /// Whether the closed loop is stable.
+    /// Returns true if the closed loop is stable.
     pub fn is_stable(&self) -> bool {
         self.unstable == Some(0)
     }
 
-    /// The loop transfer function at an angular frequency, rad/s.
+    /// Returns the loop transfer function at an angular frequency, rad/s.
     pub fn at(&self, frequency: f64) -> Complex {
         self.response.at(frequency)
     }
 
-    /// Where `|L|` is `level`, by rising frequency.
+    /// Returns the crossings of `|L| = level`, by ascending frequency.
     pub(super) fn level(&self, level: f64) -> Result<Vec<Crossing>, String> {
         let level = math::ln(level);
         let mut found = Vec::new();
@@ -84,7 +87,7 @@ impl Loop {
         Ok(found)
     }
 
-    /// Calls `found` where L is real and negative, by rising frequency, in those ranges that `window` lets through.
+    /// Calls `found` where L is real and negative, by ascending frequency, within the ranges that `window` accepts.
     pub(super) fn phase_crossovers_in(
         &self,
         window: impl Fn(&Span) -> bool,
@@ -104,7 +107,7 @@ impl Loop {
                 true
             },
         )?;
-        // With a delay the response turns around a circle at infinite frequency, and meets the axis on both sides.
+        // At infinite frequency a response with delay turns on a circle, and crosses the axis on both sides.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
         if end < 0.0 {
@@ -113,8 +116,10 @@ impl Loop {
         Ok(())
     }
 
-    /// The number of closed-loop poles with a real part of 0 or more where L is multiplied by `gain`, whose gain
-    /// crossovers are `crossovers`; none where it is infinite.
+    /// Returns the number of closed-loop poles with a real part of 0 or more when L is multiplied by `gain`; `None` if
+    /// infinite.
+    ///
+    /// `crossovers` are the gain crossovers for that gain.
     pub(super) fn unstable_with(&self, gain: f64, crossovers: &[Crossing]) -> Result<Option<usize>, String> {
         let StateSpace { c, d, delay, .. } = &self.system;
         let without = StateSpace { c: c * gain, d: d * gain, delay: 0.0, ..self.system.clone() };
@@ -127,8 +132,8 @@ impl Loop {
         }
         let mut unstable = unstable as f64;
         for crossing in crossovers {
-            // As the delay grows from 0, a pair of poles crosses here whenever it has turned L to -1: into the right half
-            // plane where |L| falls with frequency, out of it where it rises.
+            // As the delay grows from 0, a pair of poles crosses the axis whenever L reaches -1. It enters the right
+            // half-plane where |L| falls with frequency, and leaves it where |L| rises.
             let turned = crossing.frequency * delay;
             let first = angle_to_minus_one(crossing.response * complex::from_polar(1.0, turned));
             let turns = ((turned - first) / TAU).floor() + 1.0;
@@ -137,33 +142,36 @@ impl Loop {
         Ok(Some(unstable.max(0.0) as usize))
     }
 
-    /// The phase margin: the smallest turn of L, either way, with which a point of it meets -1, rad; infinite where `|L|`
-    /// never is 1. Where the closed loop is unstable: minus the smallest turn, either way, that makes it stable.
+    /// Returns the phase margin, rad: the smallest phase shift of either sign at which L meets -1.
+    ///
+    /// The margin is infinite if `|L|` is never 1. For an unstable closed loop: minus the smallest phase shift of
+    /// either sign that makes it stable.
     ///
     /// # Errors
-    /// An unstable loop that no turn makes stable.
+    /// If the loop is unstable and no phase shift stabilises it.
     pub fn phase_margin(&self) -> Result<f64, String> {
         if self.is_stable() {
             let turns = self.gain_crossovers.iter().map(|c| complex::arg(-c.response).abs());
             return Ok(turns.fold(f64::INFINITY, f64::min));
         }
         let turn = self.stabilising_turn(|_| 1.0);
-        turn.map(|turn| -turn)
-            .ok_or_else(|| "the closed loop is unstable, and no turn of the phase makes it stable".into())
+        turn.map(|turn| -turn).ok_or_else(|| "the closed loop is unstable, and no phase shift stabilises it".into())
     }
 
-    /// The gain margin: the smallest factor above 1 by which L may be multiplied until it meets -1, in dB; infinite where
-    /// none does. With `both` the smallest change either way, for loops that become unstable with less gain. Where the
-    /// closed loop is unstable: minus the smallest change of the gain, either way, that makes it stable.
+    /// Returns the gain margin, dB: the smallest factor above 1 by which L must be multiplied to meet -1.
+    ///
+    /// The margin is infinite if no factor does. With `both`, the smallest change of either sign, for loops that lose
+    /// stability with less gain. For an unstable closed loop: minus the smallest gain change of either sign that makes
+    /// it stable.
     ///
     /// # Errors
-    /// An unstable loop that no gain makes stable.
+    /// If the loop is unstable and no gain stabilises it.
     pub fn gain_margin(&self, both: bool) -> Result<f64, String> {
         let decibel = |factor: f64| 20.0 * math::log10(factor).abs();
         if !self.is_stable() {
             return self.stabilising_gain().map(|factor| -decibel(factor));
         }
-        // The largest response below 1, and the smallest above.
+        // Largest response magnitude below 1, and smallest above.
         let (below, above) = (Cell::new(0.0f64), Cell::new(f64::INFINITY));
         let window = |span: &Span| {
             let [low, high] = span.gain().map(math::exp);
@@ -177,23 +185,24 @@ impl Loop {
         Ok(if both { up.min(decibel(1.0 / above.get())) } else { up })
     }
 
-    /// The delay margin: the smallest further delay that makes the closed loop unstable, s; infinite where none does.
-    /// Where it is unstable: minus the smallest change of the delay, less or more, that makes it stable. The loop may have
-    /// less delay than would have to go.
+    /// Returns the delay margin, s: the smallest additional delay that makes the closed loop unstable, or infinity.
+    ///
+    /// For an unstable loop: minus the smallest change of the delay, of either sign, that makes it stable. A reduction
+    /// may exceed the delay of the loop.
     ///
     /// # Errors
-    /// An unstable loop that no delay makes stable.
+    /// If the loop is unstable and no delay stabilises it.
     pub fn delay_margin(&self) -> Result<f64, String> {
         if self.is_stable() {
             let delays = self.gain_crossovers.iter().map(|c| angle_to_minus_one(c.response) / c.frequency);
             return Ok(delays.fold(f64::INFINITY, f64::min));
         }
         let delay = self.stabilising_turn(|crossing| crossing.frequency);
-        delay.map(|delay| -delay).ok_or_else(|| "the closed loop is unstable, and no delay makes it stable".into())
+        delay.map(|delay| -delay).ok_or_else(|| "the closed loop is unstable, and no delay stabilises it".into())
     }
 }
 
-/// The lag, from 0 to 2 pi, that turns a response to the negative real axis.
+/// Returns the lag, from 0 to 2 pi, that turns a response to the negative real axis.
 pub(super) fn angle_to_minus_one(response: Complex) -> f64 {
     (complex::arg(response) + PI).rem_euclid(TAU)
 }

@@ -1,6 +1,7 @@
 //! Linear time-invariant systems: poles, zeros, frequency responses, norms, margins, and the design of state feedback.
 //!
-//! Pure computation on small dense matrices. What a user can ask for and has no answer is an error of one sentence.
+//! All functions are pure computations on small dense matrices. A request without an answer returns an error of one
+//! sentence.
 
 mod bounded_response;
 mod components;
@@ -44,23 +45,23 @@ pub use schur::Schur;
 pub use transfer::TransferFunction;
 pub use zeros::zeros;
 
-/// A complex number.
+/// Complex number.
 pub type Complex = nalgebra::Complex<f64>;
 
-/// A linear time-invariant system with named states, inputs and outputs:
+/// Linear time-invariant system with named states, inputs and outputs:
 ///
 /// ```text
 /// dx/dt = A x + B u(t - delay),   y = C x + D u(t - delay)
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
-    /// `A`, states x states.
+    /// Matrix `A`, states x states.
     pub a: DMatrix<f64>,
-    /// `B`, states x inputs.
+    /// Matrix `B`, states x inputs.
     pub b: DMatrix<f64>,
-    /// `C`, outputs x states.
+    /// Matrix `C`, outputs x states.
     pub c: DMatrix<f64>,
-    /// `D`, outputs x inputs.
+    /// Matrix `D`, outputs x inputs.
     pub d: DMatrix<f64>,
     /// Names of the states.
     pub states: Vec<String>,
@@ -73,7 +74,7 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
-    /// Every matrix, and the delay, moved by `distance` along a tangent of the same shape.
+    /// Returns the system with every matrix and the delay moved by `distance` along a tangent with the same dimensions.
     #[must_use]
     pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The largest gain of a linear system over all frequencies.
+//! Peak gain and Hinf norm of a linear system.
 
 use nalgebra::DMatrix;
 
@@ -8,22 +8,22 @@ use super::system::{above, beside};
 use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, undecided, zeros};
 use crate::math::complex;
 
-/// A largest gain.
+/// Peak gain over frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// The largest singular value of the response.
+    /// Largest singular value of the response.
     pub gain: f64,
-    /// Where it is reached, rad/s; infinite where the gain is that of `D`.
+    /// Frequency of the peak, rad/s; infinite if the peak is the gain of `D`.
     pub frequency: f64,
 }
 
-/// Part of a gain by which a higher one must exceed it to count.
+/// Relative increase from which on a higher gain counts.
 const HIGHER: f64 = 1e-10;
 
-/// The Hinf norm: [`peak_gain`] of a stable system.
+/// Returns the Hinf norm: [`peak_gain`] of a stable system.
 ///
 /// # Errors
-/// A system that is not stable: the norm is infinite.
+/// If the system is not stable: the norm is infinite.
 pub fn hinf_norm(system: &StateSpace) -> Result<Peak, String> {
     check_stable(system, "Hinf norm")?;
     peak_gain(system)
@@ -32,30 +32,32 @@ pub fn hinf_norm(system: &StateSpace) -> Result<Peak, String> {
 /// Checks that a system is stable beyond rounding errors.
 ///
 /// # Errors
-/// A system that is not, in one sentence on the norm.
+/// If not, with the name of the `norm`.
 pub(super) fn check_stable(system: &StateSpace, norm: &str) -> Result<(), String> {
     if !system.is_stable()? {
         return Err(format!("the system is not stable: its {norm} is infinite"));
     }
     match undecided(&system.a)?.first() {
         Some(pole) => Err(format!(
-            "rounding decides whether the system is stable: the pole at {:.3e} {:+.3e}i cannot be told from the imaginary axis",
+            "stability is undecided: within rounding errors the pole at {:.3e} {:+.3e}i lies on the imaginary axis",
             pole.re, pole.im
         )),
         None => Ok(()),
     }
 }
 
-/// The largest singular value of the frequency response over all frequencies, and where it is. The delay does not matter.
+/// Returns the largest singular value of the frequency response over all frequencies, and its frequency. The delay has
+/// no influence.
 ///
-/// With one input and one output it is found between a gain that is reached and bounds over all frequencies, which close in
-/// on each other. With several, the Hamiltonian matrix of a gain has eigenvalues on the imaginary axis exactly where the
-/// response passes that gain; between two of them the response is evaluated for the next, higher gain. Source: N. A.
-/// Bruinsma, M. Steinbuch, A fast algorithm to compute the Hinf norm of a transfer function matrix, Systems and Control
-/// Letters 14 (1990) 287-293.
+/// With one input and one output, an attained gain and bounds over all frequencies close in on the peak. With several,
+/// the Hamiltonian matrix of a gain has eigenvalues on the imaginary axis exactly where the response crosses that gain.
+/// The response is evaluated between two such frequencies to get the next, higher gain.
+///
+/// Source: N. A. Bruinsma, M. Steinbuch, A fast algorithm to compute the Hinf norm of a transfer function matrix,
+/// Systems and Control Letters 14 (1990) 287-293.
 ///
 /// # Errors
-/// A pole on the imaginary axis, where the gain is infinite; an entry that is not finite.
+/// If a pole lies on the imaginary axis, where the gain is infinite, or if an entry is not finite.
 pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
     let poles = system.poles()?;
     if poles.iter().any(|p| p.re == 0.0) || !undecided(&system.a)?.is_empty() {
@@ -99,7 +101,7 @@ fn better(best: Peak, response: &FrequencyResponse, frequency: f64) -> Peak {
     if gain > best.gain { Peak { gain, frequency } } else { best }
 }
 
-/// Climbs from a point near the top to the top, by golden section in a range of one part in a thousand.
+/// Refines a peak by golden-section search over +-0.1 % of its frequency.
 fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
     if !peak.frequency.is_finite() || peak.frequency == 0.0 {
         return peak;
@@ -109,7 +111,7 @@ fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
     better(peak, response, frequency)
 }
 
-/// The largest singular value.
+/// Returns the largest singular value.
 fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
     if m.len() == 1 {
         return complex::norm(m[(0, 0)]);
@@ -120,15 +122,17 @@ fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
     m.clone().singular_values().iter().copied().fold(0.0, f64::max)
 }
 
-/// Frequencies at which a singular value of the response may be `level`: those of eigenvalues near the imaginary axis, not
-/// yet made exact. Rounding moves a double eigenvalue by the root of the machine precision, hence the wide strip.
+/// Returns candidate frequencies, not refined, at which a singular value of the response may equal `level`.
+///
+/// They belong to eigenvalues near the imaginary axis. Rounding moves a double eigenvalue by the square root of the
+/// machine precision, hence the wide strip.
 fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     let (n, m) = (a.nrows(), b.ncols());
     let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * complex::norm(*z);
     let rest = DMatrix::identity(m, m) * (level * level) - d.transpose() * d;
     let Some(r) = rest.clone().try_inverse() else {
-        // A level that the gain tends to for high frequencies: the zeros of `G(-s)' G(s) - level^2`.
+        // The level is the high-frequency gain: use the zeros of `G(-s)' G(s) - level^2`.
         let mut product = DMatrix::zeros(2 * n, 2 * n);
         product.view_mut((0, 0), (n, n)).copy_from(a);
         product.view_mut((n, 0), (n, n)).copy_from(&(-(c.transpose() * c)));
@@ -144,7 +148,7 @@ fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String
     let closed = a + b * &r * d.transpose() * c;
     let lower = c.transpose() * (DMatrix::identity(c.nrows(), c.nrows()) + d * &r * d.transpose()) * c;
     let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
-    // The level is split between both off-diagonal blocks, so that they are of one size.
+    // The level is split between both off-diagonal blocks, so that their norms are similar.
     hamiltonian.view_mut((0, 0), (n, n)).copy_from(&closed);
     hamiltonian.view_mut((0, n), (n, n)).copy_from(&(b * r * b.transpose() * level));
     hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-lower / level));
@@ -194,7 +198,7 @@ mod tests {
 
     #[test]
     fn of_two_resonances_the_narrow_higher_one_is_found() {
-        // 1/(s^2 + 0.2 s + 1) and a needle of gain 100 at 37 rad/s.
+        // 1/(s^2 + 0.2 s + 1) and a narrow resonance of gain 100 at 37 rad/s.
         let broad = TransferFunction::new(vec![1.0], vec![1.0, 0.2, 1.0]).state_space().unwrap();
         let needle = TransferFunction::new(vec![1e-3 * 37.0 * 37.0], vec![1.0, 2e-5 * 37.0 * 0.5, 37.0 * 37.0]);
         let both = broad.parallel(&needle.state_space().unwrap()).unwrap();
@@ -210,7 +214,7 @@ mod tests {
         fn with_one_input_and_output_the_peak_is_that_of_the_other_method(
             n in 1usize..7, seed in 0u64..1_000_000_000, damping in -4.0f64..0.0, direct in proptest::bool::ANY,
         ) {
-            // Poles as near to the axis as 1e-4; twice the same output makes a system of two outputs.
+            // Poles within up to 1e-4 of the axis; duplicating the output gives a system with two outputs.
             let a = random(n, n, seed);
             let right = eigenvalues(&a).unwrap().iter().map(|z| z.re).fold(f64::NEG_INFINITY, f64::max);
             let a = &a - DMatrix::identity(n, n) * (right + math::powf(10.0, damping));

@@ -1,4 +1,4 @@
-//! Peaks of the sensitivities of a feedback loop, and bandwidths.
+//! Sensitivity peaks of a feedback loop, and bandwidths.
 
 use super::bounded_response::{BoundedResponse, Closed, Span};
 use super::search::{highest, passes};
@@ -6,18 +6,18 @@ use super::{Complex, Loop, StateSpace};
 use crate::math::{self, complex};
 
 impl Loop {
-    /// The largest sensitivity, `Ms = max |1/(1 + L)|`, over all frequencies from 0 to infinity.
+    /// Returns the maximum sensitivity, `Ms = max |1/(1 + L)|`, over all frequencies from 0 to infinity.
     ///
     /// # Errors
-    /// A closed loop that is not stable.
+    /// If the closed loop is not stable.
     pub fn peak_sensitivity(&self) -> Result<f64, String> {
         self.peak(Closed::Sensitivity)
     }
 
-    /// The largest complementary sensitivity, `Mt = max |L/(1 + L)|`, over all frequencies from 0 to infinity.
+    /// Returns the maximum complementary sensitivity, `Mt = max |L/(1 + L)|`, over all frequencies from 0 to infinity.
     ///
     /// # Errors
-    /// A closed loop that is not stable.
+    /// If the closed loop is not stable.
     pub fn peak_complementary(&self) -> Result<f64, String> {
         self.peak(Closed::Complementary)
     }
@@ -26,18 +26,18 @@ impl Loop {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
         }
-        // At infinite frequency L is D, and turns around a circle with a delay.
+        // At infinite frequency L equals D; with a delay it turns on a circle.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
         let (peak, _) = highest(&self.response, |l| what.gain(l), |span| span.closed(what))?;
         Ok(peak.max(what.gain(Complex::new(end, 0.0))))
     }
 
-    /// The lowest angular frequency, rad/s, at which the gain of the closed loop `T = L/(1 + L)` is 3 dB (a factor of
-    /// `sqrt 2`) below that at frequency 0.
+    /// Returns the closed-loop bandwidth, rad/s: the lowest angular frequency at which `|T|` is 3 dB (a factor of
+    /// `sqrt 2`) below its value at 0, with `T = L/(1 + L)`.
     ///
     /// # Errors
-    /// A closed loop that is not stable; a gain that starts at 0, or never falls so far.
+    /// If the closed loop is not stable, or if the gain is 0 at frequency 0 or never falls by 3 dB.
     pub fn closed_loop_bandwidth(&self) -> Result<f64, String> {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
@@ -48,11 +48,11 @@ impl Loop {
     }
 }
 
-/// The bandwidth: the lowest angular frequency, rad/s, at which the gain of a system with one input and one output is 3 dB
-/// (a factor of `sqrt 2`) below that at frequency 0.
+/// Returns the bandwidth, rad/s, of a system with one input and one output. The bandwidth is the lowest angular
+/// frequency at which the gain is 3 dB (a factor of `sqrt 2`) below its value at frequency 0.
 ///
 /// # Errors
-/// A gain at frequency 0 that is 0 or infinite, or that is never so far below.
+/// If the gain at frequency 0 is 0 or infinite, or never falls by 3 dB.
 pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
     // A delay changes no gain.
     let response = BoundedResponse::new(&StateSpace { delay: 0.0, ..system.clone() })?;
@@ -60,19 +60,19 @@ pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
     first_below(&response, level, |l| math::ln(complex::norm(l)), Span::gain)
 }
 
-/// The logarithm of a gain that is 3 dB below that at frequency 0.
+/// Returns the logarithm of the gain 3 dB below that at frequency 0.
 fn three_decibels_below(start: f64) -> Result<f64, String> {
     if start > 0.0 && start.is_finite() {
         Ok(math::ln(start) - 0.5 * std::f64::consts::LN_2)
     } else if !start.is_finite() {
-        let way_out = "a system with an integrator has no bandwidth, but its closed loop has: of = \"closed-loop\"";
+        let way_out = "an integrator has no bandwidth; use `of = \"closed-loop\"`";
         Err(format!("the gain at frequency 0 is infinite: {way_out}"))
     } else {
-        Err(format!("the gain at frequency 0 is {start}: there is no bandwidth"))
+        Err(format!("the gain at frequency 0 is {start}, so that the bandwidth is undefined"))
     }
 }
 
-/// The lowest frequency at which a value falls below a level.
+/// Returns the lowest frequency at which a value falls below a level.
 fn first_below(
     of: &BoundedResponse,
     level: f64,
@@ -89,5 +89,6 @@ fn first_below(
             rises
         },
     )?;
-    first.ok_or_else(|| "the gain is never 3 dB below that at frequency 0: the bandwidth is infinite".to_owned())
+    first
+        .ok_or_else(|| "the gain never falls 3 dB below its value at frequency 0: the bandwidth is infinite".to_owned())
 }

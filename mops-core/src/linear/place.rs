@@ -1,4 +1,4 @@
-//! State feedback that gives the closed loop chosen poles.
+//! Pole placement by state feedback.
 
 mod deflation;
 mod robust;
@@ -11,51 +11,53 @@ use super::{Complex, eigenvalues};
 use crate::math::complex;
 use crate::random::stream;
 
-/// Largest distance of a closed-loop pole from the one asked for, relative to it, with which a feedback is returned. A pole
-/// of multiplicity ten in one Jordan block is found a twentieth off, by the tenth root of the rounding error.
+/// Largest relative distance of a closed-loop pole from its specified value with which a feedback is returned.
+///
+/// A pole of multiplicity ten in one Jordan block is found with an error of 1/20, the tenth root of the rounding error.
 const FARTHEST: f64 = 0.1;
 
-/// Size, relative to the largest pole, below which a pole counts as 0 where distances are compared.
+/// Magnitude, relative to the largest pole, below which a pole counts as 0 when distances are compared.
 const SMALL: f64 = 1e-8;
 
-/// Share of the movement of the poles with one feedback from which on another one is better for certain.
+/// Ratio of pole movements below which a later candidate is clearly better than the first one.
 const FAR_LESS: f64 = 0.1;
 
 /// Relative change of the entries of A and B for [`Placement::sensitivity`].
 const CHANGE: f64 = 1e-6;
 
-/// A state feedback, and how well it places the poles.
+/// State feedback and the accuracy of its poles.
 #[derive(Debug, Clone)]
 pub struct Placement {
-    /// The feedback `u = -K x`, inputs x states.
+    /// Gain `K` of the feedback `u = -K x`, inputs x states.
     pub k: DMatrix<f64>,
-    /// The eigenvalues of `A - B K` as computed, 1/s.
+    /// Computed eigenvalues of `A - B K`, 1/s.
     pub poles: Vec<Complex>,
-    /// The largest distance of one of them from the pole asked for, 1/s; also where entries of A and B are rounded otherwise.
+    /// Largest distance of a pole from its specified value, 1/s, including under perturbations of A and B of rounding
+    /// size.
     pub error: f64,
-    /// How far a pole moves where the entries of A and B change by one part in a million, 1/s.
+    /// Largest distance of a pole from its specified value when the entries of A and B change by 1e-6 (relative), 1/s.
     pub sensitivity: f64,
-    /// The controllability indices, where they allow the repeated poles in Jordan blocks only, which are sensitive.
+    /// Controllability indices, if they allow the repeated poles in (sensitive) Jordan blocks only; `None` otherwise.
     pub defective: Option<Vec<usize>>,
 }
 
-/// The feedback `u = -K x` with which the eigenvalues of `A - B K` are `poles`, 1/s.
+/// Returns the feedback `u = -K x` for which the eigenvalues of `A - B K` are `poles`, 1/s.
 ///
-/// With one input `K` is unique. With several inputs the freedom that is left goes into eigenvectors as independent as
-/// possible, where the controllability indices allow independent ones. Else, or where the poles then move far less with the
-/// model, poles are placed one after the other. The eigenvalues of `A - B K` are compared with `poles`
-/// before anything is returned.
+/// With one input `K` is unique. With several inputs the remaining freedom makes the eigenvectors as independent as
+/// possible, if the controllability indices allow independent ones. Otherwise, or if the poles are then far less
+/// sensitive to the model, poles are placed one after the other. The eigenvalues of `A - B K` are compared with `poles`
+/// before a feedback is returned.
 ///
-/// Source: the ways are those of `robust` and `deflation`; which poles allow independent eigenvectors: H. H. Rosenbrock,
-/// State-space and Multivariable Theory (1970), chapter 5, theorem 4.2.
+/// Source: see `robust` and `deflation` for the methods; for which poles allow independent eigenvectors: H. H.
+/// Rosenbrock, State-space and Multivariable Theory (1970), chapter 5, theorem 4.2.
 ///
 /// # Errors
-/// A number of poles other than that of the states; complex poles without their conjugates; modes that no input moves;
-/// poles that rounding alone moves by a tenth, or to the right of the imaginary axis.
+/// If the number of poles is not that of the states, a complex pole lacks its conjugate, or a mode is uncontrollable.
+/// If rounding alone moves a pole by 10 %, or to the right of the imaginary axis.
 pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<Placement, String> {
     let n = a.nrows();
     if poles.len() != n {
-        return Err(format!("{} poles are asked for, but the system has {n} states", poles.len()));
+        return Err(format!("{} poles given, but the system has {n} states", poles.len()));
     }
     let finite = |matrix: &DMatrix<f64>| matrix.iter().all(|x| x.is_finite());
     if !finite(a) || !finite(b) || !poles.iter().all(|p| p.re.is_finite() && p.im.is_finite()) {
@@ -74,21 +76,23 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<Pl
     let relative = |p: Complex| 1.0 / size(p, &poles);
     let candidates = feedbacks(a, b, &scaled, &poles, independent).into_iter().filter_map(|k| {
         let found = eigenvalues(&(a - b * &k)).ok()?;
-        // The computed poles may be right by chance: others of the same matrices, but for rounding, are looked at too.
+        // The computed poles may be accurate by chance, so matrices perturbed by rounding are checked too.
         let error = distance(&found, &poles, |_| 1.0).max(moved(a, b, &k, &poles, f64::EPSILON, |_| 1.0));
         let sensitivity = moved(a, b, &k, &poles, CHANGE, |_| 1.0);
         let relative = moved(a, b, &k, &poles, CHANGE, relative);
         Some((relative, Placement { error, poles: found, k, sensitivity, defective: None }))
     });
-    // The first is kept unless another one's poles move far less: a sample of changes tells gross differences only.
+    // The first candidate is kept unless the poles of another move far less: random perturbations show gross
+    // differences only.
     let best = candidates.reduce(|kept, other| if other.0 < FAR_LESS * kept.0 { other } else { kept });
-    let (_, mut best) = best.ok_or("the poles cannot be placed: their directions depend on each other")?;
+    let (_, mut best) =
+        best.ok_or("the poles cannot be placed: the closed-loop eigenvectors are linearly dependent")?;
     let farthest = distance(&best.poles, &poles, relative);
     let unstable = |list: &[Complex]| list.iter().filter(|p| p.re >= 0.0).count();
     if farthest.is_nan() || farthest > FARTHEST || unstable(&best.poles) > unstable(&poles) {
         return Err(format!(
-            "the poles cannot be placed: with the best feedback found one lies {:.3e} 1/s from where it was asked for, by \
-             rounding alone, as the request is ill-conditioned; move repeated poles apart, or ask for slower ones",
+            "the poles cannot be placed: the problem is ill-conditioned, rounding alone moves a pole by {:.3e} 1/s; move \
+             repeated poles apart or choose slower ones",
             best.error
         ));
     }
@@ -96,7 +100,9 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<Pl
     Ok(best)
 }
 
-/// Feedbacks with these poles, by all ways: first those with independent eigenvectors, in the units given and in others.
+/// Returns candidate feedbacks from all methods.
+///
+/// Those with independent eigenvectors come first, computed in the given units and in scaled ones.
 fn feedbacks(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -116,25 +122,25 @@ fn feedbacks(
     found
 }
 
-/// Independent combinations of inputs, as those that act alike are one: `B back = reduced`.
+/// Independent combinations of inputs, in which inputs of equal effect are merged: `B back = reduced`.
 struct Inputs {
     reduced: DMatrix<f64>,
     back: DMatrix<f64>,
 }
 
 impl Inputs {
-    /// By the singular values of B: both matrices have orthogonal columns.
+    /// Computes the combinations from the singular values of B. Both matrices have orthogonal columns.
     fn of(b: &DMatrix<f64>) -> Self {
         let svd = b.clone().svd(true, true);
         let small = f64::EPSILON * b.nrows().max(b.ncols()) as f64 * svd.singular_values.max();
         let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|&i| svd.singular_values[i] > small).collect();
-        let (u, v) = (svd.u.expect("it was asked for"), svd.v_t.expect("it was asked for").transpose());
+        let (u, v) = (svd.u.expect("the SVD computes U"), svd.v_t.expect("the SVD computes V").transpose());
         let mut reduced = u.select_columns(&kept);
         kept.iter().enumerate().for_each(|(j, &i)| reduced.column_mut(j).scale_mut(svd.singular_values[i]));
         Self { reduced, back: v.select_columns(&kept) }
     }
 
-    /// The feedback of all inputs with independent eigenvectors.
+    /// Returns the feedback to all inputs with independent eigenvectors.
     fn robust(&self, a: &DMatrix<f64>, poles: &[Complex]) -> Option<DMatrix<f64>> {
         let lengths: Vec<f64> = self.reduced.column_iter().map(|column| column.norm()).collect();
         let mut range = self.reduced.clone();
@@ -146,8 +152,10 @@ impl Inputs {
     }
 }
 
-/// Orders in which poles are placed one after the other: by size, rising and falling, and each with copies of a pole kept
-/// for later rounds.
+/// Returns orders in which to place the poles one by one.
+///
+/// They are sorted by ascending and by descending magnitude, each also with repeated copies of a pole deferred to later
+/// passes.
 fn orders(poles: &[Complex]) -> Vec<Vec<Complex>> {
     let mut rising: Vec<Complex> = poles.iter().copied().filter(|p| p.im >= 0.0).collect();
     rising.sort_by(|a, b| complex::norm(*a).total_cmp(&complex::norm(*b)));
@@ -163,8 +171,10 @@ fn orders(poles: &[Complex]) -> Vec<Vec<Complex>> {
     all
 }
 
-/// Whether the closed loop may have independent eigenvectors: the degrees of its invariant polynomials must dominate the
-/// controllability indices (Rosenbrock). The i-th of them has a factor for every pole that is repeated i times or more.
+/// Returns true if the closed loop may have independent eigenvectors.
+///
+/// The degrees of its invariant polynomials must dominate the controllability indices (Rosenbrock). The i-th polynomial
+/// has a factor for every pole that is repeated i times or more.
 fn allows_independent(indices: &[usize], poles: &[Complex]) -> bool {
     let copies = |p: Complex| poles.iter().filter(|q| **q == p).count();
     let mut distinct: Vec<Complex> = Vec::new();
@@ -181,8 +191,8 @@ fn allows_independent(indices: &[usize], poles: &[Complex]) -> bool {
     })
 }
 
-/// How far poles lie from those asked for, times a weight, where the entries of A and B change by a share of themselves, up or
-/// down at random.
+/// Returns the largest weighted distance of the poles from their specified values under random perturbations. The
+/// entries of A and B increase or decrease by a relative `change`.
 fn moved(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -203,13 +213,13 @@ fn moved(
     farthest
 }
 
-/// The size that distances from a pole are compared with.
+/// Returns the magnitude to which distances from a pole are related.
 fn size(pole: Complex, all: &[Complex]) -> f64 {
     let largest = all.iter().map(|p| complex::norm(*p)).fold(0.0, f64::max);
     if largest > 0.0 { complex::norm(pole).max(SMALL * largest) } else { 1.0 }
 }
 
-/// The largest distance between poles found and those asked for, each times a weight, nearest pairs first.
+/// Returns the largest weighted distance between computed and specified poles, paired nearest first.
 fn distance(found: &[Complex], poles: &[Complex], weight: impl Fn(Complex) -> f64) -> f64 {
     let n = poles.len();
     let far = |i: usize, j: usize| complex::norm(found[i] - poles[j]) * weight(poles[j]);
@@ -224,7 +234,7 @@ fn distance(found: &[Complex], poles: &[Complex], weight: impl Fn(Complex) -> f6
     largest
 }
 
-/// Real poles first, then pairs with the upper one before its exact conjugate.
+/// Returns the poles sorted: real poles first, then pairs with the upper one before its exact conjugate.
 fn paired(poles: &[Complex]) -> Result<Vec<Complex>, String> {
     let mut sorted: Vec<Complex> = poles.iter().copied().filter(|p| p.im == 0.0).collect();
     let mut lower: Vec<Complex> = poles.iter().copied().filter(|p| p.im < 0.0).collect();

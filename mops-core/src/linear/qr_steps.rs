@@ -5,19 +5,23 @@ use nalgebra::{ComplexField, DMatrix};
 use super::Complex;
 use crate::math;
 
-/// Steps without a new eigenvalue after which the shift is replaced by an exceptional one. Source: LAPACK, `dlahqr`.
+/// Number of steps without a new eigenvalue after which an exceptional shift is used. Source: LAPACK, `dlahqr`.
 pub(super) const EXCEPTIONAL: usize = 10;
 
-/// Steps without a new eigenvalue after which an entry counts as zero that is one beside the whole matrix: a perturbation
-/// of the size of the rounding errors, though not beside its neighbours. Three exceptional shifts have not helped by then.
+/// Number of steps without a new eigenvalue after which a subdiagonal entry counts as zero relative to the whole
+/// matrix.
+///
+/// This is a perturbation of rounding size, though not relative to the neighbours. Three exceptional shifts have failed
+/// by then.
 pub(super) const LENIENT: usize = 3 * EXCEPTIONAL + 1;
 
-/// Steps without a new eigenvalue after which none counts as found.
+/// Number of steps without a new eigenvalue after which the iteration fails.
 pub(super) const MOST: usize = 300;
 
-/// The eigenvalues of a real Hessenberg matrix, of which nothing below the subdiagonal is read; `None` without convergence.
+/// Returns the eigenvalues of a real Hessenberg matrix, or `None` without convergence. Entries below the subdiagonal
+/// are ignored.
 ///
-/// Source: LAPACK 3.12, `dlahqr`, in its description; B. T. Smith et al., Matrix Eigensystem Routines, EISPACK Guide, 2nd
+/// Source: LAPACK 3.12, description of `dlahqr`; B. T. Smith et al., Matrix Eigensystem Routines, EISPACK Guide, 2nd
 /// edition (1976), `hqr`.
 pub(super) fn hessenberg_eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex>> {
     let mut roots = Vec::with_capacity(h.nrows());
@@ -44,8 +48,10 @@ pub(super) fn hessenberg_eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex>
     Some(roots)
 }
 
-/// Start of the block of a Hessenberg matrix that ends at `hi`: a negligible subdiagonal entry decouples it, and becomes
-/// zero. Entries that are small beside `norm` count too.
+/// Returns the start of the block of a Hessenberg matrix that ends at `hi`.
+///
+/// A negligible subdiagonal entry decouples the block and is set to zero. Entries that are small relative to `norm`
+/// count too.
 pub(super) fn decoupled<T: ComplexField<RealField = f64>>(h: &mut DMatrix<T>, hi: usize, norm: f64) -> usize {
     for lo in (1..=hi).rev() {
         if negligible(h, lo, hi) || h[(lo, lo - 1)].clone().norm1() <= f64::EPSILON * norm {
@@ -56,8 +62,9 @@ pub(super) fn decoupled<T: ComplexField<RealField = f64>>(h: &mut DMatrix<T>, hi
     0
 }
 
-/// Whether the entry below the diagonal in row `k` is zero beside its neighbours: its product with the one across the
-/// diagonal beside that of the differences on the diagonal.
+/// Returns true if the subdiagonal entry in row `k` is negligible relative to its neighbours.
+///
+/// The test relates its product with the entry across the diagonal to the difference of the diagonal entries.
 ///
 /// Source: M. Ahues, F. Tisseur, A new deflation criterion for the QR algorithm, LAPACK Working Note 122 (1997).
 fn negligible<T: ComplexField<RealField = f64>>(h: &DMatrix<T>, k: usize, hi: usize) -> bool {
@@ -69,7 +76,7 @@ fn negligible<T: ComplexField<RealField = f64>>(h: &DMatrix<T>, k: usize, hi: us
     }
     let mut around = size(k - 1, k - 1) + size(k, k);
     if around == 0.0 {
-        // Nothing on the diagonal: the entries beside it tell the scale.
+        // Zero diagonal: the neighbouring entries give the scale.
         around += if k >= 2 { size(k - 1, k - 2) } else { 0.0 };
         around += if k < hi { size(k + 1, k) } else { 0.0 };
     }
@@ -84,10 +91,10 @@ fn negligible<T: ComplexField<RealField = f64>>(h: &DMatrix<T>, k: usize, hi: us
     small * (large / sum) <= tiny.max(f64::EPSILON * (least * (most / sum)))
 }
 
-/// The two shifts of a step, real, or a conjugate pair: `[re, im, re, im]`.
+/// Returns the two shifts of a step, both real or a conjugate pair.
 fn shifts(h: &DMatrix<f64>, lo: usize, hi: usize, step: usize) -> [Complex; 2] {
     let at = |i: usize, j: usize| h[(i, j)];
-    // Exceptional shifts by turns from the lower and the upper end. Source: LAPACK, `dlahqr`.
+    // Exceptional shifts alternate between the lower and the upper end. Source: LAPACK, `dlahqr`.
     let exceptional = |diagonal: f64, s: f64| [0.75 * s + diagonal, -0.4375 * s, s, 0.75 * s + diagonal];
     let [a, b, c, d] = if step.is_multiple_of(2 * EXCEPTIONAL) {
         exceptional(at(hi, hi), at(hi, hi - 1).abs() + at(hi - 1, hi - 2).abs())
@@ -108,14 +115,15 @@ fn shifts(h: &DMatrix<f64>, lo: usize, hi: usize, step: usize) -> [Complex; 2] {
         let shift = Complex::new(half * s, root * s);
         return [shift, shift.conj()];
     }
-    // Two real ones: the one nearer to the last entry, twice.
+    // Two real shifts: the one nearer to the last entry, twice.
     let (first, second) = (half + root, half - root);
     let nearer = if (first - d).abs() <= (second - d).abs() { first } else { second };
     [Complex::new(nearer * s, 0.0); 2]
 }
 
-/// Where the step begins, between two subdiagonal entries that together are small, and the first column of
-/// `(H - first)(H - second)` there, up to a factor.
+/// Returns the start row of the step and the first column of `(H - first)(H - second)` there, up to a factor.
+///
+/// The step can start where the two adjacent subdiagonal entries together are small.
 fn start(h: &DMatrix<f64>, lo: usize, hi: usize, [first, second]: [Complex; 2]) -> (usize, [f64; 3]) {
     let mut m = hi - 2;
     loop {
@@ -140,7 +148,7 @@ fn start(h: &DMatrix<f64>, lo: usize, hi: usize, [first, second]: [Complex; 2]) 
     }
 }
 
-/// One implicit step on rows and columns `lo` to `hi`, by reflections that chase a bulge down from row `m`.
+/// Performs one implicit step on rows and columns `lo` to `hi`: reflections chase a bulge down from row `m`.
 fn double_step(h: &mut DMatrix<f64>, lo: usize, hi: usize, (m, column): (usize, [f64; 3])) {
     for k in m..hi {
         let rows = (hi - k + 1).min(3);
@@ -169,8 +177,8 @@ fn double_step(h: &mut DMatrix<f64>, lo: usize, hi: usize, (m, column): (usize, 
     }
 }
 
-/// Makes `x` the vector `v`, with a first entry of 1, of the reflection `1 - factor v v^T` that turns `x` into `(beta, 0,
-/// 0)`; returns `beta` and `factor`.
+/// Replaces `x` by the vector `v`, with a first entry of 1, of the reflection `1 - factor v v^T` that maps `x` to
+/// `(beta, 0, 0)`. Returns `beta` and `factor`.
 fn reflection(x: &mut [f64; 3]) -> (f64, f64) {
     let rest = math::hypot(x[1], x[2]);
     if rest == 0.0 {
@@ -184,7 +192,7 @@ fn reflection(x: &mut [f64; 3]) -> (f64, f64) {
     (beta, factor)
 }
 
-/// Eigenvalues of the 2 x 2 block at row `k`.
+/// Returns the eigenvalues of the 2 x 2 block at row `k`.
 fn pair(h: &DMatrix<f64>, k: usize) -> [Complex; 2] {
     let (y, x, w) = (h[(k, k)], h[(k + 1, k + 1)], h[(k + 1, k)] * h[(k, k + 1)]);
     let p = 0.5 * (y - x);

@@ -1,4 +1,4 @@
-//! An independent reference for the tests: characteristic polynomials and their roots in about 32 digits.
+//! Independent reference for the tests: characteristic polynomials and their roots in about 32 digits.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 use super::Complex;
 use crate::math::{self, complex};
 
-/// A number as the sum of two, the second at most half a unit in the last place of the first.
+/// Double-double number: an unevaluated sum, the second term at most half a unit in the last place of the first.
 ///
-/// Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971)
-/// 224-242.
+/// Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18
+/// (1971) 224-242.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Double(pub f64, pub f64);
 
@@ -74,7 +74,7 @@ impl Div for Double {
     }
 }
 
-/// A complex number of that precision.
+/// Complex double-double number.
 pub type Exact = nalgebra::Complex<Double>;
 
 fn complex(z: Complex) -> Exact {
@@ -94,27 +94,28 @@ fn inverse(a: Exact) -> Exact {
     Exact { re: a.re / square, im: -a.im / square }
 }
 
-/// A matrix of that precision, row by row.
+/// Double-double matrix, row by row.
 pub type ExactMatrix = Vec<Vec<Double>>;
 
-/// A matrix, exactly.
+/// Converts a matrix exactly.
 pub fn exactly(a: &DMatrix<f64>) -> ExactMatrix {
     a.row_iter().map(|row| row.iter().map(|&x| x.into()).collect()).collect()
 }
 
-/// The product of two matrices.
+/// Returns the product of two matrices.
 pub fn times(a: &ExactMatrix, b: &ExactMatrix) -> ExactMatrix {
     let zero = Double::from(0.0);
     let entry = |row: &Vec<Double>, j: usize| row.iter().zip(b).fold(zero, |sum, (&x, other)| sum + x * other[j]);
     a.iter().map(|row| (0..b[0].len()).map(|j| entry(row, j)).collect()).collect()
 }
 
-/// The difference of two matrices.
+/// Returns the difference of two matrices.
 pub fn minus(a: &ExactMatrix, b: &ExactMatrix) -> ExactMatrix {
     a.iter().zip(b).map(|(r, s)| r.iter().zip(s).map(|(&x, &y)| x - y).collect()).collect()
 }
 
-/// Coefficients, rising powers, of the characteristic polynomial of a matrix: the method of Faddeev and Le Verrier.
+/// Returns the coefficients, ascending powers, of the characteristic polynomial of a matrix by the Faddeev-LeVerrier
+/// method.
 pub fn characteristic(a: &ExactMatrix) -> Vec<Double> {
     let n = a.len();
     let mut coefficients = vec![Double::from(0.0); n + 1];
@@ -130,9 +131,9 @@ pub fn characteristic(a: &ExactMatrix) -> Vec<Double> {
     coefficients
 }
 
-/// The roots of a polynomial with coefficients of rising powers, by the method of Ehrlich and Aberth.
+/// Returns the roots of a polynomial with coefficients in ascending powers by the Ehrlich-Aberth method.
 pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
-    // Roots at 0 are taken out exactly.
+    // Roots at 0 are split off exactly.
     let at_zero = coefficients.iter().take_while(|c| c.0 == 0.0).count();
     let coefficients = &coefficients[at_zero..];
     let n = coefficients.len() - 1;
@@ -151,7 +152,7 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
                 slope = sum(product(slope, z[i]), value);
                 value = sum(product(value, z[i]), Exact { re: c, im: 0.0.into() });
             }
-            // Where the value is rounding nothing is left to improve.
+            // A value at rounding level cannot be improved.
             let size = math::hypot(z[i].re.0, z[i].im.0);
             let largest = monic.iter().rev().fold(0.0, |sum, c| sum * size + c.0.abs());
             if math::hypot(value.re.0, value.im.0) <= 1e-31 * largest {
@@ -174,7 +175,7 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
     found.chain(std::iter::repeat_n(Complex::new(0.0, 0.0), at_zero)).collect()
 }
 
-/// The eigenvalues of a matrix.
+/// Returns the eigenvalues of a matrix.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Vec<Complex> {
     roots(&characteristic(&exactly(a)))
 }

@@ -1,14 +1,14 @@
-//! The frequency response of a linear system.
+//! Frequency response of a linear system.
 
 use nalgebra::DMatrix;
 
 use super::{Complex, StateSpace};
 use crate::math::complex;
 
-/// A system made ready to be evaluated at many frequencies: its states scaled to one size.
+/// System prepared for evaluation at many frequencies: its states are scaled to similar magnitude.
 ///
-/// `s - A` is factored anew at each frequency, O(n^3). A Hessenberg form once and for all, after which each takes O(n^2),
-/// fills entries that are 0 with rounding errors; at high frequencies these are soon larger than the response.
+/// `s - A` is factored at each frequency in O(n^3). A single Hessenberg reduction would give O(n^2) per frequency. But
+/// it fills zero entries with rounding errors, which soon exceed the response at high frequencies.
 #[derive(Debug, Clone)]
 pub struct FrequencyResponse {
     a: DMatrix<f64>,
@@ -19,10 +19,10 @@ pub struct FrequencyResponse {
 }
 
 impl StateSpace {
-    /// The system made ready for frequency responses.
+    /// Prepares the system for frequency responses.
     ///
     /// # Errors
-    /// An entry that is not finite.
+    /// If an entry is not finite.
     pub fn response(&self) -> Result<FrequencyResponse, String> {
         let all = [&self.a, &self.b, &self.c, &self.d];
         if all.iter().any(|m| m.iter().any(|x| !x.is_finite())) || !self.delay.is_finite() {
@@ -34,20 +34,20 @@ impl StateSpace {
 }
 
 impl FrequencyResponse {
-    /// `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole.
+    /// Returns `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole.
     pub fn at(&self, s: Complex) -> DMatrix<Complex> {
         let rational = self.c.map(|x| Complex::new(x, 0.0)) * self.states(s) + self.d.map(|x| Complex::new(x, 0.0));
         if self.delay == 0.0 { rational } else { rational * complex::exp(-s * self.delay) }
     }
 
-    /// The sizes of the terms that the response of the first input and output is the sum of, added up: `|L|` beside it tells
-    /// how much is lost by cancellation.
+    /// Returns the sum of the magnitudes of the terms in the response from the first input to the first output. Its
+    /// ratio to `|L|` shows the loss by cancellation.
     pub(super) fn terms(&self, s: Complex) -> f64 {
         let x = self.states(s);
         (0..self.a.nrows()).fold(self.d[(0, 0)].abs(), |sum, i| sum + self.c[(0, i)].abs() * complex::norm(x[(i, 0)]))
     }
 
-    /// `(s - A)^-1 B`, by Gaussian elimination with partial pivoting.
+    /// Returns `(s - A)^-1 B`, by Gaussian elimination with partial pivoting.
     fn states(&self, s: Complex) -> DMatrix<Complex> {
         let n = self.a.nrows();
         let mut m = self.a.map(|x| Complex::new(-x, 0.0));
@@ -84,12 +84,12 @@ impl FrequencyResponse {
         x
     }
 
-    /// The response at the angular frequency `omega`, rad/s.
+    /// Returns the response at the angular frequency `omega`, rad/s.
     pub fn at_frequency(&self, omega: f64) -> DMatrix<Complex> {
         self.at(Complex::new(0.0, omega))
     }
 
-    /// The response of the first input and output at the angular frequency `omega`, rad/s.
+    /// Returns the response from the first input to the first output at the angular frequency `omega`, rad/s.
     pub fn scalar(&self, omega: f64) -> Complex {
         self.at_frequency(omega)[(0, 0)]
     }

@@ -1,26 +1,28 @@
-//! The algebraic Riccati equation, and linear-quadratic state feedback.
+//! Algebraic Riccati equation and linear-quadratic state feedback.
 
 use nalgebra::DMatrix;
 
 use super::controllability::Scaled;
 use super::{Complex, Schur, eigenvalues, lyapunov, undecided};
 
-/// Residual of a Riccati equation, relative to the sizes of its terms, up to which it counts as solved.
+/// Relative residual up to which a Riccati equation counts as solved.
 const SOLVED: f64 = 1e-8;
 
-/// Steps of Newton's method after which a solution does not get better any more; each doubles the digits.
+/// Maximum number of Newton steps. Each doubles the number of correct digits, so further steps bring no gain.
 const STEPS: usize = 20;
 
-/// The stabilising solution `X` of `A^T X + X A - X B R^-1 B^T X + Q = 0`.
+/// Returns the stabilising solution `X` of `A^T X + X A - X B R^-1 B^T X + Q = 0`.
 ///
-/// From the stable invariant subspace of the Hamiltonian matrix, in units of like size, then refined by steps of Newton's
-/// method. The residual, and the stability of `A - B R^-1 B^T X`, are checked. Source: A. J. Laub, A Schur method for
-/// solving algebraic Riccati equations, IEEE Transactions on Automatic Control 24 (1979) 913-921; D. L. Kleinman, On an
-/// iterative technique for Riccati equation computations, ibid. 13 (1968) 114-115.
+/// The solution comes from the stable invariant subspace of the Hamiltonian matrix, in scaled units, and is refined by
+/// Newton's method. The residual and the stability of `A - B R^-1 B^T X` are checked.
+///
+/// Source: A. J. Laub, A Schur method for solving algebraic Riccati equations, IEEE Transactions on Automatic Control
+/// 24 (1979) 913-921; D. L. Kleinman, On an iterative technique for Riccati equation computations, ibid. 13 (1968)
+/// 114-115.
 ///
 /// # Errors
-/// Weights that are not what they must be; a mode that cannot be stabilised, or that lies on the imaginary axis and is not
-/// weighted; a residual that does not become small.
+/// If a weight is not symmetric, `R` is not positive definite or `Q` is not positive semidefinite. If a mode is not
+/// stabilisable, or lies on the imaginary axis and has no weight. If the residual stays large.
 pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
     if a.nrows() == 0 {
         return Ok(DMatrix::zeros(0, 0));
@@ -32,17 +34,17 @@ pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix
     let inverse = r.clone().cholesky().ok_or("the weights of the inputs must be positive definite")?.inverse();
     let least = q.clone().symmetric_eigenvalues().min();
     if least < -1e-12 * q.norm() {
-        return Err("the weights of the states must not be negative".to_owned());
+        return Err("the weights of the states must be positive semidefinite".to_owned());
     }
     let scaled = Scaled::of(a, b);
-    // Of the scaled system B R^-1 B^T is D^-1 (B R^-1 B^T) D^-1, and Q is D Q D.
+    // In the scaled system B R^-1 B^T is D^-1 (B R^-1 B^T) D^-1, and Q is D Q D.
     let equation =
         Equation { g: scaled.per_states(&(b * inverse * b.transpose())), q: scaled.by_states(q), a: scaled.a.clone() };
     let x = equation.solution()?;
     Ok(scaled.per_states(&x))
 }
 
-/// `A^T X + X A - X G X + Q = 0`.
+/// The equation `A^T X + X A - X G X + Q = 0`.
 struct Equation {
     a: DMatrix<f64>,
     g: DMatrix<f64>,
@@ -58,7 +60,7 @@ impl Equation {
             if !eigenvalues(&closed)?.iter().all(|z| z.re < 0.0) {
                 return Err(no_solution());
             }
-            // Newton's step: the next X satisfies a Lyapunov equation.
+            // Newton step: the next X satisfies a Lyapunov equation.
             let next = lyapunov(&closed.transpose(), &(&self.q + &x * &self.g * &x))?;
             let left = self.residual(&next);
             if left.is_nan() || left >= 0.5 * residual {
@@ -68,8 +70,8 @@ impl Equation {
         }
         if residual.is_nan() || residual > SOLVED {
             return Err(format!(
-                "the Riccati equation was not solved: a relative residual of {residual:.1e} is left; weights whose sizes \
-                 differ less may help"
+                "the Riccati equation was not solved: relative residual {residual:.1e}; choose weights that are closer in \
+                 magnitude"
             ));
         }
         let closed = &self.a - &self.g * &x;
@@ -80,11 +82,11 @@ impl Equation {
         }
     }
 
-    /// The solution by the stable invariant subspace of the Hamiltonian matrix.
+    /// Returns the solution from the stable invariant subspace of the Hamiltonian matrix.
     fn by_subspace(&self) -> Result<DMatrix<f64>, String> {
         let Self { a, g, q } = self;
         let n = a.nrows();
-        // X = s X': both off-diagonal blocks get the same size.
+        // X = s X', so that both off-diagonal blocks have the same norm.
         let scale = if g.norm() > 0.0 && q.norm() > 0.0 { (q.norm() / g.norm()).sqrt() } else { 1.0 };
         let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
         hamiltonian.view_mut((0, 0), (n, n)).copy_from(a);
@@ -102,7 +104,7 @@ impl Equation {
         Ok((&x + x.transpose()) * 0.5)
     }
 
-    /// The residual at `x`, relative to the sizes of the terms.
+    /// Returns the residual at `x`, relative to the sizes of the terms.
     fn residual(&self, x: &DMatrix<f64>) -> f64 {
         let (linear, square) = (self.a.transpose() * x, x * &self.g * x);
         let left = &linear + linear.transpose() - &square + &self.q;
@@ -111,17 +113,17 @@ impl Equation {
 }
 
 fn no_solution() -> String {
-    "the Riccati equation has no stabilising solution: a mode cannot be stabilised, or rests on the imaginary axis without \
+    "the Riccati equation has no stabilising solution: a mode is not stabilisable, or lies on the imaginary axis and has no \
      weight"
         .to_owned()
 }
 
-/// The feedback `u = -K x` that minimises `integral (x^T Q x + u^T R u) dt`.
+/// Returns the gain `K` of the feedback `u = -K x` that minimises `integral (x^T Q x + u^T R u) dt`.
 ///
 /// Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods (1990), chapter 3.
 ///
 /// # Errors
-/// As [`riccati`].
+/// See [`riccati`].
 pub fn lqr(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
     let x = riccati(a, b, q, r)?;
     let factor = r.clone().cholesky().expect("checked with the equation");
@@ -180,10 +182,10 @@ mod tests {
         }
     }
 
-    /// SciPy 1.17.1, `solve_continuous_are`.
+    /// Reference values from SciPy 1.17.1, `solve_continuous_are`.
     const LQR: [f64; 4] = [-0.031_698_284_615, -0.025_227_862_966_5, -0.385_122_190_968, -0.067_332_515_286_4];
 
-    /// The relative residual, term by term, in the units given.
+    /// Returns the elementwise relative residual, in the given units.
     fn residual(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>, x: &DMatrix<f64>) -> f64 {
         let g = b * r.clone().try_inverse().unwrap() * b.transpose();
         let (linear, square) = (a.transpose() * x, x * g * x);
@@ -196,7 +198,7 @@ mod tests {
 
     #[test]
     fn units_of_the_states_change_no_feedback() {
-        // A motor in SI units and in others that differ by up to 1e15; weights follow them.
+        // A motor in SI units and in units that differ by up to 1e15; the weights are converted with them.
         let a = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, 0.0, -0.5, 20.0, 0.0, -3.0, -400.0]);
         let b = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 250.0]);
         let (q, r) = (
@@ -233,7 +235,7 @@ mod tests {
                 prop_assert!(exact.iter().all(|z| z.re < 0.0), "{:?}", exact);
                 prop_assert!(x.symmetric_eigenvalues().min() > -1e-9);
             } else {
-                // Random systems are controllable, and observable by all states.
+                // Random systems are controllable, and observable from all states.
                 prop_assert!(zeros > 0 || decades.abs() > 4.0, "{} {}", a, b);
             }
         }

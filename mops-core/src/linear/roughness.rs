@@ -1,38 +1,39 @@
-//! Whether a function has the slopes that are stated of it.
+//! Detection of points at which a function is not differentiable with the given derivatives.
 
-/// Distances at which slopes are compared with differences, each a hundredth of the one before: shares of a variable, or
-/// absolute ones where it is 0.
+/// Distances at which derivatives are compared with finite differences, relative to a variable, or absolute if it is 0.
 const DISTANCES: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
 
-/// Part of the terms of a row within which a difference is the slope.
+/// Relative tolerance, with respect to the terms of a row, within which a difference agrees with the derivative.
 const CLOSE: f64 = 1e-5;
 
-/// Part of a deviation that is left at a hundredth of the distance. Of a smooth function it is a hundredth, of `x^1.5` a
-/// tenth; at a kink it stays, and where a slope is infinite it grows.
+/// Ratio of the deviations at successive distances below which the function counts as differentiable.
+///
+/// Over a factor of 100 in distance, a smooth function gives 1/100, and `x^1.5` gives 1/10. At a kink the ratio is 1,
+/// and at an infinite derivative it exceeds 1.
 const FALLING: f64 = 0.5;
 
-/// A function of several variables at a point, with its slopes.
+/// Function of several variables at a point, with its derivatives.
 pub(crate) struct Point<'a> {
-    /// The variables.
+    /// Variables.
     pub x: &'a [f64],
-    /// The values.
+    /// Values.
     pub values: &'a [f64],
-    /// The derivatives of the values (rows) by the variables (columns).
+    /// Jacobian: derivatives of the values (rows) with respect to the variables (columns).
     pub slopes: &'a nalgebra::DMatrix<f64>,
 }
 
 impl Point<'_> {
-    /// The pairs of a row and a column of which the slope is not that of the function: it jumps, or is infinite. `f` gives
-    /// the values at other points, where it has some; only these `rows` and `columns` are looked at.
+    /// Returns the pairs of row and column whose derivative is not that of the function: it jumps or is infinite.
     ///
-    /// A direction in which all variables move tells whether there is any; only then each is moved alone.
+    /// `f` returns the values at other points, or `None` if undefined. Only these `rows` and `columns` are checked. A
+    /// direction that moves all variables shows whether any pair exists; only then is each variable moved alone.
     pub fn rough(
         &self,
         mut f: impl FnMut(&[f64]) -> Option<Vec<f64>>,
         rows: &[usize],
         columns: &[usize],
     ) -> Vec<(usize, usize)> {
-        // Parts of the golden ratio, by turns up and down, so that no two variables move alike.
+        // Fractions of the golden ratio with alternating sign, so that no two variables move alike.
         let mixed = |i: usize| {
             (0.3 + 0.7 * (0.618_033_988_749_894_9 * (i + 1) as f64).fract())
                 * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
@@ -49,8 +50,9 @@ impl Point<'_> {
         found
     }
 
-    /// Which rows have no slope along a direction, given by parts of the columns. A side on which the function is not
-    /// defined says nothing, unless it is neither.
+    /// Returns for each row whether the function lacks a derivative along a direction, given by weights of the columns.
+    ///
+    /// A side on which the function is undefined is ignored, unless it is undefined on both.
     fn rough_rows(
         &self,
         f: &mut impl FnMut(&[f64]) -> Option<Vec<f64>>,
@@ -66,7 +68,7 @@ impl Point<'_> {
                 let mut moved = Vec::with_capacity(direction.len());
                 for &(j, part) in direction {
                     x[j] += sign * distance * part * size(j);
-                    // What the variable has moved by after rounding.
+                    // Actual movement of the variable after rounding.
                     moved.push((j, x[j] - self.x[j]));
                 }
                 let Some(values) = f(&x) else { continue };
@@ -88,23 +90,23 @@ impl Point<'_> {
         (0..rows.len()).map(rough).collect()
     }
 
-    /// The size of the terms that a value is the sum of, by its slopes.
+    /// Returns the sum of the magnitudes of the terms of a value, estimated from its derivatives.
     fn inner(&self, row: usize) -> f64 {
         self.x.iter().enumerate().map(|(j, x)| (self.slopes[(row, j)] * x).abs()).sum()
     }
 }
 
-/// What the differences on one side say of a row.
+/// Result of the differences on one side for one row.
 #[derive(Debug, Clone, Default)]
 struct Verdict {
-    /// The slope is that of the function.
+    /// True if the derivative agrees with the function.
     smooth: bool,
-    /// The last deviation, per distance, that was no noise.
+    /// Last deviation above the noise, per distance.
     deviation: Option<f64>,
 }
 
 impl Verdict {
-    /// Takes a difference that is `off` by so much, with this `noise`, between terms of this `size`.
+    /// Includes a difference with deviation `off` and this `noise`, from terms of total magnitude `size`.
     fn take(&mut self, off: f64, noise: f64, size: f64, distance: f64) {
         let falls = self.deviation.is_some_and(|before| (off + noise) / distance <= FALLING * before);
         self.smooth |= falls || off.max(noise) <= CLOSE * size;
@@ -125,7 +127,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether a function of one variable with this slope at x is found rough there.
+    /// Returns true if a function of one variable with this derivative at x is found rough there.
     fn is_rough(f: impl Fn(f64) -> f64, slope: f64, x: f64) -> bool {
         let (x, values, slopes) = ([x], [f(x)], DMatrix::from_element(1, 1, slope));
         let point = Point { x: &x, values: &values, slopes: &slopes };
@@ -141,7 +143,7 @@ mod tests {
         assert!(is_rough(|x| x.clamp(-2.0, 2.0), 1.0, 2.0) && is_rough(|x| x.max(0.5) * 1e-9, 0.0, 0.5));
         assert!(is_rough(|x| if x > 0.0 { 1.0 } else { -1.0 }, 0.0, 0.0));
         assert!(is_rough(|x| 1e3 + x + 0.01 * x.abs(), 1.0, 0.0));
-        // A slope that is wrong is found out too.
+        // A wrong derivative is detected too.
         assert!(is_rough(math::sin, 0.5, 0.3));
     }
 
@@ -153,9 +155,9 @@ mod tests {
         assert!(!is_rough(|x| math::tanh(1e6 * x), 1e6, 0.0) && !is_rough(|x| math::sin(1e-6 * x), 1e-6, 0.0));
         assert!(!is_rough(f64::sqrt, 0.5 / 1e-12f64.sqrt(), 1e-12) && !is_rough(f64::sqrt, 0.5e15, 1e-30));
         assert!(!is_rough(math::exp, math::exp(20.0), 20.0) && !is_rough(|_| 7.0, 0.0, 0.0));
-        // Defined on one side only, with a slope there.
+        // Defined on one side only, with a derivative there.
         assert!(!is_rough(|x| math::powf(x, 1.5), 0.0, 0.0));
-        // Away from a kink, also close to it.
+        // Smooth near a kink, even very close to it.
         assert!(!is_rough(f64::abs, 1.0, 1e-9) && !is_rough(|x| (x - 1.0).abs(), 1.0, 1.001));
     }
 

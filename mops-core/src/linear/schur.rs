@@ -1,4 +1,4 @@
-//! The Schur form: a matrix as a unitary similarity of a triangular one.
+//! Schur form: unitary similarity of a matrix to a triangular one.
 
 use nalgebra::DMatrix;
 
@@ -6,18 +6,19 @@ use super::Complex;
 use super::qr_steps::{EXCEPTIONAL, LENIENT, MOST, decoupled};
 use crate::math::{self, complex};
 
-/// `A = Q T Q^H` with `Q` unitary and `T` upper triangular; the eigenvalues of `A` stand on the diagonal of `T`.
+/// Schur form `A = Q T Q^H` with `Q` unitary and `T` upper triangular; the diagonal of `T` holds the eigenvalues of
+/// `A`.
 ///
 /// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), sections 7.5 and 7.6.
 #[derive(Debug, Clone)]
 pub struct Schur {
-    /// The unitary factor.
+    /// Unitary factor.
     pub q: DMatrix<Complex>,
-    /// The triangular factor.
+    /// Triangular factor.
     pub t: DMatrix<Complex>,
 }
 
-/// A rotation that makes `(x, y)` into `(r, 0)`.
+/// Givens rotation that maps `(x, y)` to `(r, 0)`.
 struct Rotation {
     cosine: f64,
     sine: Complex,
@@ -53,10 +54,10 @@ impl Rotation {
 }
 
 impl Schur {
-    /// The Schur form of a square matrix.
+    /// Computes the Schur form of a square matrix.
     ///
     /// # Errors
-    /// An entry that is not finite, or, hardly ever, no convergence.
+    /// If an entry is not finite or, very rarely, the QR steps do not converge.
     pub fn new(a: DMatrix<Complex>) -> Result<Self, String> {
         if a.iter().any(|z| !z.is_finite()) {
             return Err("a matrix with an entry that is not finite has no Schur form".to_owned());
@@ -94,18 +95,18 @@ impl Schur {
         Ok(Self { q, t })
     }
 
-    /// The Schur form of a real matrix.
+    /// Computes the Schur form of a real matrix.
     ///
     /// # Errors
-    /// As [`Schur::new`].
+    /// See [`Schur::new`].
     pub fn of(a: &DMatrix<f64>) -> Result<Self, String> {
         Self::new(a.map(|x| Complex::new(x, 0.0)))
     }
 
-    /// Moves the eigenvalues that are `wanted` to the front; returns how many there are.
+    /// Moves the `wanted` eigenvalues to the front and returns their number.
     ///
-    /// Source: Z. Bai, J. W. Demmel, On swapping diagonal blocks in real Schur form, Linear Algebra and its Applications
-    /// 186 (1993) 75-95; here every block is 1 x 1.
+    /// Source: Z. Bai, J. W. Demmel, On swapping diagonal blocks in real Schur form, Linear Algebra and its
+    /// Applications 186 (1993) 75-95; here every block is 1 x 1.
     pub fn reorder(&mut self, wanted: impl Fn(Complex) -> bool) -> usize {
         let n = self.t.nrows();
         let mut count = 0;
@@ -133,7 +134,7 @@ impl Schur {
     }
 }
 
-/// The eigenvalue of the last 2 x 2 block that is nearer to its last entry.
+/// Returns the eigenvalue of the last 2 x 2 block that is nearer to its last entry (Wilkinson shift).
 fn shift(t: &DMatrix<Complex>, hi: usize) -> Complex {
     let (a, d) = (t[(hi - 1, hi - 1)], t[(hi, hi)]);
     let half = (a - d) * 0.5;

@@ -1,30 +1,31 @@
-//! Frequencies at which a response does something, by dividing the axis until bounds exclude or pin it.
+//! Search for frequencies at which a response crosses a level or peaks: branch and bound over the frequency axis.
 //!
-//! Source (branch and bound): R. E. Moore, R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (2009), chapters 5
-//! and 8.
+//! Source: R. E. Moore, R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (2009), chapters 5 and 8.
 
 use super::Complex;
 use super::bounded_response::{BoundedResponse, Span};
 use crate::math;
 
-/// Ranges looked at until a search counts as hopeless: a delay that turns the response a hundred thousand times.
+/// Largest number of ranges that a search evaluates: enough for a delay that turns the phase 100 000 times.
 const MOST: usize = 2_000_000;
 
-/// Change of what is searched, over a range, below which it counts as monotone there: rad, or a share of the gain.
+/// Change of the value over a range below which the value counts as monotone there: rad, or relative gain.
 const SMOOTH: f64 = 0.3;
 
-/// Change below which a response that does not pass counts as one that only touches.
+/// Change below which a response without a sign change counts as only touching the level.
 const TOUCHING: f64 = 1e-9;
 
-/// How sure a highest gain is, relative, before it is made exact.
+/// Relative gap between the highest gain found and its bound at which the search stops before refinement.
 const SURE: f64 = 1e-6;
 
-/// Calls `found` with every frequency at which a value of the response passes 0, rising, and whether the value rises
-/// there. `bounds` are those of the value over a range of frequencies; ranges that they exclude are left out. `found` may
-/// end the search by `false`.
+/// Calls `found` with every frequency, ascending, at which a value of the response crosses 0, and with true if the
+/// value rises there.
+///
+/// `bounds` encloses the value over a range of frequencies; ranges that exclude 0 are skipped. The search stops when
+/// `found` returns false.
 ///
 /// # Errors
-/// More ranges than can be looked at.
+/// If the search exceeds its number of ranges.
 pub(super) fn passes(
     of: &BoundedResponse,
     value: impl Fn(Complex) -> f64,
@@ -32,7 +33,7 @@ pub(super) fn passes(
     mut found: impl FnMut(f64, bool) -> bool,
 ) -> Result<(), String> {
     let lowest = 1e-12 * of.corners()[0];
-    // A value that passes 0 at an end of a range may lie on either side of the bounds of both its neighbours.
+    // A value that crosses 0 at the end of a range may lie on either side of the bounds of both neighbours.
     let inaccuracy = of.inaccuracy();
     let touching = TOUCHING.max(inaccuracy);
     let mut open = of.spans();
@@ -58,7 +59,7 @@ pub(super) fn passes(
                 continue;
             }
         }
-        // Where nothing is known yet the change is not a number.
+        // The change is NaN where no bounds are known yet.
         if (change.is_nan() || change > touching) && span.high - span.low > 1e-13 * span.high {
             let [first, second] = span.split(of);
             open.extend([second, first]);
@@ -67,11 +68,13 @@ pub(super) fn passes(
     Ok(())
 }
 
-/// The highest value of the response over all frequencies from 0 to the highest that matters, and where it is. `bounds` are
-/// those of its logarithm over a range of frequencies: what they leave is at most a millionth above, and is made exact.
+/// Returns the highest value of the response from frequency 0 to the highest relevant one, and its frequency.
+///
+/// `bounds` encloses the logarithm of the value over a range of frequencies. The remaining ranges exceed the best value
+/// by at most 1e-6 (relative) and are refined.
 ///
 /// # Errors
-/// More ranges than can be looked at.
+/// If the search exceeds its number of ranges.
 pub(super) fn highest(
     of: &BoundedResponse,
     value: impl Fn(Complex) -> f64,
@@ -109,7 +112,7 @@ pub(super) fn highest(
         }
         open = next;
     }
-    // Made exact where it may be reached.
+    // Refinement of the ranges whose bounds exceed the best value.
     tops.retain(|(most, _)| *most > best.0);
     tops.sort_by(|a, b| value(b.1.response).total_cmp(&value(a.1.response)));
     for (_, span) in tops.iter().take(16) {
@@ -121,15 +124,16 @@ pub(super) fn highest(
 }
 
 fn too_many() -> String {
-    "the response turns too often to be searched: its delay is very long beside its corners".to_owned()
+    "the frequency response turns too often to be searched: the delay is very long relative to the corner frequencies"
+        .to_owned()
 }
 
-/// The place of the maximum of a function with one maximum between `low` and `high`, by golden section.
+/// Returns the maximiser of a unimodal function between `low` and `high` by golden-section search.
 pub(super) fn maximise(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
     let (mut fa, mut fb) = (f(a), f(b));
-    // Values next to the maximum differ by the square of the distance, beside the width of what is left.
+    // Near the maximum, values differ by the square of the distance, relative to the width of the range.
     let close = (1e-6 * (high - low)).min(1e-9 * (low.abs() + high.abs()));
     let rounding = 4.0 * f64::EPSILON * (low.abs() + high.abs());
     while high - low > close.max(rounding) {
@@ -146,7 +150,7 @@ pub(super) fn maximise(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f
     0.5 * (low + high)
 }
 
-/// Where `f` changes its sign between `low` and `high`.
+/// Returns the point between `low` and `high` at which `f` changes its sign.
 pub(super) fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let rises = f(high) >= 0.0;
     for _ in 0..100 {

@@ -1,4 +1,4 @@
-//! What would make an unstable loop stable: the nearest gain, turn of the phase, or delay.
+//! Stabilisation of an unstable loop: the nearest gain, phase shift or delay.
 
 use std::cell::RefCell;
 use std::f64::consts::TAU;
@@ -8,18 +8,18 @@ use super::bounded_response::Span;
 use super::margins::{Crossing, STRONG};
 use crate::math::{self, complex};
 
-/// Crossings of the negative real axis up to which a stabilising gain is looked for.
+/// Largest number of crossings of the negative real axis in the search for a stabilising gain.
 const MOST: usize = 20_000;
 
 impl Loop {
-    /// The factor nearest to 1, in the logarithm, beside which the closed loop is stable where L is multiplied by it: on
-    /// its far side, or, where the closed loop is stable already, 1.
+    /// Returns the factor nearest to 1, in the logarithm, at which L multiplied by it reaches the stability limit.
     ///
-    /// The number of unstable poles changes only at gains with which L meets -1, by two at most for each crossing. It is
-    /// counted anew between them, so that a crossing that does not lead to stability is passed over.
+    /// The closed loop is stable on the far side of the factor. A closed loop that is already stable has the factor 1.
+    /// The number of unstable poles changes only at gains at which L meets -1, by at most two per crossing. It is
+    /// counted between the crossings, so that a crossing that does not lead to stability is skipped.
     ///
     /// # Errors
-    /// No such factor within 200 dB.
+    /// If no such factor exists within 200 dB.
     pub(super) fn stabilising_gain(&self) -> Result<f64, String> {
         let end = self.last_useful_crossing()?;
         let gains = RefCell::new(Vec::new());
@@ -30,9 +30,7 @@ impl Loop {
         self.phase_crossovers_in(window, |crossing| gains.borrow_mut().push(1.0 / complex::norm(crossing.response)))?;
         let gains = gains.into_inner();
         if gains.len() > MOST {
-            return Err(
-                "the closed loop is unstable, and its delay too long for a stabilising gain to be found".to_owned()
-            );
+            return Err("the closed loop is unstable, and its delay is too long to find a stabilising gain".to_owned());
         }
         let mut down: Vec<f64> = gains.iter().copied().filter(|gain| *gain <= 1.0).collect();
         let mut up: Vec<f64> = gains.into_iter().filter(|gain| *gain >= 1.0).collect();
@@ -40,26 +38,26 @@ impl Loop {
         up.sort_by(f64::total_cmp);
         let found = [self.first_stable(&down, 0.5)?, self.first_stable(&up, 2.0)?].into_iter().flatten();
         let nearest = found.min_by(|a, b| math::ln(*a).abs().total_cmp(&math::ln(*b).abs()));
-        nearest.ok_or_else(|| {
-            "the closed loop is unstable, and no change of the gain by up to 200 dB makes it stable".to_owned()
-        })
+        nearest
+            .ok_or_else(|| "the closed loop is unstable, and no gain change of up to 200 dB stabilises it".to_owned())
     }
 
-    /// The first of these gains, which lead away from 1, beyond which the closed loop is stable; `beyond` is a factor to a
-    /// gain beyond the last one.
+    /// Returns the first of these gains, ordered away from 1, beyond which the closed loop is stable. `beyond` is the
+    /// factor to a gain beyond the last one.
     fn first_stable(&self, gains: &[f64], beyond: f64) -> Result<Option<f64>, String> {
         let mut i = 0;
         while i < gains.len() {
             let next = gains.get(i + 1).copied().unwrap_or(gains[i] * beyond);
             let between = (gains[i] * next).sqrt();
-            // Equal gains have nothing between them.
+            // No gain lies between two equal ones.
             if math::ln(next / gains[i]).abs() <= 1e-9 {
                 i += 1;
                 continue;
             }
             match self.unstable_with(between, &self.level(1.0 / between)?)? {
                 Some(0) => return Ok(Some(gains[i])),
-                // As many crossings are needed, each of which takes two poles away, less one for poles on the axis.
+                // That many crossings are needed, each of which removes two poles; one less because of poles on the
+                // axis.
                 Some(unstable) => i += (unstable / 2).saturating_sub(1).max(1),
                 None => i += 1,
             }
@@ -67,9 +65,10 @@ impl Loop {
         Ok(None)
     }
 
-    /// Highest frequency of phase crossovers that may help. With a delay there are crossovers without end, but beyond the
-    /// corners of L every one brings two more unstable poles, and no more of them than there are crossovers below can be
-    /// undone.
+    /// Returns the highest frequency of phase crossovers that can lead to stability.
+    ///
+    /// With a delay there are infinitely many crossovers. Beyond the corners of L each adds two unstable poles, and no
+    /// more of these can be removed than there are crossovers below.
     fn last_useful_crossing(&self) -> Result<f64, String> {
         let delay = self.system.delay;
         if delay == 0.0 {
@@ -78,14 +77,15 @@ impl Loop {
         // The phase falls where the delay turns it faster than all poles and zeros, each by at most |root|/w^2.
         let high = self.response.corners()[1];
         let falling = (100.0 * high).max(2.0 * (self.response.order() as f64 * high / delay).sqrt());
-        // Below, the delay turns L so often, and the poles and zeros by half a turn each.
+        // Upper bound of the crossovers below: turns of the delay, and half a turn per pole or zero.
         let crossovers = falling * delay / TAU + 0.5 * self.response.order() as f64;
         Ok(falling + (crossovers.ceil() + 3.0) * TAU / delay)
     }
 
-    /// The smallest turn of the response, towards lead or lag, that makes the closed loop stable; at every gain crossover
-    /// it turns L by `rate` rad. A turn by which a point of L passes -1 changes the number of unstable poles by two: less
-    /// with a lead where `|L|` falls, or with a lag where it rises.
+    /// Returns the smallest phase shift, lead or lag, that makes the closed loop stable.
+    ///
+    /// At every gain crossover it turns L by `rate` rad per unit. When a point of L passes -1, the number of unstable
+    /// poles changes by two. It decreases with a lead where `|L|` falls, or with a lag where `|L|` rises.
     pub(super) fn stabilising_turn(&self, rate: impl Fn(&Crossing) -> f64) -> Option<f64> {
         let unstable = i64::try_from(self.unstable?).ok()?;
         let turns = unstable / 2 + self.gain_crossovers.len() as i64 + 1;

@@ -1,4 +1,4 @@
-//! Linear systems put together: channels, series, parallel and feedback connection.
+//! Connections of linear systems: channels, series, parallel and feedback connection.
 
 use nalgebra::DMatrix;
 
@@ -6,10 +6,10 @@ use super::eigen::balance;
 use super::{Complex, StateSpace, eigenvalues};
 
 impl StateSpace {
-    /// A system without delay whose states are called `x1`, `x2`, ..., its inputs `u1`, ..., its outputs `y1`, ....
+    /// Creates a system without delay, with states `x1`, `x2`, ..., inputs `u1`, ... and outputs `y1`, ....
     ///
     /// # Panics
-    /// If the sizes of the matrices do not fit.
+    /// If the dimensions of the matrices do not match.
     pub fn new(a: DMatrix<f64>, b: DMatrix<f64>, c: DMatrix<f64>, d: DMatrix<f64>) -> Self {
         assert!(a.is_square() && a.nrows() == b.nrows() && a.ncols() == c.ncols(), "states of A, B and C");
         assert!(d.nrows() == c.nrows() && d.ncols() == b.ncols(), "inputs and outputs of B, C and D");
@@ -18,28 +18,28 @@ impl StateSpace {
         Self { a, b, c, d, states, inputs, outputs, delay: 0.0 }
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn order(&self) -> usize {
         self.a.nrows()
     }
 
-    /// The poles: eigenvalues of `A`, 1/s.
+    /// Returns the poles: eigenvalues of `A`, 1/s.
     ///
     /// # Errors
-    /// An entry that is not finite.
+    /// If an entry is not finite.
     pub fn poles(&self) -> Result<Vec<Complex>, String> {
         eigenvalues(&self.a)
     }
 
-    /// Whether every pole lies in the open left half plane.
+    /// Returns true if every pole lies in the open left half-plane.
     ///
     /// # Errors
-    /// An entry that is not finite.
+    /// If an entry is not finite.
     pub fn is_stable(&self) -> Result<bool, String> {
         Ok(self.poles()?.iter().all(|pole| pole.re < 0.0))
     }
 
-    /// The system with its states scaled by powers of two, so that the entries of `A` are of one size.
+    /// Returns the system with its states scaled by powers of two, so that the entries of `A` have similar magnitude.
     #[must_use]
     pub(super) fn balanced(&self) -> Self {
         let mut system = self.clone();
@@ -50,7 +50,7 @@ impl StateSpace {
         system
     }
 
-    /// The system from one input to one output, by their indices.
+    /// Returns the system from one input to one output, given by their indices.
     #[must_use]
     pub fn channel(&self, input: usize, output: usize) -> Self {
         Self {
@@ -63,7 +63,7 @@ impl StateSpace {
         }
     }
 
-    /// `next` driven by the outputs of this system; the delays add up.
+    /// Returns the series connection in which the outputs of this system drive `next`; the delays add up.
     ///
     /// # Panics
     /// If `next` does not have one input per output of this system.
@@ -87,16 +87,16 @@ impl StateSpace {
         }
     }
 
-    /// The sum of this system and another with the same input.
+    /// Returns the parallel connection: the sum of this system and another with the same input.
     ///
     /// # Errors
-    /// Different delays.
+    /// If the delays differ.
     ///
     /// # Panics
     /// If the numbers of inputs or outputs differ.
     pub fn parallel(&self, other: &Self) -> Result<Self, String> {
         if self.delay != other.delay {
-            return Err("systems with different delays have no sum without further states".to_owned());
+            return Err("systems with different delays cannot be added without further states".to_owned());
         }
         let (n, m) = (self.order(), other.order());
         let mut a = DMatrix::zeros(n + m, n + m);
@@ -112,10 +112,11 @@ impl StateSpace {
         })
     }
 
-    /// The closed loop with unity negative feedback, `T = L/(1 + L)`: from the reference to the outputs.
+    /// Returns the closed loop with unity negative feedback, `T = L/(1 + L)`: from the reference to the outputs.
     ///
     /// # Errors
-    /// A delay in the loop, which has no finite number of states; a loop through `D` alone that has no solution.
+    /// If the loop has a delay, so that the number of states is infinite, or if the loop is not well-posed because of
+    /// `D`.
     pub fn complementary_sensitivity(&self) -> Result<Self, String> {
         let inverse = self.loop_inverse()?;
         Ok(Self {
@@ -127,10 +128,10 @@ impl StateSpace {
         })
     }
 
-    /// The sensitivity of the loop, `S = 1/(1 + L)`: from the reference to the control error.
+    /// Returns the sensitivity of the loop, `S = 1/(1 + L)`: from the reference to the control error.
     ///
     /// # Errors
-    /// As [`StateSpace::complementary_sensitivity`].
+    /// See [`StateSpace::complementary_sensitivity`].
     pub fn sensitivity(&self) -> Result<Self, String> {
         let inverse = self.loop_inverse()?;
         Ok(Self {
@@ -142,20 +143,20 @@ impl StateSpace {
         })
     }
 
-    /// `(1 + D)^-1`.
+    /// Returns `(1 + D)^-1`.
     fn loop_inverse(&self) -> Result<DMatrix<f64>, String> {
         if self.delay != 0.0 {
-            return Err("a closed loop with a delay has no finite number of poles".to_owned());
+            return Err("a closed loop with a delay has infinitely many poles".to_owned());
         }
         if !self.d.is_square() {
             return Err("unity feedback needs as many outputs as inputs".to_owned());
         }
         let inverse = (DMatrix::identity(self.d.nrows(), self.d.nrows()) + &self.d).try_inverse();
-        inverse.ok_or_else(|| "the loop has no solution: L is -1 at infinite frequency".to_owned())
+        inverse.ok_or_else(|| "the loop is not well-posed: L is -1 at infinite frequency".to_owned())
     }
 }
 
-/// A matrix above another.
+/// Stacks two matrices vertically.
 pub(super) fn above(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
     let mut both = DMatrix::zeros(top.nrows() + bottom.nrows(), top.ncols());
     both.rows_mut(0, top.nrows()).copy_from(top);
@@ -163,7 +164,7 @@ pub(super) fn above(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
     both
 }
 
-/// A matrix to the left of another.
+/// Stacks two matrices horizontally.
 pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     let mut both = DMatrix::zeros(left.nrows(), left.ncols() + right.ncols());
     both.columns_mut(0, left.ncols()).copy_from(left);
@@ -183,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn connections_have_the_response_that_the_algebra_of_transfer_functions_says() {
+    fn connections_have_the_response_of_transfer_function_algebra() {
         let (f, g) = (lag(3.0, 1.0), lag(2.0, 5.0));
         let s = c(0.3, 2.0);
         let at = |system: &StateSpace| system.response().unwrap().at(s)[(0, 0)];

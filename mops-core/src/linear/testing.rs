@@ -7,18 +7,18 @@ use super::Complex;
 use crate::math::complex;
 use crate::random::stream;
 
-/// A complex number.
+/// Returns a complex number.
 pub fn c(re: f64, im: f64) -> Complex {
     Complex::new(re, im)
 }
 
-/// A matrix of numbers between -1 and 1.
+/// Returns a matrix of random numbers between -1 and 1.
 pub fn random(rows: usize, columns: usize, seed: u64) -> DMatrix<f64> {
     let mut stream = stream(seed, "matrix");
     DMatrix::from_fn(rows, columns, |_, _| stream.random_range(-1.0..1.0))
 }
 
-/// The same numbers, in any order.
+/// Asserts that both lists contain the same numbers, in any order, within `tolerance`.
 #[track_caller]
 pub fn assert_same_set(found: &[Complex], expected: &[Complex], tolerance: f64) {
     let mut rest = found.to_vec();
@@ -31,14 +31,16 @@ pub fn assert_same_set(found: &[Complex], expected: &[Complex], tolerance: f64) 
     }
 }
 
-/// Two numbers agree within `tolerance`.
+/// Asserts that two numbers agree within `tolerance`.
 #[track_caller]
 pub fn assert_near(number: f64, expected: f64, tolerance: f64) {
     assert!((number - expected).abs() <= tolerance, "{number} is not {expected} within {tolerance}");
 }
 
-/// `A` and `B` of the Furuta pendulum about its upright position, states `phi, phi', theta, theta'`. Source: Greybox
-/// Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section 5.2.
+/// Returns `A` and `B` of the Furuta pendulum about its upright position, states `phi, phi', theta, theta'`.
+///
+/// Source: Greybox Identification and Control Design with Dymola (master thesis, Lund Institute of Technology), section
+/// 5.2.
 pub fn furuta() -> (DMatrix<f64>, DMatrix<f64>) {
     let a =
         [[0.0, 1.0, 0.0, 0.0], [-0.1082, 0.0, -25.4814, 0.0255], [0.0, 0.0, 0.0, 1.0], [0.0756, 0.0, 45.7597, -0.0458]];

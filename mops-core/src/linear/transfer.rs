@@ -1,30 +1,31 @@
-//! Transfer functions, and the way to a state space and back.
+//! Transfer functions, and their conversion to and from state space.
 
 use nalgebra::DMatrix;
 
 use super::{Complex, StateSpace, eigenvalues, zeros};
 
-/// A rational transfer function with a delay, `numerator(s)/denominator(s) exp(-s delay)`.
+/// Rational transfer function with a delay, `numerator(s)/denominator(s) exp(-s delay)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
-    /// Coefficients of falling powers of s.
+    /// Numerator coefficients, descending powers of s.
     pub numerator: Vec<f64>,
-    /// Coefficients of falling powers of s.
+    /// Denominator coefficients, descending powers of s.
     pub denominator: Vec<f64>,
     /// Delay, s.
     pub delay: f64,
 }
 
 impl TransferFunction {
-    /// A transfer function without delay, by coefficients of falling powers of s.
+    /// Creates a transfer function without delay from coefficients of descending powers of s.
     pub fn new(numerator: Vec<f64>, denominator: Vec<f64>) -> Self {
         Self { numerator, denominator, delay: 0.0 }
     }
 
-    /// The system in controllable canonical form, with states `x1` (the slowest to follow), `x2`, ....
+    /// Returns the system in controllable canonical form, with states `x1` (last in the chain of integrators), `x2`,
+    /// ....
     ///
     /// # Errors
-    /// A denominator that is zero, or a numerator of higher order.
+    /// If the denominator is zero, or if the numerator is of higher order.
     pub fn state_space(&self) -> Result<StateSpace, String> {
         let denominator = without_leading_zeros(&self.denominator);
         let numerator = without_leading_zeros(&self.numerator);
@@ -34,11 +35,11 @@ impl TransferFunction {
         let n = denominator.len() - 1;
         if numerator.len() > n + 1 {
             return Err(format!(
-                "a transfer function of order {} over order {n} is no system: it differentiates its input",
+                "the transfer function is improper: the numerator has order {}, the denominator order {n}",
                 numerator.len() - 1
             ));
         }
-        // Rising powers, padded.
+        // Ascending powers, padded with zeros.
         let coefficient = |list: &[f64], power: usize| {
             if power < list.len() { list[list.len() - 1 - power] / leading } else { 0.0 }
         };
@@ -60,11 +61,12 @@ impl TransferFunction {
         Ok(StateSpace { delay: self.delay, ..system })
     }
 
-    /// The transfer function of a system with one input and one output: the zeros over the poles. Poles that no input
-    /// moves or no output shows are among the zeros too, and are not cancelled.
+    /// Returns the transfer function of a system with one input and one output.
+    ///
+    /// Uncontrollable and unobservable poles also appear among the zeros and are not cancelled.
     ///
     /// # Errors
-    /// Several inputs or outputs; an entry that is not finite.
+    /// If there are several inputs or outputs, or if an entry is not finite.
     pub fn of(system: &StateSpace) -> Result<Self, String> {
         if system.inputs.len() != 1 || system.outputs.len() != 1 {
             return Err("a transfer function has one input and one output".to_owned());
@@ -77,7 +79,7 @@ impl TransferFunction {
     }
 }
 
-/// The first Markov parameter that is not zero, given the excess of poles over zeros.
+/// Returns the first nonzero Markov parameter, given the excess of poles over zeros.
 fn gain(system: &StateSpace, excess: usize) -> f64 {
     if excess == 0 {
         return system.d[(0, 0)];
@@ -89,7 +91,7 @@ fn gain(system: &StateSpace, excess: usize) -> f64 {
     (&system.c * x)[(0, 0)]
 }
 
-/// Coefficients, falling powers, of the real polynomial with these roots, which come in conjugate pairs.
+/// Returns the coefficients, descending powers, of the real polynomial with these roots, which come in conjugate pairs.
 pub(super) fn polynomial(roots: &[Complex]) -> Vec<f64> {
     let mut coefficients = vec![Complex::new(1.0, 0.0)];
     for root in roots {
@@ -142,7 +144,7 @@ mod tests {
 
     #[test]
     fn what_is_no_system_is_refused() {
-        assert!(TransferFunction::new(vec![1.0, 0.0], vec![1.0]).state_space().unwrap_err().contains("differentiates"));
+        assert!(TransferFunction::new(vec![1.0, 0.0], vec![1.0]).state_space().unwrap_err().contains("improper"));
         assert!(TransferFunction::new(vec![1.0], vec![0.0]).state_space().unwrap_err().contains("is 0"));
         assert!(TransferFunction::new(vec![0.0, 0.0, 1.0], vec![1.0, 2.0]).state_space().is_ok());
     }

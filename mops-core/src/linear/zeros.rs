@@ -6,10 +6,10 @@ use super::eigen::{balancing_factor, eigenvalues};
 use super::{Complex, StateSpace};
 use crate::math;
 
-/// What counts as zero, relative to the norm of the whole system after balancing.
+/// Magnitude below which an entry counts as zero, relative to the norm of the balanced system.
 const SMALL: f64 = 1e-13;
 
-/// A system of matrices on its way to fewer states.
+/// System matrices during the reduction to fewer states.
 struct Quadruple {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -17,15 +17,17 @@ struct Quadruple {
     d: DMatrix<f64>,
 }
 
-/// The zeros of a system: numbers s at which `[A - s, B; C, D]` has less than its normal rank, 1/s. For one input and one
-/// output these are the zeros of the transfer function before anything is cancelled. The delay does not matter.
+/// Returns the zeros of a system, 1/s: numbers s at which `[A - s, B; C, D]` has less than its normal rank.
 ///
-/// The system is reduced by orthogonal transformations to one with an invertible `D`; what is left is an eigenvalue
-/// problem. Source: A. Emami-Naeini, P. Van Dooren, Computation of zeros of linear multivariable systems, Automatica 18
-/// (1982) 415-430.
+/// With one input and one output these are the zeros of the transfer function before cancellation. The delay has no
+/// influence. Orthogonal transformations reduce the system to one with an invertible `D`; the remainder is an
+/// eigenvalue problem.
+///
+/// Source: A. Emami-Naeini, P. Van Dooren, Computation of zeros of linear multivariable systems, Automatica 18 (1982)
+/// 415-430.
 ///
 /// # Errors
-/// An entry that is not finite.
+/// If an entry is not finite.
 pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     if [a, b, c, d].iter().any(|m| m.iter().any(|x| !x.is_finite())) {
@@ -37,7 +39,7 @@ pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
     if a.nrows() == 0 || d.is_empty() {
         return eigenvalues(&a);
     }
-    // [A - s, B; C, D] with D square and invertible: columns are combined until [C, D] is [0, D'].
+    // [A - s, B; C, D] with D square and invertible: column combinations transform [C, D] to [0, D'].
     let (n, m) = (a.nrows(), d.nrows());
     let mut lower = DMatrix::zeros(n + m, m);
     lower.rows_mut(0, n).copy_from(&c.transpose());
@@ -51,17 +53,17 @@ pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
     }
 }
 
-/// Orthonormal columns that together with those of `m` span everything; `m` has full column rank.
+/// Returns orthonormal columns that complete those of `m` to a basis; `m` has full column rank.
 pub(super) fn complement<T: ComplexField>(m: &DMatrix<T>) -> DMatrix<T> {
     let (rows, columns) = m.shape();
     let mut square = DMatrix::<T>::zeros(rows, rows);
     square.columns_mut(0, columns).copy_from(m);
-    // The factor Q of the padded matrix: columns without an entry leave their reflections trivial.
+    // Factor Q of the padded matrix: zero columns have trivial reflections.
     square.qr().q().columns(columns, rows - columns).into_owned()
 }
 
 impl Quadruple {
-    /// States, inputs and outputs scaled by powers of two, so that the entries are of one size.
+    /// Scales states, inputs and outputs by powers of two, so that the entries have similar magnitude.
     fn balanced(mut self) -> Self {
         for _ in 0..50 {
             let mut changed = false;
@@ -82,7 +84,7 @@ impl Quadruple {
                 break;
             }
         }
-        // Inputs and outputs do not move zeros; they are brought to the size of A.
+        // Scaling of inputs and outputs does not move zeros; both are scaled to the magnitude of A.
         let size = if self.a.norm() > 0.0 { self.a.norm() } else { 1.0 };
         let power = |norm: f64| if norm > 0.0 { math::exp2(math::log2(size / norm).round()) } else { 1.0 };
         let (input, output) = (power(self.b.norm()), power(self.c.norm()));
@@ -104,7 +106,7 @@ impl Quadruple {
             if outputs == 0 {
                 return Self { a, b, c, d };
             }
-            // Step 1: rows of D that are independent, and rows that vanish.
+            // Step 1: independent rows of D, and rows that vanish.
             let (u, rank) = row_compression(&d, small);
             let (c, d) = (&u * c, &u * d);
             if rank == outputs {
@@ -112,7 +114,7 @@ impl Quadruple {
             }
             let (upper_c, upper_d) = (c.rows(0, rank).into_owned(), d.rows(0, rank).into_owned());
             let lower = c.rows(rank, outputs - rank).into_owned();
-            // Step 2: the states that these rows of C see, last.
+            // Step 2: the states observed by these rows of C, moved to the end.
             let (v, seen) = row_compression(&lower.transpose(), small);
             if seen == 0 {
                 return Self { a, b, c: upper_c, d: upper_d };
@@ -120,7 +122,7 @@ impl Quadruple {
             let v = DMatrix::from_fn(n, n, |i, j| v[((i + seen) % n, j)]);
             let (a, b, upper_c) = (&v * a * v.transpose(), &v * b, upper_c * v.transpose());
             let left = n - seen;
-            // Step 3: they are zero, and so is their derivative: new outputs.
+            // Step 3: these states and their derivatives are zero, which gives new outputs.
             self = Self {
                 a: a.view((0, 0), (left, left)).into_owned(),
                 b: b.rows(0, left).into_owned(),
@@ -134,18 +136,19 @@ impl Quadruple {
     }
 }
 
-/// An orthogonal matrix whose product with `m` has its independent rows first and zeros after them, and their number.
+/// Returns an orthogonal matrix whose product with `m` has the independent rows first and zero rows after them, and the
+/// rank.
 fn row_compression(m: &DMatrix<f64>, small: f64) -> (DMatrix<f64>, usize) {
     let n = m.nrows();
     if m.is_empty() {
         return (DMatrix::identity(n, n), 0);
     }
-    // Padded to be square, so that the left vectors are complete.
+    // Padded to a square matrix, so that the left singular vectors form a complete basis.
     let mut square = DMatrix::zeros(n, n.max(m.ncols()));
     square.columns_mut(0, m.ncols()).copy_from(m);
     let svd = square.svd(true, false);
     let rank = svd.singular_values.iter().filter(|&&s| s > small).count();
-    (svd.u.expect("it was asked for").transpose(), rank)
+    (svd.u.expect("the SVD computes U").transpose(), rank)
 }
 
 #[cfg(test)]
@@ -157,7 +160,7 @@ mod tests {
 
     #[test]
     fn zeros_of_a_transfer_function_are_the_roots_of_its_numerator() {
-        // (s^2 + 2 s + 5)(s - 3) over an order of 5.
+        // (s^2 + 2 s + 5)(s - 3) over a denominator of order 5.
         let g = TransferFunction::new(vec![1.0, -1.0, -1.0, -15.0], vec![1.0, 15.0, 85.0, 225.0, 274.0, 120.0]);
         let system = g.state_space().unwrap();
         assert_same_set(&zeros(&system).unwrap(), &[c(3., 0.), c(-1., 2.), c(-1., -2.)], 1e-10);
@@ -171,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_hidden_mode_is_a_zero_and_a_pole() {
-        // Two states, the second driven but not seen.
+        // Two states, the second controllable but not observable.
         let system = StateSpace::new(
             DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, 0.0, -7.0]),
             DMatrix::from_row_slice(2, 1, &[1.0, 1.0]),
@@ -194,8 +197,8 @@ mod tests {
 
     #[test]
     fn the_cart_with_a_badly_scaled_input_has_its_zeros() {
-        // The linear pendulum of the thesis (section 5.2), from torque to the arm's angle: s^2 + 0.0458 s - 45.7597 with
-        // the coupling, by hand: b2 (s^2 - a44 s - a43) + b4 (a23 + a24 s).
+        // The linear pendulum of the thesis (section 5.2), from torque to arm angle: s^2 + 0.0458 s - 45.7597 plus the
+        // coupling. Derived by hand: b2 (s^2 - a44 s - a43) + b4 (a23 + a24 s).
         let (a, b) = crate::linear::testing::furuta();
         let out = DMatrix::from_row_slice(1, 4, &[1.0, 0.0, 0.0, 0.0]);
         let system = StateSpace::new(a, b, out, DMatrix::zeros(1, 1));

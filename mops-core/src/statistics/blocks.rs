@@ -1,17 +1,17 @@
-//! Moving blocks: samples in a new order that keeps what neighbours have in common.
+//! Moving-block resampling, which preserves the correlation of neighbouring samples.
 
 use rand::Rng;
 
 use crate::random::Stream;
 
-/// `count` indices below `count`, in runs of `block` that begin anywhere.
+/// Returns `count` indices below `count`, in runs of `block` with random starts.
 ///
 /// Source: H. R. Kuensch, Annals of Statistics 17 (1989) 1217-1241.
 ///
 /// # Panics
 /// If a block is empty, or longer than all samples.
 pub fn moving_blocks(count: usize, block: usize, random: &mut Stream) -> Vec<usize> {
-    assert!((1..=count).contains(&block), "a block is a part of the samples");
+    assert!((1..=count).contains(&block), "a block has 1 to `count` samples");
     let mut order = Vec::with_capacity(count + block);
     while order.len() < count {
         let begin = random.random_range(0..=count - block);
@@ -35,7 +35,7 @@ mod tests {
             assert!(order.len() == 12 && order.chunks(4).all(|run| run.windows(2).all(|two| two[1] == two[0] + 1)));
             order.chunks(4).for_each(|run| begins[run[0]] += 1);
         }
-        // 2700 blocks over nine beginnings: 300 each, with a standard deviation of 16.
+        // 2700 blocks over nine starts: 300 each, with a standard deviation of 16.
         assert!(begins.iter().all(|&n| n.abs_diff(300) < 80), "{begins:?}");
         assert_eq!(moving_blocks(7, 7, &mut random), (0..7).collect::<Vec<_>>());
     }

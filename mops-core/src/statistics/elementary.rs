@@ -1,4 +1,4 @@
-//! Elementary effects of the inputs of a function: the screening of Morris.
+//! Elementary effects of the inputs of a function (Morris screening).
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -6,25 +6,25 @@ use rand::seq::SliceRandom;
 use crate::math;
 use crate::random::Stream;
 
-/// Values that a coordinate takes, evenly spread over [0, 1].
+/// Number of levels of a coordinate, equally spaced over [0, 1].
 const LEVELS: usize = 4;
 
-/// Length of a step, half of the levels: every level is reached from exactly one other.
+/// Step size, half of the levels: every level is reached from exactly one other.
 const STEP: f64 = 2.0 / 3.0;
 
-/// What steps of one input do to the values.
+/// Elementary effects of one input, summarised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementaryEffect {
-    /// Mean of the effects: what goes both ways cancels.
+    /// Mean of the effects, in which opposite signs cancel.
     pub mean: f64,
-    /// Mean of their magnitudes: whether the input matters.
+    /// Mean of the magnitudes, a measure of importance.
     pub magnitude: f64,
-    /// Their standard deviation: whether it acts nonlinearly, or together with others.
+    /// Standard deviation of the effects, a measure of nonlinearity and interaction.
     pub deviation: f64,
 }
 
-/// Trajectories through the unit cube: each begins at a random point of the grid and moves every coordinate once, in random
-/// order, by two thirds.
+/// Returns random trajectories through the unit cube. Each starts at a random grid point and moves every coordinate
+/// once, in random order, by two thirds.
 ///
 /// Source: M. D. Morris, Technometrics 33 (1991) 161-174, with four levels.
 #[allow(clippy::cast_precision_loss)]
@@ -45,13 +45,13 @@ pub fn trajectories(count: usize, inputs: usize, random: &mut Stream) -> Vec<Vec
         .collect()
 }
 
-/// The effect of every input, per length of its range, from the values along trajectories.
+/// Returns the effect of every input, per length of its range, from the values along trajectories.
 ///
-/// The mean of magnitudes is by F. Campolongo, J. Cariboni, A. Saltelli, Environmental Modelling and Software 22 (2007)
+/// Source (mean of magnitudes): F. Campolongo, J. Cariboni, A. Saltelli, Environmental Modelling and Software 22 (2007)
 /// 1509-1518.
 ///
 /// # Panics
-/// If there is no trajectory, or one with other points than values.
+/// If there is no trajectory, or if a trajectory does not have one value per point.
 #[allow(clippy::cast_precision_loss)]
 pub fn elementary_effects(trajectories: &[Vec<Vec<f64>>], values: &[Vec<f64>]) -> Vec<ElementaryEffect> {
     let inputs = trajectories[0][0].len();

@@ -1,5 +1,5 @@
-//! Statistics of samples: how points are drawn, what values tell of their distribution, and whose variance it is. Pure
-//! computation on numbers.
+//! Statistics of samples: sampling, distributions, confidence intervals and sensitivity indices. Pure computation on
+//! numbers.
 
 mod blocks;
 mod distributions;

@@ -1,4 +1,4 @@
-//! Points of the unit cube: at random, in a Latin hypercube, or of a scrambled Sobol sequence.
+//! Points of the unit cube: random, Latin hypercube, or scrambled Sobol sequence.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -8,21 +8,22 @@ use serde::{Deserialize, Serialize};
 use super::sobol_sequence::{MOST_DIMENSIONS, sobol_sequence};
 use crate::random::Stream;
 
-/// How samples are drawn.
+/// Sampling method.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// Independently. Intervals of confidence hold as they are told.
+    /// Independent random samples; confidence intervals have their stated level.
     #[default]
     Random,
-    /// Of every parameter, one value in each of as many equally probable ranges as there are samples. Means are more
-    /// accurate than intervals of confidence say.
+    /// Latin hypercube: one value of every parameter in each of as many equally probable ranges as there are samples.
+    /// Means are more accurate than the stated confidence intervals.
     LatinHypercube,
-    /// A Sobol sequence with a random digital shift; the same remark. Up to 21 parameters; more are drawn at random.
+    /// Sobol sequence with a random digital shift. Means are more accurate than the stated confidence intervals. Up to
+    /// 21 parameters; with more, samples are random.
     Sobol,
 }
 
-/// `count` points of the open unit cube.
+/// Returns `count` points of the open unit cube.
 pub fn draw(method: Sampling, count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
     match method {
         Sampling::Sobol if dimensions <= MOST_DIMENSIONS => shifted(count, dimensions, random),
@@ -33,22 +34,24 @@ pub fn draw(method: Sampling, count: usize, dimensions: usize, random: &mut Stre
     }
 }
 
-/// Away from the ends, where quantiles may be infinite.
+/// Returns `u` clamped away from 0 and 1, where quantiles may be infinite.
 fn inner(u: f64) -> f64 {
     u.clamp(f64::EPSILON, 1.0 - f64::EPSILON)
 }
 
-/// Every coordinate has all its digits changed by the same random ones, so that each point is uniform and together they
-/// still fill the cube evenly. Source: C. Lemieux, Monte Carlo and Quasi-Monte Carlo Sampling (2009), section 6.2.
+/// Returns a Sobol sequence in which the digits of every coordinate are changed by the same random ones.
+///
+/// Each point then is uniformly distributed, and together the points still fill the cube evenly. Source: C. Lemieux,
+/// Monte Carlo and Quasi-Monte Carlo Sampling (2009), section 6.2.
 fn shifted(count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
     let shifts: Vec<u32> = (0..dimensions).map(|_| random.random()).collect();
-    // The middle of the cell that 32 digits leave.
+    // Centre of the cell at a resolution of 32 digits.
     let fraction = |x: u32| (f64::from(x) + 0.5) / 4_294_967_296.0;
     let points = sobol_sequence(count, dimensions).into_iter();
     points.map(|point| point.iter().zip(&shifts).map(|(x, shift)| fraction(x ^ shift)).collect()).collect()
 }
 
-/// Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245.
+/// Returns a Latin hypercube. Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245.
 #[allow(clippy::cast_precision_loss)]
 fn latin_hypercube(count: usize, dimensions: usize, random: &mut Stream) -> Vec<Vec<f64>> {
     let mut points = vec![vec![0.0; dimensions]; count];
@@ -78,7 +81,8 @@ mod tests {
         }
     }
 
-    /// The mean of `u1 u2` is 1/4. Independent draws err by 0.0069 (one standard deviation), the others by less.
+    /// Checks the mean of `u1 u2`, which is 1/4. Independent samples have a standard error of 0.0069, the others a
+    /// smaller one.
     #[test]
     fn means_are_those_of_the_uniform_distribution() {
         for (method, error) in ALL.into_iter().zip([0.021, 0.01, 0.001]) {

@@ -1,24 +1,24 @@
-//! Confidence intervals of shares.
+//! Confidence intervals of probabilities.
 
 use super::distributions::{beta_cdf, beta_quantile};
 
-/// Clopper-Pearson interval of a probability from `hits` in `count` independent trials: it contains the truth with at least
-/// the probability `level`.
+/// Returns the Clopper-Pearson interval of a probability from `hits` in `count` independent trials. The interval
+/// contains the true value with at least the probability `level`.
 ///
-/// Source: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404-413; ends by quantiles of beta distributions.
+/// Source: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404-413; ends from quantiles of beta distributions.
 ///
 /// # Panics
 /// If there are more hits than trials, or no trial.
 #[allow(clippy::cast_precision_loss)]
 pub fn share_interval(hits: usize, count: usize, level: f64) -> [f64; 2] {
-    assert!(count > 0 && hits <= count, "hits are counted among trials");
+    assert!(count > 0 && hits <= count, "`hits` must be at most `count`, and `count` positive");
     let (k, n, tail) = (hits as f64, count as f64, 0.5 * (1.0 - level));
     let low = if hits == 0 { 0.0 } else { beta_quantile(tail, k, n - k + 1.0) };
     let high = if hits == count { 1.0 } else { beta_quantile(1.0 - tail, k + 1.0, n - k) };
     [low, high]
 }
 
-/// Probability of at most `hits` in `count` trials of probability `p`.
+/// Returns the probability of at most `hits` in `count` trials of probability `p`.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn at_most(hits: usize, count: usize, p: f64) -> f64 {
     if hits >= count {
@@ -32,8 +32,8 @@ mod tests {
     use super::*;
     use crate::math;
 
-    /// No hit: `1 - (alpha/2)^(1/n)`. Five of ten: 0.1870860, 0.8129140 (R, binom.test). 263 of 300 by the sum of the
-    /// binomial distribution at the ends.
+    /// Checks no hit: `1 - (alpha/2)^(1/n)`. Five of ten: 0.1870860, 0.8129140 (R, binom.test). 263 of 300 against the
+    /// sum of the binomial distribution at the ends.
     #[test]
     fn the_interval_is_that_of_clopper_and_pearson() {
         let [low, high] = share_interval(0, 20, 0.95);

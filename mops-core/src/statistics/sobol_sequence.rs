@@ -1,13 +1,13 @@
-//! The Sobol sequence: points that fill the unit cube evenly.
+//! Sobol sequence: points that fill the unit cube evenly.
 
-/// More dimensions than this are not tabulated.
+/// Largest number of tabulated dimensions.
 pub const MOST_DIMENSIONS: usize = 21;
 
-/// Bits of a coordinate.
+/// Number of bits of a coordinate.
 const BITS: usize = 32;
 
-/// From the second dimension on: degree of the primitive polynomial, its inner coefficients as bits, and the first direction
-/// numbers.
+/// Degree of the primitive polynomial, its inner coefficients as bits, and the first direction numbers, from the second
+/// dimension on.
 ///
 /// Source: S. Joe, F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections, SIAM Journal on
 /// Scientific Computing 30 (2008) 2635-2654; table new-joe-kuo-6.21201.
@@ -34,11 +34,11 @@ const TABLE: [(usize, u32, &[u32]); MOST_DIMENSIONS - 1] = [
     (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
 ];
 
-/// The first `count` points in `dimensions` dimensions, as 32-bit fractions, in the order of the Gray code; the first is
+/// Returns the first `count` points in `dimensions` dimensions, as 32-bit fractions, in Gray-code order; the first is
 /// the origin.
 ///
-/// Source: as the table; I. A. Antonov, V. M. Saleev, USSR Computational Mathematics and Mathematical Physics 19 (1979)
-/// 252-256 (the order of the Gray code: each point differs from the one before by one direction number).
+/// In this order each point differs from its predecessor by one direction number. Source: that of the table; I. A.
+/// Antonov, V. M. Saleev, USSR Computational Mathematics and Mathematical Physics 19 (1979) 252-256 (Gray-code order).
 ///
 /// # Panics
 /// For more than [`MOST_DIMENSIONS`] dimensions.
@@ -56,7 +56,7 @@ pub fn sobol_sequence(count: usize, dimensions: usize) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// Direction numbers `v_k = m_k 2^-k`, with
+/// Returns the direction numbers `v_k = m_k 2^-k`, with
 /// `m_k = 2 a_1 m_(k-1) ^ 4 a_2 m_(k-2) ^ ... ^ 2^(s-1) a_(s-1) m_(k-s+1) ^ 2^s m_(k-s) ^ m_(k-s)`.
 fn directions(dimension: usize) -> [u32; BITS] {
     assert!(dimension < MOST_DIMENSIONS, "a Sobol sequence has at most {MOST_DIMENSIONS} dimensions here");
@@ -80,7 +80,7 @@ fn directions(dimension: usize) -> [u32; BITS] {
 mod tests {
     use super::*;
 
-    /// The points printed with the authors' generator for three dimensions.
+    /// Checks the points published with the authors' generator for three dimensions.
     #[test]
     fn the_first_points_are_the_published_ones() {
         let found: Vec<Vec<f64>> = sobol_sequence(8, 3)
@@ -100,7 +100,8 @@ mod tests {
         assert_eq!(found, published);
     }
 
-    /// What a wrong direction number would break: of `2^k` points one lies in each of `2^k` equal intervals.
+    /// Checks that of `2^k` points one lies in each of `2^k` equal intervals; a wrong direction number would break
+    /// this.
     #[test]
     fn every_coordinate_of_a_power_of_two_of_points_fills_its_axis_evenly() {
         for k in [1u32, 4, 7, 10] {

@@ -2,14 +2,15 @@
 
 use super::distributions::{beta_quantile, normal_quantile};
 
-/// Degrees of freedom from which on the quantiles are those of the normal distribution: they differ by less than 1e-6 of
-/// themselves up to the 0.9999 quantile.
+/// Degrees of freedom from which on normal quantiles are used. The relative difference is below 1e-6 up to the 0.9999
+/// quantile.
 ///
-/// Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.5: `t = z + (z^3 + z)/(4 freedom) + ..`.
+/// Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.5:
+/// `t = z + (z^3 + z)/(4 freedom) + ..`.
 const NORMAL: f64 = 1e7;
 
-/// The value that a share `p` of Student's t distribution with `freedom` degrees of freedom does not exceed; with infinitely
-/// many, of the normal distribution.
+/// Returns the `p` quantile of Student's t distribution with `freedom` degrees of freedom; of the normal distribution
+/// if `freedom` is infinite.
 ///
 /// Source: Abramowitz and Stegun, 26.7.1: `t^2/(freedom + t^2)` has the beta distribution with 1/2 and freedom/2.
 pub fn t_quantile(p: f64, freedom: f64) -> f64 {
@@ -27,8 +28,8 @@ pub fn t_quantile(p: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Published: 2.228139 with 10, 12.706205 with 1, 1.983972 with 100 degrees of freedom, 1.959964 of the normal
-    /// distribution.
+    /// Checks published quantiles: 2.228139 with 10, 12.706205 with 1, 1.983972 with 100 degrees of freedom, 1.959964
+    /// of the normal distribution.
     #[test]
     fn quantiles_are_the_published_ones() {
         for (freedom, published) in

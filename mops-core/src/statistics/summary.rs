@@ -1,14 +1,14 @@
-//! What a sample tells of the distribution it was drawn from.
+//! Summary statistics and quantiles of a sample.
 
 use super::share::at_most;
 use crate::math;
 
-/// Mean, spread and ends of a sample.
+/// Mean, spread and range of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
     /// Mean.
     pub mean: f64,
-    /// Standard deviation: the root of the sum of squared differences from the mean over `n - 1`.
+    /// Standard deviation: the square root of the sum of squared differences from the mean over `n - 1`.
     pub deviation: f64,
     /// Smallest value.
     pub min: f64,
@@ -17,7 +17,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of a sample; NaN throughout where it is empty.
+    /// Summarises a sample; all fields are NaN for an empty one.
     #[allow(clippy::cast_precision_loss)]
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
@@ -29,7 +29,7 @@ impl Summary {
     }
 }
 
-/// The quantile of a sorted sample: linear between its values, the smallest at 0 and the largest at 1.
+/// Returns the quantile of a sorted sample by linear interpolation, with the smallest value at 0 and the largest at 1.
 ///
 /// Source: R. J. Hyndman, Y. Fan, The American Statistician 50 (1996) 361-365, definition 7.
 ///
@@ -43,11 +43,14 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// Confidence interval of a quantile, whatever the distribution: two values of the sorted sample, between which the quantile
-/// lies with at least the probability `level`. An end is NaN where the sample is too small to have one.
+/// Returns the distribution-free confidence interval of a quantile.
 ///
-/// How many of n independent values lie below the quantile of p is binomial: the r-th smallest exceeds the quantile with
-/// the probability that fewer than r do. Source: H. A. David, H. N. Nagaraja, Order Statistics, 3rd edition (2003), 7.1.
+/// Its ends are two values of the sorted sample, between which the quantile lies with at least the probability `level`.
+/// An end is NaN if the sample is too small.
+///
+/// The number of n independent values below the quantile of p is binomial. The r-th smallest value exceeds the quantile
+/// with the probability that fewer than r lie below it. Source: H. A. David, H. N. Nagaraja, Order Statistics, 3rd
+/// edition (2003), 7.1.
 pub fn quantile_interval(sorted: &[f64], p: f64, level: f64) -> [f64; 2] {
     let (n, tail) = (sorted.len(), 0.5 * (1.0 - level));
     // Largest r with P(at most r - 1 below) <= tail, smallest s with P(at most s - 1 below) >= 1 - tail.
@@ -73,7 +76,7 @@ mod tests {
         assert_eq!([0.0, 0.5, 0.9, 1.0].map(|p| (quantile(&sorted, p) * 1e9).round() / 1e9), [1.0, 3.0, 6.8, 8.0]);
     }
 
-    /// Published ranks for the median of 20 values at 95 %: 6 and 15; of 5 values there is no such interval.
+    /// Checks the published ranks for the median of 20 values at 95 %: 6 and 15; for 5 values no such interval exists.
     #[test]
     fn the_interval_of_a_median_is_between_published_ranks() {
         let sorted: Vec<f64> = (1..=20).map(f64::from).collect();

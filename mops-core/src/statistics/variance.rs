@@ -1,4 +1,4 @@
-//! Shares of a variance by the inputs of a function: Sobol indices.
+//! Variance-based sensitivity: Sobol indices of the inputs of a function.
 
 use rand::Rng;
 
@@ -7,12 +7,12 @@ use super::summary::quantile;
 use crate::math;
 use crate::random::Stream;
 
-/// Shares of the variance that one input accounts for.
+/// Sobol indices of one input: its shares of the variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VarianceShares {
-    /// By the input alone.
+    /// First-order index: share of the input alone.
     pub first: f64,
-    /// By the input alone and together with others.
+    /// Total index: share of the input alone and in interaction with others.
     pub total: f64,
     /// Bootstrap interval of `first`.
     pub first_interval: [f64; 2],
@@ -20,8 +20,10 @@ pub struct VarianceShares {
     pub total_interval: [f64; 2],
 }
 
-/// Points of the unit cube at which a function is evaluated: for each of `count` samples a point of `A`, one of `B`, and one
-/// for every input: that of `A` with this input from `B`.
+/// Returns the points of the unit cube at which a function is evaluated.
+///
+/// Each of `count` samples has a point of `A` and a point of `B`. For every input it also has the point of `A` with
+/// this input from `B`.
 pub fn radial(count: usize, inputs: usize, random: &mut Stream) -> Vec<Vec<Vec<f64>>> {
     let of_sample = |both: Vec<f64>| {
         let (a, b) = both.split_at(inputs);
@@ -35,21 +37,22 @@ pub fn radial(count: usize, inputs: usize, random: &mut Stream) -> Vec<Vec<Vec<f
     draw(Sampling::Sobol, count, 2 * inputs, random).into_iter().map(of_sample).collect()
 }
 
-/// Shares of the variance from the values at the points of [`radial`]: for every sample those at `A`, at `B`, and one for
-/// every input. `None` where the values do not vary.
+/// Returns the Sobol indices from the values at the points of [`radial`]: per sample the values at `A`, at `B`, and one
+/// per input. Returns `None` if the values do not vary.
 ///
 /// ```text
 /// first_i = mean(f(B) (f(A_B^i) - f(A))) / V        total_i = mean((f(A) - f(A_B^i))^2) / (2 V)
 /// ```
 ///
-/// with V the variance of all f(A) and f(B), and the values counted from their mean. The intervals are percentiles over
-/// `replicates` bootstrap samples of the samples.
+/// with V the variance of all f(A) and f(B), and values relative to their mean. The intervals are percentiles over
+/// `replicates` bootstrap resamples of the samples.
 ///
-/// Source: A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola, Computer Physics Communications 181
-/// (2010) 259-270, table 2 (b) and (f); the latter by M. J. W. Jansen, Computer Physics Communications 117 (1999) 35-43.
+/// Source: A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola, Computer Physics Communications
+/// 181 (2010) 259-270, table 2 (b) and (f); the latter by M. J. W. Jansen, Computer Physics Communications 117 (1999)
+/// 35-43.
 ///
 /// # Panics
-/// If the samples have different lengths, or fewer than three.
+/// If the samples have different lengths, or fewer than three values.
 pub fn variance_shares(
     values: &[Vec<f64>],
     level: f64,
@@ -80,7 +83,7 @@ pub fn variance_shares(
     Some(found.into_iter().enumerate().map(of_input).collect())
 }
 
-/// First and total share of every input over the samples named.
+/// Returns the first and total index of every input over the given samples.
 #[allow(clippy::cast_precision_loss)]
 fn shares(values: &[Vec<f64>], samples: &[usize]) -> Option<Vec<[f64; 2]>> {
     let n = samples.len() as f64;
@@ -113,7 +116,8 @@ mod tests {
         variance_shares(&values, 0.95, 200, &mut stream(1, "bootstrap")).unwrap()
     }
 
-    /// `sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1`, x in (-pi, pi): the variances are known in closed form.
+    /// Checks `sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1`, x in (-pi, pi), whose variances are known in closed form.
+    ///
     /// Source: T. Ishigami, T. Homma, Proceedings of the First International Symposium on Uncertainty Modeling (1990).
     #[test]
     fn the_shares_of_the_ishigami_function_are_those_of_closed_forms() {
@@ -136,7 +140,8 @@ mod tests {
         }
     }
 
-    /// The g-function, product of `(|4 u - 2| + a) / (1 + a)`: partial variances `(1/3)/(1 + a)^2`.
+    /// Checks the g-function, a product of `(|4 u - 2| + a) / (1 + a)` with partial variances `(1/3)/(1 + a)^2`.
+    ///
     /// Source: A. Saltelli, I. M. Sobol, Reliability Engineering and System Safety 50 (1995) 225-239.
     #[test]
     fn the_shares_of_the_g_function_are_those_of_closed_forms() {

@@ -1,23 +1,23 @@
-//! What `task = "diagnosis"` is asked: as it is written down, and checked.
+//! Settings of `task = "diagnosis"`, and their check.
 
 use super::{Study, Task};
 use crate::experiment::Role;
 use crate::mistake::Mistake;
 use crate::model::AnalysisKind;
 
-/// More effects than this are never added at once.
+/// Maximum number of effects that a diagnosis adds.
 const MOST_EFFECTS: usize = 6;
 
-/// How the search for what a model lacks goes.
+/// Settings of the search for missing effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnosisTask {
-    /// Largest number of effects that are added, from 1 up.
+    /// Maximum number of added effects, at least 1.
     pub max_effects: usize,
-    /// Probability with which something counts as missing where nothing is.
+    /// False-alarm probability: the significance level of the tests for missing effects.
     pub level: f64,
-    /// Kinds of effect that are tried; all of the catalogue where absent.
+    /// Kinds of effect to try; `None` for the whole catalogue.
     pub effects: Option<Vec<String>>,
-    /// Kinds of effect that are not tried.
+    /// Kinds of effect to exclude.
     pub without: Vec<String>,
 }
 
@@ -28,52 +28,53 @@ impl Default for DiagnosisTask {
 }
 
 impl DiagnosisTask {
-    /// Whether a kind of effect is tried.
+    /// Returns true if a kind of effect is tried.
     pub fn tries(&self, effect: &str) -> bool {
         let named = |list: &[String]| list.iter().any(|name| name == effect);
         self.effects.as_deref().is_none_or(named) && !named(&self.without)
     }
 }
 
-/// Checks the numbers; that the names are those of effects is checked where the catalogue is known.
+/// Checks the numbers. The names of effects are checked elsewhere, with the catalogue.
 pub(super) fn check(task: DiagnosisTask, study: &Study) -> Result<DiagnosisTask, Mistake> {
     let within = |mistake: Mistake| mistake.within("diagnosis");
     if !(1..=MOST_EFFECTS).contains(&task.max_effects) {
-        let fact = format!("a diagnosis adds 1 to {MOST_EFFECTS} effects, not {}", task.max_effects);
-        let help = "3, the default, is more than most data can tell apart";
+        let fact = format!("expected 1 to {MOST_EFFECTS} effects, found {}", task.max_effects);
+        let help = "most data cannot distinguish more effects than the default 3";
         return Err(within(Mistake::new("max-effects", fact).with_help(help)));
     }
     if !(task.level > 0.0 && task.level <= 0.2) {
-        let fact = format!("the probability of a false alarm lies between 0 and 0.2, not at {}", task.level);
-        let help = "0.01, the default, lets one sound model in a hundred count as lacking something";
+        let fact = format!("expected a false-alarm probability above 0 and at most 0.2, found {}", task.level);
+        let help = "with the default 0.01, one complete model in a hundred is reported as incomplete";
         return Err(within(Mistake::new("level", fact).with_help(help)));
     }
     if task.effects.as_ref().is_some_and(Vec::is_empty) {
-        return Err(within(
-            Mistake::new("effects", "no effect is left to try").with_help("leave `effects` out to try them all"),
-        ));
+        return Err(within(Mistake::new("effects", "`effects` is empty").with_help("omit `effects` to try all")));
     }
     if let Some(name) = task.without.iter().find(|name| task.effects.iter().flatten().any(|e| e == *name)) {
-        let fact = format!("`{name}` is both named and left out");
-        let help = "remove it from `effects` or from `without`";
+        let fact = format!("`{name}` is in both `effects` and `without`");
+        let help = "remove it from one of them";
         return Err(within(Mistake::new(name, fact).with_help(help).within("without")));
     }
     if study.task == Task::Diagnosis {
         let measured = study.cases.iter().filter_map(|case| case.experiment.as_ref());
         if !measured.clone().any(|experiment| !experiment.channels.is_empty()) {
             let help = "add one under [experiments], with a `file` and the measured signals as `channels`";
-            return Err(Mistake::new("experiments", "nothing was measured over time: there is no residual to look at")
-                .with_help(help));
+            return Err(Mistake::new(
+                "experiments",
+                "no experiment measures a signal over time, so that there are no residuals",
+            )
+            .with_help(help));
         }
         if !measured.clone().any(|e| e.role == Role::Calibration && !e.channels.is_empty()) {
-            return Err(Mistake::new("experiments", "no experiment is there to estimate parameters from")
-                .with_help("leave `role` out of at least one of them, or say role = \"calibration\""));
+            return Err(Mistake::new("experiments", "no calibration experiment measures a signal over time")
+                .with_help("omit `role` in at least one experiment, or set role = \"calibration\""));
         }
     }
     Ok(task)
 }
 
-/// What experiments measure of models that are simulated: model, case, signals.
+/// Returns the measured signals of simulated models: model, case, signals.
 pub(super) fn measured(study: &Study) -> Vec<(usize, usize, Vec<String>)> {
     let mut jobs = Vec::new();
     for (case, experiment) in study.cases.iter().enumerate().filter_map(|(i, c)| Some((i, c.experiment.as_ref()?))) {

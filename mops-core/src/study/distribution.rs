@@ -1,46 +1,46 @@
-//! What is known of an uncertain parameter: its range, and how its values are distributed.
+//! Uncertain parameters: range and distribution.
 
 use crate::math;
 use crate::statistics::{normal_cdf, normal_quantile};
 use crate::unit::Unit;
 
-/// A parameter of models, or a tuner, that is not known exactly.
+/// An uncertain parameter of models, or an uncertain tuner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertain {
-    /// Name of the parameter, or of the tuner.
+    /// Name of the parameter or tuner.
     pub name: String,
-    /// The tuner, by index, where it is one.
+    /// Index of the tuner, if the parameter is a tuner.
     pub tuner: Option<usize>,
     /// Unit of all numbers.
     pub unit: Unit,
-    /// Smallest and largest value; infinite where there is none.
+    /// Smallest and largest value; infinite if unbounded.
     pub bounds: [f64; 2],
-    /// Of a tuner: the share of its value by which it is off at most; the bounds follow from the design.
+    /// Largest relative deviation of a tuner from its value; the bounds follow from the design.
     pub tolerance: Option<f64>,
-    /// How values are distributed.
+    /// Distribution of the values.
     pub distribution: Distribution,
 }
 
-/// How the values of an uncertain parameter are distributed; what lies outside its bounds is cut off.
+/// Distribution of an uncertain parameter, truncated at the bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distribution {
-    /// Evenly between the bounds.
+    /// Uniform between the bounds.
     Uniform,
-    /// `exp(-(x - mean)^2 / (2 deviation^2))`.
+    /// Normal, with the density proportional to `exp(-(x - mean)^2 / (2 deviation^2))`.
     Normal {
         /// Mean.
         mean: f64,
         /// Standard deviation.
         deviation: f64,
     },
-    /// The logarithm is normal.
+    /// Log-normal: the logarithm is normal.
     LogNormal {
         /// Median.
         median: f64,
         /// Standard deviation of the natural logarithm.
         deviation: f64,
     },
-    /// Rises linearly from the lower bound to the mode, and falls to the upper one.
+    /// Triangular: the density rises linearly from the lower bound to the mode and falls to the upper bound.
     Triangular {
         /// Most probable value.
         mode: f64,
@@ -48,7 +48,8 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// Probability of a value up to `x`, nothing cut off but by `bounds` where the distribution needs them.
+    /// Returns the probability of a value up to `x`, without truncation; `bounds` only define uniform and triangular
+    /// distributions.
     pub(super) fn below(self, x: f64, [min, max]: [f64; 2]) -> f64 {
         match self {
             Self::Uniform => ((x - min) / (max - min)).clamp(0.0, 1.0),
@@ -72,7 +73,7 @@ impl Distribution {
         }
     }
 
-    /// The value that a share `p` of the values does not exceed.
+    /// Returns the `p` quantile, without truncation.
     fn quantile(self, p: f64, [min, max]: [f64; 2]) -> f64 {
         match self {
             Self::Uniform => min + p * (max - min),
@@ -91,19 +92,19 @@ impl Distribution {
 }
 
 impl Uncertain {
-    /// The value that a share `p` in (0, 1) of the values does not exceed.
+    /// Returns the `p` quantile of the truncated distribution, for `p` in (0, 1).
     pub fn quantile(&self, p: f64) -> f64 {
         let [low, high] = self.bounds.map(|bound| self.distribution.below(bound, self.bounds));
         let value = self.distribution.quantile(low + p * (high - low), self.bounds);
         value.clamp(self.bounds[0], self.bounds[1])
     }
 
-    /// Whether both bounds are finite.
+    /// Returns true if both bounds are finite.
     pub fn is_bounded(&self) -> bool {
         self.tolerance.is_some() || self.bounds.iter().all(|bound| bound.is_finite())
     }
 
-    /// The same for a design: a tolerance becomes bounds.
+    /// Returns the uncertain parameter for a design: a tolerance becomes bounds.
     pub(super) fn at(&self, tuners: &[f64]) -> Self {
         let mut settled = self.clone();
         if let (Some(share), Some(tuner)) = (self.tolerance, self.tuner) {
@@ -146,8 +147,8 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_the_bounds_is_cut_off() {
-        // Half a normal distribution: its median is the upper quartile of the whole.
+    fn distributions_are_truncated_at_the_bounds() {
+        // The median of half a normal distribution is the upper quartile of the full one.
         let half = uncertain(Distribution::Normal { mean: 0.0, deviation: 1.0 }, [0.0, f64::INFINITY]);
         assert!((half.quantile(0.5) - 0.674_489_750_196_081_7).abs() < 1e-9);
         let narrow = uncertain(Distribution::Normal { mean: 0.0, deviation: 1.0 }, [-0.1, 0.3]);

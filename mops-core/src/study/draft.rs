@@ -1,4 +1,4 @@
-//! A study as it is written down, in a file or in Rust: nothing checked yet.
+//! Drafts: studies as written in a file or in Rust, not yet checked.
 
 use super::{Study, Task, TasksDraft};
 use crate::catalogue::Catalogue;
@@ -11,14 +11,14 @@ use crate::placement::EffectDraft;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 
-/// A study as it is written down. [`Draft::build`] checks it.
+/// A study as written, not yet checked. [`Draft::build`] checks it.
 #[derive(Default)]
 pub struct Draft {
     /// Name.
     pub name: String,
-    /// What it is for.
+    /// Task.
     pub task: Task,
-    /// How scaled values are combined; by the task where absent.
+    /// Combination of the scaled values into the objective; `None` for the default of the task.
     pub objective: Option<Objective>,
     /// Seed of all random streams.
     pub seed: u64,
@@ -30,15 +30,15 @@ pub struct Draft {
     pub cases: Vec<CaseDraft>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionDraft)>,
-    /// What tasks other than design and calibration are asked.
+    /// Settings of the tasks other than design and calibration.
     pub tasks: TasksDraft,
 }
 
 impl Draft {
-    /// Checks every name, size, bound and unit.
+    /// Checks all names, sizes, bounds and units.
     ///
     /// # Errors
-    /// The first mistake, with the keys that lead to it.
+    /// Returns the first error, with the path of keys to its location.
     pub fn build(self) -> Result<Study, Mistake> {
         super::build::build(self)
     }
@@ -48,15 +48,15 @@ impl Draft {
 pub struct ModelDraft {
     /// The model.
     pub model: Box<dyn Model>,
-    /// Values that hold unless a tuner or a case sets the parameter.
+    /// Parameter values, used unless a tuner or a case sets the parameter.
     pub parameters: Vec<(String, Quantity)>,
 }
 
 impl ModelDraft {
-    /// Adds effects at places of the model; each strength is a parameter `name.strength`.
+    /// Adds effects at places of the model; each effect parameter is a model parameter `name.strength`.
     ///
     /// # Errors
-    /// As [`Catalogue::with_effects`].
+    /// Returns an error as [`Catalogue::with_effects`] does.
     pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectDraft]) -> Result<Self, Mistake> {
         Ok(Self { model: catalogue.with_effects(self.model.into(), effects)?, ..self })
     }
@@ -68,40 +68,40 @@ impl<M: Model + 'static> From<M> for ModelDraft {
     }
 }
 
-/// A tuner as it is written down.
+/// A tuner as written, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct TunerDraft {
-    /// Value at the start.
+    /// Initial guess.
     pub start: Option<Quantity>,
     /// Smallest value.
     pub min: Option<Quantity>,
     /// Largest value.
     pub max: Option<Quantity>,
-    /// Unit; the parameter's where absent.
+    /// Unit; `None` for the unit of the parameter.
     pub unit: Option<Unit>,
-    /// How the range is spread.
+    /// Mapping of the range to [0, 1].
     pub scale: Scale,
-    /// Whole numbers only.
+    /// True for integers only.
     pub integer: bool,
-    /// These values only.
+    /// Allowed values, if the tuner is restricted to a list.
     pub values: Option<Vec<Quantity>>,
-    /// Kept at its start value.
+    /// True if the tuner keeps its initial guess.
     pub inactive: bool,
-    /// Follows from other tuners.
+    /// Expression in other tuners that sets this tuner.
     pub tie: Option<String>,
-    /// One of its own for every case.
+    /// True for a separate tuner in every case.
     pub per_case: bool,
-    /// Values at the start in cases that begin elsewhere, by name.
+    /// Initial guesses of single cases, by name of the case.
     pub starts: Vec<(String, Quantity)>,
 }
 
 impl TunerDraft {
-    /// A tuner that starts at `start` and stays between `min` and `max`.
+    /// Creates a tuner with the initial guess `start` and the bounds `min` and `max`.
     pub fn new(start: f64, min: f64, max: f64) -> Self {
         Self { start: Some(start.into()), min: Some(min.into()), max: Some(max.into()), ..Self::default() }
     }
 
-    /// Spreads the range evenly in the logarithm.
+    /// Makes the mapping of the range logarithmic.
     #[must_use]
     pub fn log(mut self) -> Self {
         self.scale = Scale::Log;
@@ -109,42 +109,42 @@ impl TunerDraft {
     }
 }
 
-/// A case or an experiment as it is written down.
+/// A case or an experiment as written, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct CaseDraft {
     /// Name.
     pub name: String,
-    /// Parameter values that hold in it.
+    /// Parameter values of the case.
     pub parameters: Vec<(String, Quantity)>,
-    /// Inputs, with the unit of their values where one is given.
+    /// Inputs, with the unit of their values if one is given.
     pub inputs: Vec<(String, Input, Option<Unit>)>,
     /// End of the simulation, s.
     pub horizon: Option<f64>,
-    /// What was measured; this makes it an experiment.
+    /// Measurement; `Some` makes the case an experiment.
     pub measured: Option<Measured>,
-    /// What deserves a word before a run.
+    /// Warnings shown before a run.
     pub warnings: Vec<String>,
 }
 
-/// What an experiment brings.
+/// Data of an experiment.
 #[derive(Debug, Clone, Default)]
 pub struct Measured {
     /// Measured signals.
     pub channels: Vec<ChannelDraft>,
     /// Measured frequency responses.
     pub responses: Vec<ResponseData>,
-    /// What it is used for.
+    /// Role of the experiment.
     pub role: Role,
-    /// States whose start values are estimated.
+    /// States whose initial values are estimated.
     pub free: Vec<Free>,
 }
 
-/// A state whose start value is estimated; what is absent is read off the data.
+/// A state whose initial value is estimated; absent values are derived from the data.
 #[derive(Debug, Clone, Default)]
 pub struct Free {
     /// Name of the state.
     pub state: String,
-    /// First guess.
+    /// Initial guess.
     pub start: Option<Quantity>,
     /// Smallest value.
     pub min: Option<Quantity>,
@@ -152,32 +152,32 @@ pub struct Free {
     pub max: Option<Quantity>,
 }
 
-/// A measured signal as it is written down.
+/// A measured signal as written, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct ChannelDraft {
-    /// The model's signal.
+    /// Signal of the model.
     pub signal: String,
     /// Times, s, increasing.
     pub times: Vec<f64>,
-    /// Samples; NaN is a gap.
+    /// Samples; NaN for a missing sample.
     pub values: Vec<f64>,
-    /// Unit of the samples; the signal's where absent.
+    /// Unit of the samples; `None` for the unit of the signal.
     pub unit: Option<Unit>,
     /// Standard deviation of the noise.
     pub noise: Option<Quantity>,
 }
 
-/// A criterion with what the study does with it.
+/// A criterion with its usage in the study.
 pub struct CriterionDraft {
-    /// What computes the value.
+    /// Criterion that computes the value.
     pub criterion: Box<dyn CriterionSpec>,
-    /// The model it reads; the only one where absent.
+    /// Model that the criterion reads; `None` for the only one.
     pub model: Option<String>,
-    /// The cases it is evaluated in; all where absent.
+    /// Cases in which the criterion is evaluated; `None` for all.
     pub cases: Option<Vec<String>>,
-    /// What the study does with it.
+    /// Usage of the criterion in the study.
     pub usage: Usage,
-    /// The value to reach.
+    /// Demand.
     pub demand: Option<Quantity>,
     /// Value that scales to 0.
     pub good: Option<Quantity>,
@@ -188,7 +188,7 @@ pub struct CriterionDraft {
 }
 
 impl CriterionDraft {
-    /// A criterion to be minimised, with a demand in its own unit.
+    /// Creates a criterion to be minimised, with a demand in its own unit.
     pub fn minimise(criterion: impl CriterionSpec + 'static, demand: f64) -> Self {
         Self {
             criterion: Box::new(criterion),
@@ -202,7 +202,7 @@ impl CriterionDraft {
         }
     }
 
-    /// Gives it another usage.
+    /// Sets another usage.
     #[must_use]
     pub fn used_as(mut self, usage: Usage) -> Self {
         self.usage = usage;

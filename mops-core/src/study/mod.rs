@@ -1,4 +1,4 @@
-//! A study: models, cases, tuners and criteria that belong together. Once built, it is valid.
+//! Studies: models, cases, tuners and criteria that belong together. A [`Study`] is valid once built.
 
 mod build;
 mod diagnosis;
@@ -35,83 +35,83 @@ use crate::scalar::Scalar;
 use crate::tuner::Tuner;
 use crate::unit::Unit;
 
-/// What a study is for.
+/// Task of a study.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Task {
-    /// Choose the tuners so that the worst scaled criterion is as small as it can be.
+    /// Choose the tuners that minimise the worst scaled criterion.
     #[default]
     Design,
     /// Estimate the tuners from measurements.
     Calibration,
-    /// Tell how rich the inputs are.
+    /// Report the order of persistent excitation of the inputs.
     Excitation,
-    /// Tell which tuners, or which combinations of them, the criteria or the data determine.
+    /// Report which tuners, or which combinations of them, the criteria or the data determine.
     Sensitivity,
-    /// Draw the objective over one tuner or two.
+    /// Compute the objective over one or two tuners.
     Sweep,
     /// Find the physical effect that the model lacks.
     Diagnosis,
     /// Find the largest scaled value of every criterion over a box of uncertain parameters.
     WorstCase,
-    /// Tell how the criteria are distributed where parameters are uncertain.
+    /// Report the distributions of the criteria under uncertain parameters.
     MonteCarlo,
-    /// Find the designs that no other is better than in every criterion, and what one criterion costs in terms of another.
+    /// Find the Pareto front (non-dominated designs) and the trade-offs between criteria.
     Pareto,
 }
 
-/// A study whose every name, size, bound and unit has been checked.
+/// A study with all names, sizes, bounds and units checked.
 #[derive(Clone)]
 pub struct Study {
     /// Name.
     pub name: String,
-    /// What it is for.
+    /// Task.
     pub task: Task,
-    /// How scaled values are combined.
+    /// Combination of the scaled values into the objective.
     pub objective: Objective,
     /// Seed of all random streams.
     pub seed: u64,
     /// Models, by name.
     pub models: Vec<(String, Arc<dyn Model>)>,
-    /// Cases.
+    /// Cases: situations in which the criteria are evaluated.
     pub cases: Vec<Case>,
-    /// Tuners: of the study first, then of single cases.
+    /// Tuners: first those of the study, then those of single cases.
     pub tuners: Vec<Tuner>,
-    /// One row per criterion and case.
+    /// Rows: one per criterion and case.
     pub rows: Vec<Row>,
-    /// One job per model and case that has a row.
+    /// Jobs: one per model and case with at least one row.
     pub jobs: Vec<JobPlan>,
-    /// What tasks other than design and calibration are asked.
+    /// Settings of the tasks other than design and calibration.
     pub tasks: Tasks,
-    /// What deserves a word before a run, such as a first sample that looks wrong.
+    /// Warnings shown before a run, such as a suspicious first sample.
     pub warnings: Vec<String>,
-    /// What was assumed where nothing was said, such as the unit of a column.
+    /// Assumptions made where the study specifies nothing, such as the unit of a column.
     pub notes: Vec<String>,
 }
 
-/// A criterion in one case.
+/// A criterion-case pair.
 #[derive(Clone)]
 pub struct Row {
     /// Name of the criterion.
     pub name: String,
-    /// The job whose analysis it reads, by index into [`Study::jobs`].
+    /// Job whose analysis the criterion reads, as index into [`Study::jobs`].
     pub job: usize,
-    /// What computes the value.
+    /// Criterion that computes the value.
     pub criterion: Arc<dyn Criterion>,
-    /// What the study does with it.
+    /// Usage of the criterion in the study.
     pub usage: Usage,
-    /// How it is scaled.
+    /// Demand that scales the value.
     pub demand: Demand,
-    /// Whether its scaled value counts with the other sign: where the worst of it is sought.
+    /// True if the scaled value counts with reversed sign, as in a search for its worst case.
     pub reversed: bool,
-    /// Weight of its scaled value in the objective.
+    /// Weight of the scaled value in the objective.
     pub weight: f64,
     /// Unit of the value.
     pub unit: Unit,
 }
 
 impl Row {
-    /// The value of its criterion, under its demand.
+    /// Returns the reading of a value: the value scaled by the demand.
     pub fn reading(&self, value: &Value) -> Reading {
         let Scaled { value: scaled, slope } = self.demand.scaled(value);
         let sign = if self.reversed { -1.0 } else { 1.0 };
@@ -119,7 +119,7 @@ impl Row {
         Reading { value: number, scaled: sign * scaled, slope: sign * slope, note: value.note }
     }
 
-    /// Whether a scaled value meets what is asked for.
+    /// Returns true if a scaled value meets the demand.
     pub fn is_met(&self, scaled: f64) -> bool {
         match self.usage {
             _ if self.demand == Demand::None => true,
@@ -129,36 +129,36 @@ impl Row {
     }
 }
 
-/// A model in a case: what to analyse, and where its parameters come from.
+/// A model-case pair: the analysis to run, and the sources of its parameters.
 #[derive(Debug, Clone)]
 pub struct JobPlan {
     /// Index into [`Study::models`].
     pub model: usize,
     /// Index into [`Study::cases`].
     pub case: usize,
-    /// Where each of the model's parameters comes from.
+    /// Source of each parameter of the model.
     pub parameters: Vec<ParameterSource>,
-    /// Signals that criteria read, as indices into the model's.
+    /// Signals that criteria read, as indices into the signals of the model.
     pub signals: Vec<usize>,
     /// End of the simulation, s.
     pub horizon: f64,
 }
 
-/// Where the value of a model's parameter comes from.
+/// Source of the value of a model parameter.
 #[derive(Debug, Clone, Copy)]
 pub enum ParameterSource {
-    /// A number of the study, in the parameter's unit; not a number where the model computes it.
+    /// A constant of the study, in the unit of the parameter; NaN if the model computes the value.
     Constant(f64),
-    /// A tuner, times a factor that turns its unit into the parameter's.
+    /// A tuner, multiplied by a factor that converts its unit to the unit of the parameter.
     Tuner {
         /// Index into [`Study::tuners`].
         tuner: usize,
-        /// Factor.
+        /// Conversion factor between the units.
         factor: f64,
     },
 }
 
-/// Sources are equal by the bits of their numbers: one that the model computes is equal to itself.
+/// Equality compares the bits of the numbers: a NaN, for a value computed by the model, equals itself.
 impl PartialEq for ParameterSource {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
@@ -170,18 +170,18 @@ impl PartialEq for ParameterSource {
 }
 
 impl Study {
-    /// The key of a row in reports: `case/criterion`.
+    /// Returns the key of a row in reports: `case/criterion`.
     pub fn key(&self, row: &Row) -> String {
         format!("{}/{}", self.case_of(row).name, row.name)
     }
 
-    /// The case of a row.
+    /// Returns the case of a row.
     pub fn case_of(&self, row: &Row) -> &Case {
         &self.cases[self.jobs[row.job].case]
     }
 
-    /// Whether the same values of all tuners give the same values of all rows in both studies: they have the same models,
-    /// criteria, cases and tuners. Demands, usages and weights may differ, and the roles of experiments.
+    /// Returns true if equal tuner values give equal row values in both studies. This requires equal models, criteria, cases
+    /// and tuners; demands, usages, weights and roles of experiments may differ.
     pub fn measures_as(&self, other: &Self) -> bool {
         let same_case = |a: &Case, b: &Case| {
             (&a.name, &a.parameters, &a.inputs) == (&b.name, &b.parameters, &b.inputs)
@@ -207,19 +207,19 @@ impl Study {
             && same(&self.tuners, &other.tuners, same_tuner)
     }
 
-    /// Lets a request to end reach the simulations of this study, and of every study that is made from it.
+    /// Connects the simulations of this study, and of every study derived from it, to a cancellation request.
     pub fn cancelled_by(&mut self, cancellation: &Cancellation) {
         self.cases.iter_mut().for_each(|case| case.cancellation.clone_from(cancellation));
     }
 
-    /// Start values of all tuners, ties applied.
+    /// Returns the initial guess of all tuners, ties applied.
     pub fn start(&self) -> Vec<f64> {
         let mut values: Vec<f64> = self.tuners.iter().map(|t| t.start).collect();
         self.apply_ties(&mut values);
         values
     }
 
-    /// Sets every tied tuner from the ones it follows; expressions are evaluated in coherent units.
+    /// Sets every tied tuner from the tuners in its expression; expressions are evaluated in coherent units.
     pub fn apply_ties<S: Scalar>(&self, values: &mut [S]) {
         for (i, tuner) in self.tuners.iter().enumerate() {
             if let Some((expression, of)) = &tuner.tie {
@@ -235,7 +235,7 @@ impl Study {
         }
     }
 
-    /// Values of a job's parameters for given values of all tuners.
+    /// Returns the parameter values of a job for given values of all tuners.
     pub fn parameters(&self, job: &JobPlan, tuners: &[f64]) -> Vec<f64> {
         job.parameters
             .iter()
@@ -246,7 +246,7 @@ impl Study {
             .collect()
     }
 
-    /// Derivative of a job's parameters for a given derivative of all tuners.
+    /// Returns the derivative of a job's parameters for a given derivative of all tuners.
     pub fn parameter_slopes(&self, job: &JobPlan, tuners: &[f64]) -> Vec<f64> {
         let slope = |source: &ParameterSource| match *source {
             ParameterSource::Constant(_) => 0.0,
@@ -256,7 +256,7 @@ impl Study {
     }
 }
 
-/// Whether two lists are as long, and the same one by one.
+/// Returns true if two lists have equal length and pairwise equal elements.
 fn same<T>(a: &[T], b: &[T], alike: impl Fn(&T, &T) -> bool) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| alike(a, b))
 }

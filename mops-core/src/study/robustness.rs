@@ -1,4 +1,4 @@
-//! What the tasks over uncertain parameters are asked, and what a calibration is asked of its uncertainty.
+//! Settings of the tasks over uncertain parameters and of the uncertainty of a calibration, and their checks.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,19 +10,19 @@ use crate::evaluation::Objective;
 use crate::mistake::Mistake;
 use crate::statistics::Sampling;
 
-/// More samples than this are refused: nobody waits for them by intention.
+/// Maximum number of samples.
 const MOST_SAMPLES: usize = 10_000_000;
 
-/// What `task = "worst-case"` is asked.
+/// Settings of `task = "worst-case"`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorstCaseTask {
-    /// The design that is looked at.
+    /// Design to be examined.
     pub at: Place,
-    /// Names of the criteria whose worst is sought; all that count, or all where none counts, where absent.
+    /// Criteria for the worst-case search. `None` for every criterion that counts, or for all criteria if none counts.
     pub criteria: Option<Vec<String>>,
-    /// Points at which every criterion is looked at first; the corners of the box come on top.
+    /// Number of initial sample points per criterion, in addition to the corners of the box.
     pub samples: usize,
-    /// Local searches for every criterion.
+    /// Number of local searches per criterion.
     pub starts: usize,
 }
 
@@ -32,16 +32,16 @@ impl Default for WorstCaseTask {
     }
 }
 
-/// What a design against the worst cases is asked.
+/// Settings of a design against worst cases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobustTask {
-    /// Rounds of designing and searching, at most.
+    /// Maximum number of iterations of design and search.
     pub rounds: usize,
-    /// What a worst case may exceed the design's own worst by, in scaled values, without being added.
+    /// Tolerance in scaled values: a worst case is added only if it exceeds the present worst scaled value by more.
     pub tolerance: f64,
-    /// As in [`WorstCaseTask`].
+    /// Number of initial sample points, as in [`WorstCaseTask`].
     pub samples: usize,
-    /// As in [`WorstCaseTask`].
+    /// Number of local searches, as in [`WorstCaseTask`].
     pub starts: usize,
 }
 
@@ -51,18 +51,18 @@ impl Default for RobustTask {
     }
 }
 
-/// What `task = "monte-carlo"` is asked.
+/// Settings of `task = "monte-carlo"`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MonteCarloTask {
-    /// The design that is looked at.
+    /// Design to be examined.
     pub at: Place,
     /// Number of samples.
     pub samples: usize,
-    /// How they are drawn.
+    /// Sampling method.
     pub method: Sampling,
-    /// Shares of the values whose bounds are told.
+    /// Levels of the reported quantiles.
     pub quantiles: Vec<f64>,
-    /// Confidence of the intervals.
+    /// Confidence level of the intervals.
     pub level: f64,
 }
 
@@ -73,48 +73,48 @@ impl Default for MonteCarloTask {
     }
 }
 
-/// How `task = "sensitivity"` looks.
+/// Method of `task = "sensitivity"`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SensitivityMethod {
-    /// Slopes along the tuners at a point.
+    /// Derivatives with respect to the tuners at a point.
     #[default]
     Local,
-    /// Elementary effects of the uncertain parameters: which of them matter at all.
+    /// Elementary effects of the uncertain parameters: screening of the relevant ones.
     Morris,
-    /// Shares of the variance by the uncertain parameters.
+    /// Variance shares of the uncertain parameters (Sobol indices).
     Sobol,
 }
 
-/// What a calibration is asked of the uncertainty of its estimates.
+/// Settings of the uncertainty of a calibration's estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UncertaintyTask {
-    /// Whether every estimate gets a profile of the likelihood; or those of these tuners alone.
+    /// Tuners for which a likelihood profile is computed.
     pub profile: Chosen,
-    /// Number of bootstrap replicates; none where 0.
+    /// Number of bootstrap replicates; 0 for no bootstrap.
     pub bootstrap: usize,
-    /// Length of a block of the bootstrap, in samples; the cube root of their number where absent.
+    /// Block length of the bootstrap, in samples; `None` for the cube root of the number of samples.
     pub block: Option<usize>,
-    /// Whether predictions get bands.
+    /// True if confidence bands of predictions are computed.
     pub bands: bool,
-    /// Confidence of all intervals.
+    /// Confidence level of all intervals.
     pub level: f64,
 }
 
-/// None, some, or all.
+/// Selection of names: none, some or all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Chosen {
-    /// None.
+    /// No name.
     #[default]
     None,
-    /// These.
+    /// Listed names.
     Some(Vec<String>),
-    /// All.
+    /// All names.
     All,
 }
 
 impl Chosen {
-    /// Whether it is chosen.
+    /// Returns true if a name is selected.
     pub fn has(&self, name: &str) -> bool {
         match self {
             Self::None => false,
@@ -130,26 +130,26 @@ impl Default for UncertaintyTask {
     }
 }
 
-/// Checks what the tasks over uncertain parameters are asked; `tasks.uncertain` is checked already.
+/// Checks the settings of the tasks over uncertain parameters; `tasks.uncertain` is already checked.
 pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
     let global = study.task == Task::Sensitivity && tasks.sensitivity.method != SensitivityMethod::Local;
-    // Other tasks of the same study leave the table aside.
+    // Other tasks of the same study ignore the table.
     let robust = tasks.robust.is_some() && study.task == Task::Design;
     let worst = matches!(study.task, Task::WorstCase);
     if tasks.robust.is_some() && study.task == Task::Calibration {
-        return Err(Mistake::new("robust", "only a design is made against worst cases, and this is a calibration")
-            .with_help("remove [robust]; [uncertainty] tells how well the data determine the estimates"));
+        return Err(Mistake::new("robust", "[robust] applies to designs, but this study is a calibration")
+            .with_help("remove [robust]; [uncertainty] reports how well the data determine the estimates"));
     }
     if robust && study.objective != Objective::Max {
         return Err(Mistake::new(
             "robust",
-            "a design against worst cases lowers the largest scaled value, and this one adds or lists them",
+            "a design against worst cases minimises the largest scaled value: it needs objective = \"max\"",
         )
-        .with_help("remove [robust], or the `objective`"));
+        .with_help("remove [robust] or `objective`"));
     }
     if (worst || robust || global || study.task == Task::MonteCarlo) && tasks.uncertain.is_empty() {
         let (key, table) = if robust { ("robust", None) } else { ("task", Some("study")) };
-        let mistake = Mistake::new(key, "nothing is uncertain: the study names no parameter that is not known exactly")
+        let mistake = Mistake::new(key, "the study has no uncertain parameter")
             .with_help("add [uncertain] with NAME = { min = ..., max = ... } for parameters of the model");
         return Err(table.map_or(mistake.clone(), |table| mistake.within(table)));
     }
@@ -157,13 +157,13 @@ pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
     for uncertain in &tasks.uncertain {
         let within = |m: Mistake| m.within("uncertain");
         if (worst || robust || morris) && !uncertain.is_bounded() {
-            let fact = format!("a box needs both bounds, and `{}` has none on one side", uncertain.name);
-            return Err(within(Mistake::new(&uncertain.name, fact).with_help("give it `min` and `max`")));
+            let fact = format!("a box needs two finite bounds, but `{}` has a missing one", uncertain.name);
+            return Err(within(Mistake::new(&uncertain.name, fact).with_help("set `min` and `max`")));
         }
         if robust && uncertain.tuner.is_some() {
             let fact =
-                format!("`{}` is a tuner: a design cannot choose it and guard against it at once", uncertain.name);
-            let help = "remove it from [uncertain]; task = \"worst-case\" tells how much its tolerance matters";
+                format!("`{}` is a tuner and cannot be uncertain in a design against worst cases", uncertain.name);
+            let help = "remove it from [uncertain]; task = \"worst-case\" reports the effect of its tolerance";
             return Err(within(Mistake::new(&uncertain.name, fact).with_help(help)));
         }
     }
@@ -180,8 +180,8 @@ fn count(key: &str, number: usize, least: usize, most: usize) -> Result<(), Mist
     if (least..=most).contains(&number) {
         return Ok(());
     }
-    Err(Mistake::new(key, format!("`{key}` takes {least} to {most}, not {number}"))
-        .with_help("leave it out for its default"))
+    Err(Mistake::new(key, format!("expected `{key}` from {least} to {most}, found {number}"))
+        .with_help("omit it for the default"))
 }
 
 fn worst_case(task: &WorstCaseTask, study: &Study) -> Result<(), Mistake> {
@@ -204,26 +204,23 @@ fn robust_design(task: &RobustTask) -> Result<(), Mistake> {
     if task.tolerance > 0.0 && task.tolerance < 1.0 {
         return Ok(());
     }
-    let fact = format!("the tolerance counts in scaled values, between 0 and 1, and is not {}", task.tolerance);
-    Err(Mistake::new("tolerance", fact).with_help("0.001, the default, is a thousandth of a demand"))
+    let fact = format!("expected a tolerance between 0 and 1 in scaled values, found {}", task.tolerance);
+    Err(Mistake::new("tolerance", fact).with_help("the default 0.001 is a thousandth of a demand"))
 }
 
 fn level(level: f64) -> Result<(), Mistake> {
     if (0.5..1.0).contains(&level) {
         return Ok(());
     }
-    Err(Mistake::new("level", format!("the confidence of an interval lies between 0.5 and 1, not at {level}"))
-        .with_help("0.95, the default, misses the truth once in twenty times"))
+    Err(Mistake::new("level", format!("expected a confidence level from 0.5 to below 1, found {level}"))
+        .with_help("with the default 0.95, one interval in twenty misses the true value"))
 }
 
 fn monte_carlo(task: &MonteCarloTask) -> Result<(), Mistake> {
     count("samples", task.samples, 2, MOST_SAMPLES)?;
     if let Some(wrong) = task.quantiles.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
-        return Err(Mistake::new(
-            "quantiles",
-            format!("a quantile belongs to a share between 0 and 1, not to {wrong}"),
-        )
-        .with_help("0.95 is the value that 95 % of the samples do not exceed"));
+        return Err(Mistake::new("quantiles", format!("expected quantile levels between 0 and 1, found {wrong}"))
+            .with_help("the 0.95 quantile is the value that 95 % of the samples do not exceed"));
     }
     level(task.level)
 }
@@ -231,8 +228,8 @@ fn monte_carlo(task: &MonteCarloTask) -> Result<(), Mistake> {
 fn uncertainty(task: Option<&UncertaintyTask>, study: &Study) -> Result<(), Mistake> {
     let Some(task) = task else { return Ok(()) };
     if study.cases.iter().all(|case| case.experiment.is_none()) {
-        return Err(Mistake::here("only a calibration has estimates whose uncertainty can be told")
-            .with_help("remove [uncertainty]; what parameters are known to lie in stands in [uncertain]"));
+        return Err(Mistake::here("[uncertainty] needs a calibration: the study has no experiment")
+            .with_help("remove [uncertainty]; ranges of uncertain parameters belong in [uncertain]"));
     }
     if let Chosen::Some(names) = &task.profile {
         let known = || study.tuners.iter().filter(|t| t.active).map(|t| t.name.as_str());
@@ -245,7 +242,7 @@ fn uncertainty(task: Option<&UncertaintyTask>, study: &Study) -> Result<(), Mist
         count("bootstrap", task.bootstrap, 20, 100_000)?;
     }
     if task.block == Some(0) {
-        return Err(Mistake::new("block", "a block has at least one sample").with_help("leave it out for its default"));
+        return Err(Mistake::new("block", "a block has at least one sample").with_help("omit it for the default"));
     }
     level(task.level)
 }

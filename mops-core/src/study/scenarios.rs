@@ -1,4 +1,4 @@
-//! The study over its uncertain parameters at a design, and with some of their values as cases.
+//! Studies derived from uncertain parameters: over their box at a design, and with some of their values as cases.
 
 use super::distribution::Uncertain;
 use super::{JobPlan, ParameterSource, Study};
@@ -6,9 +6,9 @@ use crate::evaluation::Objective;
 use crate::tuner::{Grid, Scale, Tuner};
 
 impl Study {
-    /// The study over its uncertain parameters at a design: these are the active tuners, at the end of the list, in their
-    /// order; the tuners of the study keep the values given. Cases that differ in nothing but uncertain parameters become
-    /// one.
+    /// Returns the study over its uncertain parameters at a design. The uncertain parameters become the active tuners, in
+    /// their order, at the end of the list. The tuners of the study keep the given values. Cases that differ only in
+    /// uncertain parameters are merged.
     pub fn over_uncertain(&self, tuners: &[f64]) -> Self {
         let mut study = self.clone();
         for (tuner, &value) in study.tuners.iter_mut().zip(tuners) {
@@ -42,7 +42,8 @@ impl Study {
         study
     }
 
-    /// Parameters of a job that are uncertain: index of the parameter, index of the uncertain one, factor of the unit.
+    /// Returns the uncertain parameters of a job: index of the parameter, index of the uncertain one, unit conversion
+    /// factor.
     fn touched(&self, job: &JobPlan) -> Vec<(usize, usize, f64)> {
         let parameters = &self.models[job.model].1.interface().parameters;
         let found = |(index, p): (usize, &crate::model::Parameter)| {
@@ -53,7 +54,7 @@ impl Study {
         parameters.iter().enumerate().filter_map(found).collect()
     }
 
-    /// The value that the first simulation has, within the bounds.
+    /// Returns the nominal value, as used by the first simulation, clamped to the bounds.
     fn nominal(&self, uncertain: &Uncertain, tuners: &[f64]) -> f64 {
         let first = self.jobs.iter().find_map(|job| {
             let (index, _, factor) =
@@ -63,7 +64,7 @@ impl Study {
         first.unwrap_or_else(|| uncertain.quantile(0.5)).clamp(uncertain.bounds[0], uncertain.bounds[1])
     }
 
-    /// Leaves out simulations that are the same as an earlier one, with their criteria.
+    /// Removes simulations identical to an earlier one, with their criteria.
     fn keep_distinct(&mut self) {
         let same = |a: &JobPlan, b: &JobPlan| {
             let (of_a, of_b) = (&self.cases[a.case], &self.cases[b.case]);
@@ -74,10 +75,10 @@ impl Study {
             (0..self.jobs.len()).map(|j| (0..j).find(|&i| same(&self.jobs[i], &self.jobs[j])).unwrap_or(j)).collect();
         let known: Vec<(usize, String)> = self.rows.iter().map(|row| (row.job, row.name.clone())).collect();
         self.rows.retain(|row| {
-            // N.B.: a criterion may be read in the later case alone.
+            // N.B.: some criteria apply to the later case only.
             first[row.job] == row.job || !known.contains(&(first[row.job], row.name.clone()))
         });
-        // What nobody reads is not simulated.
+        // Jobs without a criterion are not simulated.
         let read: Vec<usize> = (0..self.jobs.len()).filter(|&j| self.rows.iter().any(|row| row.job == j)).collect();
         self.jobs = read.iter().map(|&j| self.jobs[j].clone()).collect();
         for row in &mut self.rows {
@@ -85,7 +86,7 @@ impl Study {
         }
     }
 
-    /// The study with these cases besides its own: values of the uncertain parameters, in their units, in a case.
+    /// Returns the study with additional cases: values of the uncertain parameters, in their units, in a case.
     pub fn with_scenarios(&self, scenarios: &[Scenario]) -> Self {
         let mut study = self.clone();
         for scenario in scenarios {
@@ -108,12 +109,12 @@ impl Study {
     }
 }
 
-/// Values of the uncertain parameters, as a case of their own.
+/// Values of the uncertain parameters, as a separate case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Name of the case.
     pub name: String,
-    /// The case that it is otherwise like, by index.
+    /// Index of the case from which all other settings are copied.
     pub case: usize,
     /// Values of the uncertain parameters, in their units.
     pub values: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What tasks other than design and calibration are asked: as it is written down, and checked.
+//! Settings of the tasks other than design and calibration, and their checks.
 
 use super::diagnosis::{self, DiagnosisTask};
 use super::distribution::Uncertain;
@@ -13,118 +13,118 @@ use crate::mistake::Mistake;
 use crate::tuner::Grid;
 use crate::unit::Quantity;
 
-/// Where a task looks: at the start values, or at the optimum.
+/// Point at which a task is performed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Place {
-    /// At the point that solving the study gives.
+    /// The optimum: the study is solved first.
     #[default]
     Optimum,
-    /// At the start values of the tuners; nothing is solved.
+    /// The initial guess of the tuners; nothing is solved.
     Start,
 }
 
-/// What the tasks of a study are asked, as it is written down.
+/// Settings of the tasks of a study, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct TasksDraft {
-    /// Of `excitation`.
+    /// Settings of `excitation`.
     pub excitation: ExcitationDraft,
-    /// Of `sensitivity`.
+    /// Settings of `sensitivity`.
     pub sensitivity: SensitivityTask,
-    /// Of `sweep`, if it is there.
+    /// Settings of `sweep`, if given.
     pub sweep: Option<SweepDraft>,
-    /// Of `diagnosis`.
+    /// Settings of `diagnosis`.
     pub diagnosis: DiagnosisTask,
-    /// Of `pareto`.
+    /// Settings of `pareto`.
     pub pareto: ParetoTask,
-    /// Parameters that are not known exactly, by name.
+    /// Uncertain parameters, by name.
     pub uncertain: Vec<(String, UncertainDraft)>,
-    /// Of `worst-case`.
+    /// Settings of `worst-case`.
     pub worst_case: WorstCaseTask,
-    /// Of a design against the worst cases, if it is one.
+    /// Settings of a design against worst cases, if given.
     pub robust: Option<RobustTask>,
-    /// Of `monte-carlo`.
+    /// Settings of `monte-carlo`.
     pub monte_carlo: MonteCarloTask,
-    /// Of the uncertainty of a calibration's estimates, if more than standard errors are asked for.
+    /// Settings of the uncertainty of a calibration's estimates, if more than standard errors are requested.
     pub uncertainty: Option<UncertaintyTask>,
 }
 
-/// What the tasks of a study are asked.
+/// Settings of the tasks of a study.
 #[derive(Debug, Clone, Default)]
 pub struct Tasks {
-    /// Of `excitation`.
+    /// Settings of `excitation`.
     pub excitation: ExcitationTask,
-    /// Of `sensitivity`.
+    /// Settings of `sensitivity`.
     pub sensitivity: SensitivityTask,
-    /// Of `sweep`, if it is there.
+    /// Settings of `sweep`, if given.
     pub sweep: Option<SweepTask>,
-    /// Of `diagnosis`.
+    /// Settings of `diagnosis`.
     pub diagnosis: DiagnosisTask,
-    /// Of `pareto`.
+    /// Settings of `pareto`.
     pub pareto: ParetoTask,
-    /// Parameters that are not known exactly.
+    /// Uncertain parameters.
     pub uncertain: Vec<Uncertain>,
-    /// Of `worst-case`.
+    /// Settings of `worst-case`.
     pub worst_case: WorstCaseTask,
-    /// Of a design against the worst cases, if it is one.
+    /// Settings of a design against worst cases, if given.
     pub robust: Option<RobustTask>,
-    /// Of `monte-carlo`.
+    /// Settings of `monte-carlo`.
     pub monte_carlo: MonteCarloTask,
-    /// Of the uncertainty of a calibration's estimates, if more than standard errors are asked for.
+    /// Settings of the uncertainty of a calibration's estimates, if more than standard errors are requested.
     pub uncertainty: Option<UncertaintyTask>,
 }
 
-/// Which inputs are looked at, as it is written down.
+/// Settings of `excitation`, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct ExcitationDraft {
-    /// The inputs; all where absent.
+    /// Inputs; `None` for all.
     pub inputs: Option<Vec<String>>,
-    /// Time between two samples, s.
+    /// Sample time, s.
     pub sample_time: Option<f64>,
-    /// Standard deviation of the noise on inputs.
+    /// Standard deviation of the noise of each input.
     pub noise: Vec<(String, Quantity)>,
-    /// Number of parameters to be estimated.
+    /// Number of parameters to estimate.
     pub parameters: Option<usize>,
     /// FIR and ARX models, by name.
     pub regressions: Vec<(String, RegressionDraft)>,
 }
 
-/// Which inputs are looked at, and how.
+/// Settings of the excitation analysis of inputs.
 #[derive(Debug, Clone, Default)]
 pub struct ExcitationQuestion {
-    /// The inputs; all where absent.
+    /// Inputs; `None` for all.
     pub inputs: Option<Vec<String>>,
-    /// Time between two samples, s; that of the recording where absent.
+    /// Sample time, s; `None` for the sample time of the recording.
     pub sample_time: Option<f64>,
-    /// Standard deviation of the noise on inputs, in the models' units.
+    /// Standard deviation of the noise of each input, in the units of the models.
     pub noise: Vec<(String, f64)>,
-    /// Number of parameters to be estimated; that of the tuners that act in the case where absent.
+    /// Number of parameters to estimate; `None` for the number of tuners that act in the case.
     pub parameters: Option<usize>,
 }
 
-/// Which inputs are looked at.
+/// Settings of `excitation`.
 #[derive(Debug, Clone, Default)]
 pub struct ExcitationTask {
-    /// What is asked of inputs.
+    /// Settings of the excitation analysis of inputs.
     pub question: ExcitationQuestion,
     /// FIR and ARX models.
     pub regressions: Vec<RegressionTask>,
 }
 
-/// A FIR or ARX model as it is written down.
+/// A FIR or ARX model, not yet checked.
 #[derive(Debug, Clone)]
 pub struct RegressionDraft {
-    /// The experiment; the only one with the output where absent.
+    /// Name of the experiment; `None` for the first one with the output.
     pub experiment: Option<String>,
-    /// The input.
+    /// Input of the model.
     pub input: String,
-    /// The measured output.
+    /// Measured output of the model.
     pub output: String,
     /// Number of past outputs.
     pub a: usize,
     /// Number of past inputs.
     pub b: usize,
-    /// Samples from input to output.
+    /// Delay from input to output, in samples.
     pub delay: usize,
     /// Forgetting factor of the recursive estimate.
     pub forgetting: f64,
@@ -135,74 +135,75 @@ pub struct RegressionDraft {
 pub struct RegressionTask {
     /// Name.
     pub name: String,
-    /// The experiment, by index into the cases.
+    /// Experiment, as index into the cases.
     pub case: usize,
-    /// The input.
+    /// Input of the model.
     pub input: String,
-    /// The measured output.
+    /// Measured output of the model.
     pub output: String,
     /// Number of past outputs.
     pub a: usize,
     /// Number of past inputs.
     pub b: usize,
-    /// Samples from input to output.
+    /// Delay from input to output, in samples.
     pub delay: usize,
     /// Forgetting factor of the recursive estimate.
     pub forgetting: f64,
 }
 
-/// Where sensitivities are taken.
+/// Settings of `sensitivity`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SensitivityTask {
-    /// The point.
+    /// Point at which the sensitivities are computed.
     pub at: Place,
-    /// Share of the largest singular value below which one counts as zero; that of the slopes' accuracy where absent.
+    /// Share of the largest singular value below which a singular value counts as zero; `None` for the accuracy of the
+    /// derivatives.
     pub zero: Option<f64>,
-    /// Slopes at the point, or effects over the uncertain parameters.
+    /// Derivatives at the point, or effects of the uncertain parameters over their ranges.
     pub method: SensitivityMethod,
-    /// Of `morris` the number of trajectories, of `sobol` that of samples; their defaults where absent.
+    /// Number of trajectories (`morris`) or of samples (`sobol`); `None` for the default.
     pub samples: Option<usize>,
 }
 
-/// Which tuners are swept, as it is written down.
+/// Settings of `sweep`, not yet checked.
 #[derive(Debug, Clone)]
 pub struct SweepDraft {
-    /// The tuner along x.
+    /// Tuner along x.
     pub x: AxisDraft,
-    /// The tuner along y; without it the sweep is a line.
+    /// Tuner along y; without it the sweep is a line.
     pub y: Option<AxisDraft>,
-    /// Where the other tuners stand.
+    /// Values of the other tuners.
     pub at: Place,
 }
 
-/// A swept tuner as it is written down.
+/// A swept tuner, not yet checked.
 #[derive(Debug, Clone)]
 pub struct AxisDraft {
     /// Name.
     pub tuner: String,
-    /// Smallest value; that of the tuner where absent.
+    /// Smallest value; `None` for the lower bound of the tuner.
     pub min: Option<Quantity>,
-    /// Largest value; that of the tuner where absent.
+    /// Largest value; `None` for the upper bound of the tuner.
     pub max: Option<Quantity>,
     /// Number of values.
     pub points: usize,
 }
 
-/// Which tuners are swept.
+/// Settings of `sweep`.
 #[derive(Debug, Clone)]
 pub struct SweepTask {
-    /// The tuner along x.
+    /// Tuner along x.
     pub x: Axis,
-    /// The tuner along y.
+    /// Tuner along y.
     pub y: Option<Axis>,
-    /// Where the other tuners stand.
+    /// Values of the other tuners.
     pub at: Place,
 }
 
 /// A swept tuner.
 #[derive(Debug, Clone)]
 pub struct Axis {
-    /// Index into [`Study::tuners`].
+    /// Tuner, as index into [`Study::tuners`].
     pub tuner: usize,
     /// Smallest and largest value.
     pub range: [f64; 2],
@@ -210,10 +211,10 @@ pub struct Axis {
     pub points: usize,
 }
 
-/// How many points a front has.
+/// Settings of `pareto`.
 #[derive(Debug, Clone, Copy)]
 pub struct ParetoTask {
-    /// Number of points, about.
+    /// Approximate number of points of the Pareto front.
     pub points: usize,
 }
 
@@ -223,10 +224,10 @@ impl Default for ParetoTask {
     }
 }
 
-/// More points of a front than this are refused.
+/// Maximum number of points of a Pareto front.
 const MOST_OF_FRONT: usize = 200;
 
-/// More values than this along an axis are refused.
+/// Maximum number of values along an axis.
 const MOST_POINTS: usize = 1000;
 
 pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> {
@@ -236,20 +237,20 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
     {
         return Err(Mistake::new(
             "zero",
-            format!("a share of the largest singular value lies between 0 and 1, not at {zero}"),
+            format!("expected a share of the largest singular value between 0 and 1, found {zero}"),
         )
-        .with_help("leave `zero` out for the accuracy of the slopes")
+        .with_help("omit `zero` to use the accuracy of the derivatives")
         .within("sensitivity"));
     }
     let sweep = draft.sweep.map(|sweep| self::sweep(sweep, study)).transpose().map_err(|m| m.within("sweep"))?;
     if study.task == Task::Sweep && sweep.is_none() {
-        return Err(Mistake::new("task", "nothing says which tuners are swept")
+        return Err(Mistake::new("task", "the study has no table [sweep]")
             .with_help("add [sweep] with x = \"tuner\" and, for a surface, y = \"tuner\"")
             .within("study"));
     }
     if study.task == Task::Excitation && study.cases.iter().all(|case| case.inputs.is_empty()) {
-        return Err(Mistake::new("task", "nothing drives the model: no case and no experiment has an input")
-            .with_help("give one `inputs`, such as inputs = { u = { step = { after = 1.0 } } }")
+        return Err(Mistake::new("task", "no case and no experiment has an input signal")
+            .with_help("add `inputs` to a case, such as inputs = { u = { step = { after = 1.0 } } }")
             .within("study"));
     }
     let diagnosis = diagnosis::check(draft.diagnosis, study)?;
@@ -272,24 +273,27 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
 
 fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, Mistake> {
     if !(3..=MOST_OF_FRONT).contains(&task.points) {
-        let fact = format!("a front takes 3 to {MOST_OF_FRONT} points, not {}", task.points);
-        return Err(Mistake::new("points", fact).with_help("30, the default, draw a smooth curve").within("pareto"));
+        let fact = format!("expected 3 to {MOST_OF_FRONT} points of the front, found {}", task.points);
+        return Err(Mistake::new("points", fact).with_help("the default 30 gives a smooth curve").within("pareto"));
     }
     if study.task != Task::Pareto {
         return Ok(task);
     }
     if study.objective != Objective::Each {
-        return Err(Mistake::new("objective", "on a front every criterion counts for itself")
-            .with_help("remove `objective`, or say objective = \"each\"")
+        return Err(Mistake::new("objective", "a Pareto front needs objective = \"each\"")
+            .with_help("remove `objective`, or set objective = \"each\"")
             .within("study"));
     }
     let counts = |row: &&Row| row.usage == Usage::Minimise && study.case_of(row).role() == Role::Calibration;
     let minimised: Vec<&Row> = study.rows.iter().filter(counts).collect();
     if minimised.len() < 2 {
-        let known = minimised.first().map_or_else(|| "none is".to_owned(), |row| format!("only `{}` is", row.name));
-        return Err(Mistake::new("task", format!("a front needs two criteria to be minimised, and {known}"))
-            .with_help("leave `usage` out of another criterion, or say usage = \"minimise\"")
-            .within("study"));
+        let known = minimised.first().map_or_else(|| "none".to_owned(), |row| format!("only `{}`", row.name));
+        return Err(Mistake::new(
+            "task",
+            format!("a Pareto front needs at least two criteria to minimise, found {known}"),
+        )
+        .with_help("omit `usage` of another criterion, or set usage = \"minimise\"")
+        .within("study"));
     }
     Ok(task)
 }
@@ -309,7 +313,7 @@ fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, M
     }
     if let Some(time) = draft.sample_time.filter(|time| !(time.is_finite() && *time > 0.0)) {
         return Err(Mistake::new("sample-time", format!("the time between samples must be positive, not {time} s"))
-            .with_help("leave it out for that of the recording"));
+            .with_help("omit it to use the sample time of the recording"));
     }
     let mut noise = Vec::new();
     for (name, quantity) in draft.noise {
@@ -318,12 +322,12 @@ fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, M
         let variables = study.models.iter().flat_map(|(_, m)| &m.interface().inputs);
         let unit = &variables.into_iter().find(|v| v.name == name).expect("inputs of cases are those of models").unit;
         let value = quantity.to(unit).map_err(|why| {
-            within(Mistake::new(&name, why).with_help(format!("a number without a unit counts in `{unit}`")))
+            within(Mistake::new(&name, why).with_help(format!("a number without a unit is in `{unit}`")))
         })?;
         if !(value.is_finite() && value > 0.0) {
             return Err(within(
                 Mistake::new(&name, format!("a standard deviation must be positive, not {value}"))
-                    .with_help("leave it out where it is not known"),
+                    .with_help("omit it if the noise is unknown"),
             ));
         }
         noise.push((name, value));
@@ -371,24 +375,24 @@ fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<Reg
             format!("the experiment `{}` has no input `{input}`", study.cases[case].name),
         )
         .with_help(match inputs.is_empty() {
-            true => "nothing drives it: give it `inputs`".to_owned(),
+            true => "the experiment has no inputs: add `inputs`".to_owned(),
             false => suggestion(&input, inputs.iter().map(|(known, _)| known.as_str())),
         }));
     }
     if b == 0 {
-        return Err(Mistake::new("b", "a model without past inputs has nothing to do with the input")
-            .with_help("`b` counts the coefficients of the input: at least 1"));
+        return Err(Mistake::new("b", "expected at least 1 coefficient of the input, found 0")
+            .with_help("`b` is the number of coefficients of the input"));
     }
     if a + b > 200 {
-        return Err(Mistake::new("b", format!("{} coefficients are more than 200", a + b))
-            .with_help("take a longer sample time, or an ARX model: its `a` shortens the response"));
+        return Err(Mistake::new("b", format!("expected at most 200 coefficients, found {}", a + b))
+            .with_help("use a longer sample time, or an ARX model: past outputs (`a`) shorten the response"));
     }
     if !(forgetting > 0.0 && forgetting <= 1.0) {
         return Err(Mistake::new(
             "forgetting",
-            format!("a forgetting factor lies between 0 and 1, not at {forgetting}"),
+            format!("expected a forgetting factor above 0 and at most 1, found {forgetting}"),
         )
-        .with_help("1 forgets nothing; 0.98 forgets within about fifty samples"));
+        .with_help("1 disables forgetting; 0.98 forgets within about fifty samples"));
     }
     Ok(RegressionTask { name, case, input, output, a, b, delay, forgetting })
 }
@@ -398,7 +402,7 @@ fn sweep(draft: SweepDraft, study: &Study) -> Result<SweepTask, Mistake> {
     let y = draft.y.map(|y| axis(y, study)).transpose().map_err(|m| m.within("y"))?;
     if y.as_ref().is_some_and(|y| y.tuner == x.tuner) {
         return Err(Mistake::new("y", format!("x and y are the same tuner `{}`", study.tuners[x.tuner].name))
-            .with_help("name another, or leave `y` out for a line"));
+            .with_help("name another tuner, or omit `y` for a line"));
     }
     Ok(SweepTask { x, y, at: draft.at })
 }
@@ -412,17 +416,19 @@ fn axis(draft: AxisDraft, study: &Study) -> Result<Axis, Mistake> {
     })?;
     let tuner = &study.tuners[index];
     if !tuner.active || tuner.tie.is_some() || tuner.grid != Grid::Continuous {
-        return Err(within(Mistake::here(format!("`{name}` cannot be swept: it is no active, continuous tuner")))
+        return Err(within(Mistake::here(format!("`{name}` cannot be swept: it is not an active, continuous tuner")))
             .with_help("remove `active`, `tie`, `integer` or `values` from it"));
     }
     if tuner.case.is_some_and(|case| study.cases[case].role() != Role::Calibration) {
-        return Err(within(Mistake::here(format!("`{name}` cannot be swept: its experiment moves no tuner")))
-            .with_help("sweep a tuner of the study, or of a calibration experiment"));
+        return Err(within(Mistake::here(format!(
+            "`{name}` cannot be swept: its experiment is not used for calibration"
+        )))
+        .with_help("sweep a tuner of the study, or of a calibration experiment"));
     }
     let bound = |key: &str, given: &Option<Quantity>, default: f64| -> Result<f64, Mistake> {
         let Some(quantity) = given else { return Ok(default) };
         let value = quantity.to(&tuner.unit).map_err(|why| {
-            Mistake::new(key, why).with_help(format!("a number without a unit counts in `{}`", tuner.unit))
+            Mistake::new(key, why).with_help(format!("a number without a unit is in `{}`", tuner.unit))
         })?;
         let [low, high] = tuner.bounds;
         if (low..=high).contains(&value) {
@@ -430,21 +436,21 @@ fn axis(draft: AxisDraft, study: &Study) -> Result<Axis, Mistake> {
         }
         Err(Mistake::new(
             key,
-            format!("{value} lies outside the bounds of `{name}`, {low} to {}", tuner.unit.amount(high)),
+            format!("{value} is outside the bounds of `{name}`, {low} to {}", tuner.unit.amount(high)),
         )
-        .with_help("a sweep stays where the tuner may be; widen its `min` and `max`"))
+        .with_help("widen `min` and `max` of the tuner"))
     };
     let range = [bound("min", &draft.min, tuner.bounds[0])?, bound("max", &draft.max, tuner.bounds[1])?];
     if range[0] >= range[1] {
         return Err(Mistake::new(
             "max",
-            format!("the sweep of `{name}` must end above its start, not at {}", range[1]),
+            format!("expected `max` of the sweep of `{name}` above its `min`, found {}", range[1]),
         )
-        .with_help(format!("it starts at {}", tuner.unit.amount(range[0]))));
+        .with_help(format!("`min` is {}", tuner.unit.amount(range[0]))));
     }
     if !(2..=MOST_POINTS).contains(&draft.points) {
-        return Err(Mistake::new("points", format!("a sweep takes 2 to {MOST_POINTS} values, not {}", draft.points))
-            .with_help("41 along each of two tuners make 1681 points"));
+        return Err(Mistake::new("points", format!("expected 2 to {MOST_POINTS} points, found {}", draft.points))
+            .with_help("41 points along each of two tuners are 1681 evaluations"));
     }
     Ok(Axis { tuner: index, range, points: draft.points })
 }

@@ -1,4 +1,4 @@
-//! Uncertain parameters: as they are written down, and checked.
+//! Uncertain parameters as written in a study, and their checks.
 
 use super::Study;
 use super::distribution::{Distribution, Uncertain};
@@ -7,41 +7,41 @@ use crate::math;
 use crate::mistake::Mistake;
 use crate::unit::Quantity;
 
-/// An uncertain parameter as it is written down.
+/// An uncertain parameter, not yet checked.
 #[derive(Debug, Clone, Default)]
 pub struct UncertainDraft {
     /// Smallest value.
     pub min: Option<Quantity>,
     /// Largest value.
     pub max: Option<Quantity>,
-    /// Of a tuner: the share of its value by which it may be off, either way, instead of `min` and `max`.
+    /// Largest relative deviation of a tuner from its value, in both directions, instead of `min` and `max`.
     pub tolerance: Option<f64>,
-    /// How values are distributed between the bounds; uniformly where absent.
+    /// Distribution between the bounds; `None` for uniform.
     pub distribution: Option<DistributionDraft>,
 }
 
-/// A distribution as it is written down.
+/// A distribution, not yet checked.
 #[derive(Debug, Clone)]
 pub enum DistributionDraft {
-    /// By mean and standard deviation.
+    /// Normal distribution, given by mean and standard deviation.
     Normal {
         /// Mean.
         mean: Quantity,
         /// Standard deviation.
         deviation: Quantity,
     },
-    /// By the interval that 95 % of the values lie in, as many below as above.
+    /// Normal distribution, given by the central interval that contains 95 % of the values.
     NormalWithin([Quantity; 2]),
-    /// By the median, and the standard deviation of the natural logarithm.
+    /// Log-normal distribution, given by the median and the standard deviation of the natural logarithm.
     LogNormal {
         /// Median.
         median: Quantity,
         /// Standard deviation of the natural logarithm.
         deviation: f64,
     },
-    /// By the interval that 95 % of the values lie in, as many below as above.
+    /// Log-normal distribution, given by the central interval that contains 95 % of the values.
     LogNormalWithin([Quantity; 2]),
-    /// By its most probable value; `min` and `max` are its ends.
+    /// Triangular distribution between `min` and `max`, given by the most probable value.
     Triangular {
         /// Most probable value.
         mode: Quantity,
@@ -63,7 +63,7 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
             .with_help(suggestion(name, parameters.iter().map(|p| p.variable.name.as_str())))
     })?;
     if study.tuners.iter().any(|t| t.parameter == name && t.case.is_some()) {
-        return Err(Mistake::here(format!("`{name}` has a value of its own in every case"))
+        return Err(Mistake::here(format!("`{name}` has a separate value in every case"))
             .with_help("only parameters, and tuners of the whole study, can be uncertain"));
     }
     let tuner = study.tuners.iter().position(|t| t.parameter == name);
@@ -71,8 +71,12 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     let number = |key: &str, quantity: &Quantity| -> Result<f64, Mistake> {
         let value = quantity
             .to(&if key == "deviation" { unit.difference() } else { unit.clone() })
-            .map_err(|why| Mistake::new(key, why).with_help(format!("a number without a unit counts in `{unit}`")))?;
-        if value.is_finite() { Ok(value) } else { Err(Mistake::new(key, format!("{value} is not a finite number"))) }
+            .map_err(|why| Mistake::new(key, why).with_help(format!("a number without a unit is in `{unit}`")))?;
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(Mistake::new(key, format!("expected a finite number, found {value}")))
+        }
     };
     let bound = |key: &str, quantity: &Option<Quantity>| quantity.as_ref().map(|q| number(key, q)).transpose();
     let (min, max) = (bound("min", &draft.min)?, bound("max", &draft.max)?);
@@ -85,16 +89,19 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     }
     let distribution = distribution(&draft, bounds, number)?;
     if tolerance.is_none() && distribution == Distribution::Uniform && !bounds.iter().all(|b| b.is_finite()) {
-        return Err(Mistake::here(format!("nothing says how far `{name}` may go"))
+        return Err(Mistake::here(format!("the range of `{name}` is not bounded"))
             .with_help("give `min` and `max`, or a distribution such as normal = { mean = 1.0, deviation = 0.1 }"));
     }
-    // What the model does not take is cut off a distribution, but not off bounds that were asked for.
+    // The distribution is truncated at the range of the model parameter; explicit bounds outside that range are errors.
     let factor = unit.factor_to(&parameter.variable.unit).unwrap_or(1.0);
     let range = parameter.range.map(|end| end / factor);
     for (key, given) in [("min", min), ("max", max)] {
         if let Some(value) = given.filter(|value| !(range[0]..=range[1]).contains(value)) {
-            return Err(Mistake::new(key, format!("the model does not take {} for `{name}`", unit.amount(value)))
-                .with_help(format!("`{name}` is: {}", parameter.variable.about)));
+            return Err(Mistake::new(
+                key,
+                format!("{} is outside the range of `{name}` in the model", unit.amount(value)),
+            )
+            .with_help(format!("`{name}` is: {}", parameter.variable.about)));
         }
     }
     bounds = [bounds[0].max(range[0]), bounds[1].min(range[1])];
@@ -106,18 +113,21 @@ fn tolerance(draft: &UncertainDraft, of_tuner: bool, name: &str) -> Result<Optio
     let wrong = |fact: String, help: &str| Err(Mistake::new("tolerance", fact).with_help(help));
     if !of_tuner {
         return wrong(
-            format!("`{name}` is no tuner, so that no design gives it a value"),
+            format!("`{name}` is not a tuner, so that a tolerance has no reference value"),
             "give `min` and `max` instead",
         );
     }
     if draft.min.is_some() || draft.max.is_some() || draft.distribution.is_some() {
         return wrong(
-            "a tolerance is the whole range".into(),
-            "remove `min`, `max` and the distribution, or the tolerance",
+            "`tolerance` already defines the range".into(),
+            "remove `min`, `max` and the distribution, or `tolerance`",
         );
     }
     if !(share > 0.0 && share < 1.0) {
-        return wrong(format!("a tolerance is a share of the value, between 0 and 1, not {share}"), "0.05 is 5 %");
+        return wrong(
+            format!("expected a tolerance between 0 and 1, as a share of the value, found {share}"),
+            "0.05 is 5 %",
+        );
     }
     Ok(Some(share))
 }
@@ -134,8 +144,7 @@ fn distribution(
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            Err(Mistake::new(key, format!("{what} must be positive, not {value}"))
-                .with_help("it tells how wide values spread"))
+            Err(Mistake::new(key, format!("{what} must be positive, not {value}")).with_help("write a positive number"))
         }
     };
     let ends = |interval: &[Quantity; 2]| -> Result<[f64; 2], Mistake> {
@@ -181,16 +190,15 @@ fn distribution(
                 if (min..=max).contains(&mode) && min.is_finite() && max.is_finite() {
                     return Ok(Distribution::Triangular { mode });
                 }
-                let fact =
-                    format!("a triangular distribution needs `min` and `max`, and a mode between them; {mode} is none");
-                Err(Mistake::new("mode", fact).with_help("give `min` and `max` beside `triangular`, around the mode"))
+                let fact = format!("a triangular distribution needs a mode between `min` and `max`, found {mode}");
+                Err(Mistake::new("mode", fact).with_help("set `min` and `max` next to `triangular`, around the mode"))
             }),
         ),
     };
     let found = found.map_err(|m| m.within(kind))?;
     let mass = found.below(max, [min, max]) - found.below(min, [min, max]);
     if mass < 1e-6 {
-        return Err(Mistake::here(format!("next to nothing of the {kind} distribution lies within its bounds"))
+        return Err(Mistake::here(format!("less than 1e-6 of the {kind} distribution lies within its bounds"))
             .with_help("widen `min` and `max`, or correct the distribution"));
     }
     Ok(found)

@@ -1,16 +1,18 @@
-//! What a quantity measures: exponents of the base units.
+//! Dimensions: exponents of the base units.
 
 use std::fmt;
 
-/// Exponents of m, kg, s, A, K, mol, and of the decibel (a unit apart, as it is not a ratio). They may be fractions, as in
-/// `V^0.5/s`.
+/// Exponents of m, kg, s, A, K, mol, and of the decibel (a unit of its own, as it is not a ratio).
+///
+/// Exponents may be fractions, as in `V^0.5/s`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Dimension(pub(super) [f64; 7]);
 
-/// Symbols of the coherent base units, and the places of their exponents, in the order in which they are written.
+/// Symbols of the coherent base units and the indices of their exponents, in writing order.
 const BASE: [(&str, usize); 7] = [("kg", 1), ("m", 0), ("s", 2), ("A", 3), ("K", 4), ("mol", 5), ("dB", 6)];
 
-/// Coherent units with names of their own, in the order in which a dimension is written with them.
+/// Coherent units with special names, in writing order.
+///
 /// Source: BIPM, The International System of Units, 9th edition (2019), table 4.
 const NAMED: [(&str, [f64; 7]); 10] = [
     ("V", [2.0, 1.0, -3.0, -1.0, 0.0, 0.0, 0.0]),
@@ -25,7 +27,7 @@ const NAMED: [(&str, [f64; 7]); 10] = [
     ("S", [-2.0, -1.0, 3.0, 2.0, 0.0, 0.0, 0.0]),
 ];
 
-/// Exponents closer than this are the same: thirds add up to whole numbers but for rounding.
+/// Difference below which exponents are equal: thirds add up to integers except for rounding.
 const SAME: f64 = 1e-9;
 
 impl Dimension {
@@ -34,12 +36,12 @@ impl Dimension {
     /// Dimension of a time.
     pub const TIME: Self = Self([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
 
-    /// Whether it is that of a pure number.
+    /// Returns true for the dimension of a pure number.
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// Dimension of the product with the power `exponent` of a quantity of dimension `other`.
+    /// Returns the dimension of the product with the power `exponent` of a quantity of dimension `other`.
     #[must_use]
     pub fn times(mut self, other: &Self, exponent: f64) -> Self {
         for (sum, power) in self.0.iter_mut().zip(other.0) {
@@ -48,9 +50,9 @@ impl Dimension {
         self
     }
 
-    /// The text of its coherent SI unit: a unit with a name and few base units beside it.
+    /// Returns the text of the coherent SI unit: a named unit with few additional base units.
     pub fn coherent(&self) -> String {
-        // Masses that would have to be divided out again speak against a name: m/s2, not N/kg.
+        // A name that requires division by a mass is penalised: m/s2, not N/kg.
         let cost = |rest: &Self| rest.0.iter().map(|e| e.abs()).sum::<f64>() + 2.0 * rest.0[1].abs();
         let plain = (self.0.iter().map(|e| e.abs()).sum(), String::new(), *self);
         let named = NAMED.iter().flat_map(|(symbol, dimension)| {
@@ -62,7 +64,7 @@ impl Dimension {
             };
             [(1.0, ""), (2.0, "2"), (0.5, "^0.5")].into_iter().filter_map(of).collect::<Vec<_>>()
         });
-        // The first of the cheapest: base units alone where nothing is gained.
+        // First of the cheapest candidates: base units alone unless a name is shorter.
         let (_, symbol, rest) = named.fold(plain, |best, other| if other.0 < best.0 - SAME { other } else { best });
         let part = |(symbol, exponent): (&str, f64)| {
             if (exponent - 1.0).abs() < SAME { symbol.to_owned() } else { format!("{symbol}{}", rounded(exponent)) }
@@ -77,7 +79,7 @@ impl Dimension {
     }
 }
 
-/// An exponent as a unit has it: `2`, `^0.5`, `^(2/3)`.
+/// Formats an exponent as in a unit: `2`, `^0.5`, `^(2/3)`.
 fn rounded(exponent: f64) -> String {
     let whole = exponent.round();
     if (exponent - whole).abs() < SAME {

@@ -14,33 +14,34 @@ use symbols::{SYMBOLS, Turning};
 use crate::diagnostic::nearest;
 use crate::math;
 
-/// A unit of measure: a product of powers of SI units, prefixes allowed (`kg m2`, `N.m.s/rad`, `mm/s^2`, `V^0.5/s`).
+/// Unit of measure: a product of powers of SI units, with optional prefixes (`kg m2`, `N.m.s/rad`, `mm/s^2`,
+/// `V^0.5/s`).
 ///
-/// Factors stand side by side or are joined by `*` or a dot; `/` divides by the one factor, or the parenthesis, after it; an
+/// Factors are separated by a blank, `*` or a dot. `/` divides by the one factor, or the parenthesis, after it. An
 /// exponent follows its unit, with or without `^`, and may be a fraction (`m^0.5`, `m^(1/2)`).
 ///
-/// The radian counts as 1, as in the SI; a revolution is 2 pi of it, so that rev/s and rpm are angular speeds. Hz counts cycles:
-/// 1 Hz is 1 1/s, and where a frequency in rad/s is asked for it is 2 pi rad/s.
+/// The radian equals 1, as in the SI; a revolution is 2 pi rad, so that rev/s and rpm are angular speeds. Hz counts
+/// cycles: 1 Hz is 1 1/s, and 2 pi rad/s where a frequency in rad/s is expected.
 ///
-/// degC and degF alone are scales of temperature with a zero of their own. In a product (`W/degC`) they are differences.
+/// degC and degF alone are temperature scales with their own zero. In a product (`W/degC`) they are differences.
 #[derive(Debug, Clone)]
 pub struct Unit {
     text: String,
     dimension: Dimension,
     /// Value of this unit in the coherent SI unit.
     factor: f64,
-    /// The zero of the scale in K, of a scale of temperature.
+    /// Zero of a temperature scale, in K.
     zero: f64,
-    /// Whether it is of differences, to which the zeros of scales do not matter.
+    /// True for a unit of differences, which ignores the zeros of scales.
     is_difference: bool,
     /// Exponents of units that count angles, and of those that count cycles.
     turning: [f64; 2],
-    /// Value of its angles in the coherent unit: 180/pi for V/deg, 1 where angles are in rad.
+    /// Value of the angle units in the coherent unit: 180/pi for V/deg, 1 for rad.
     angles: f64,
 }
 
 impl Unit {
-    /// The unit of a pure number.
+    /// Returns the unit of a pure number.
     pub fn one() -> Self {
         Self {
             text: "1".to_owned(),
@@ -53,13 +54,14 @@ impl Unit {
         }
     }
 
-    /// Reads a unit; an empty text is the unit of a pure number.
+    /// Parses a unit; an empty text is the unit of a pure number.
     ///
     /// # Errors
-    /// An unknown symbol, or a text that is not a product of powers: one sentence that says which.
+    /// If a symbol is unknown, or if the text is not a product of powers; the message is one sentence that names the
+    /// part.
     pub fn parse(text: &str) -> Result<Self, String> {
         if text.len() > LONGEST {
-            return Err(format!("a unit of {} characters; units are at most {LONGEST} long", text.chars().count()));
+            return Err(format!("the unit has {} characters; the limit is {LONGEST}", text.chars().count()));
         }
         let mut rest = text.trim();
         let mut unit = Self { text: if rest.is_empty() { "1".into() } else { rest.into() }, ..Self::one() };
@@ -75,7 +77,7 @@ impl Unit {
             let (factor, after) = factor(rest).ok_or_else(|| {
                 let place = if rest == text.trim() { String::new() } else { format!(" in `{text}`") };
                 let end = rest.find(|c: char| !c.is_alphabetic()).unwrap_or(rest.len());
-                // A slip seldom hits the first letter, and one letter alone is near to everything.
+                // Typing errors seldom affect the first letter, and a single letter is similar to any other.
                 let first = |text: &str| text.chars().next().map(|c| c.to_lowercase().to_string());
                 let alike = |symbol: &&str| symbol.len() > 1 && first(symbol) == first(rest);
                 let near = nearest(&rest[..end], SYMBOLS.iter().map(|known| known.symbol).filter(alike));
@@ -96,60 +98,64 @@ impl Unit {
             (divide, first) = (false, false);
             rest = after.trim_start();
         }
-        if divide { Err(format!("nothing follows the `/` in `{text}`")) } else { Ok(unit) }
+        if divide { Err(format!("expected a unit after the `/` in `{text}`")) } else { Ok(unit) }
     }
 
-    /// A unit that is written in the program, not by a user.
+    /// Parses a unit written in the program, not by a user.
     ///
     /// # Panics
     /// If `text` is not a unit.
     pub fn known(text: &str) -> Self {
-        Self::parse(text).expect("units in the program are spelled right")
+        Self::parse(text).expect("units in the program are valid")
     }
 
-    /// The coherent SI unit of a dimension.
+    /// Returns the coherent SI unit of a dimension.
     pub fn coherent(dimension: &Dimension) -> Self {
         Self { text: dimension.coherent(), dimension: *dimension, ..Self::one() }
     }
 
-    /// What it measures.
+    /// Returns the dimension of the unit.
     pub fn dimension(&self) -> &Dimension {
         &self.dimension
     }
 
-    /// Its value in the coherent SI unit: 0.01 for cm.
+    /// Returns the value of the unit in the coherent SI unit: 0.01 for cm.
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// The zero of its scale in K: 273.15 for degC; 0 for what is no scale of temperature.
+    /// Returns the zero of the scale in K: 273.15 for degC; 0 unless a temperature scale.
     pub fn zero(&self) -> f64 {
         self.zero
     }
 
-    /// Whether it counts angles: rad, deg, rev, and what is made of them.
+    /// Returns true if the unit counts angles: rad, deg, rev, and derived units.
     pub fn is_angle(&self) -> bool {
         self.turning[0] != 0.0
     }
 
-    /// Whether a number in it says in which unit angles are counted, where `other` counts them in deg, rev or the like: V does
-    /// not beside V/deg, nor 1/s beside rpm. Radians are 1, so that V beside V/rad leaves nothing open.
+    /// Returns true if a number in this unit leaves the angle unit ambiguous when converted to `other`, which counts
+    /// angles in deg, rev or similar.
+    ///
+    /// V is ambiguous for V/deg, and 1/s for rpm. V is not ambiguous for V/rad, because the radian is 1.
     pub fn leaves_angles_open(&self, other: &Self) -> bool {
         self.turning == [0.0; 2] && other.is_angle() && other.angles != 1.0
     }
 
-    /// Whether it counts cycles, as Hz does: where angles are asked for it is 2 pi times as much.
+    /// Returns true if the unit counts cycles, as Hz does; conversion to an angle unit multiplies by 2 pi.
     pub fn counts_cycles(&self) -> bool {
         self.turning[1] != 0.0
     }
 
-    /// Whether numbers in it are numbers in the coherent SI unit.
+    /// Returns true if numbers in the unit equal numbers in the coherent SI unit.
     pub fn is_coherent(&self) -> bool {
         self.factor == 1.0 && self.zero == 0.0
     }
 
-    /// The unit of differences, rates and errors of quantities in this unit: K for degC, degR for degF, else the same. A
-    /// temperature that is converted to it is a difference: 5 degC are 5 K.
+    /// Returns the unit of differences, rates and errors of quantities in this unit: K for degC, degR for degF,
+    /// otherwise the unit itself.
+    ///
+    /// A temperature converted to it is a difference: 5 degC are 5 K.
     #[must_use]
     pub fn difference(&self) -> Self {
         let unit = match (self.zero == 0.0, self.factor == 1.0) {
@@ -160,19 +166,20 @@ impl Unit {
         Self { is_difference: true, ..unit }
     }
 
-    /// A number with this unit, as it stands in a sentence: `3 rad`; a pure number alone.
+    /// Formats a number with this unit for a sentence: `3 rad`; a pure number without unit.
     pub fn amount(&self, number: f64) -> String {
         if self.text == "1" { number.to_string() } else { format!("{number} {self}") }
     }
 
-    /// Whether quantities in the two units can be compared.
+    /// Returns true if quantities in the two units are comparable.
     pub fn is_compatible(&self, other: &Self) -> bool {
         self.dimension == other.dimension
     }
 
-    /// Factor that turns a difference in this unit into one in `other`; `None` where they measure different things.
+    /// Returns the factor that converts a difference in this unit to `other`; `None` for different dimensions.
     ///
-    /// Zeros of temperature scales do not enter: [`Unit::convert`] has them. A frequency in cycles is 2 pi times that in rad.
+    /// Zeros of temperature scales are ignored; see [`Unit::convert`] for them. A frequency in cycles is multiplied by
+    /// 2 pi for rad.
     pub fn factor_to(&self, other: &Self) -> Option<f64> {
         if !self.is_compatible(other) {
             return None;
@@ -180,12 +187,12 @@ impl Unit {
         let [[angles, cycles], [others, of_other]] = [self.turning, other.turning];
         let counted = cycles - of_other;
         let turns = if counted != 0.0 && counted == others - angles { raised(2.0 * PI, counted) } else { 1.0 };
-        // Equal units must convert without a rounding, so that no bit of a study's numbers changes.
+        // Equal units must convert without rounding, so that no bit of a study's numbers changes.
         Some(if self.factor == other.factor { turns } else { self.factor / other.factor * turns })
     }
 
-    /// A number in this unit as one in `other`, scales of temperature by their zeros: 20 degC is 293.15 K. `None` where they
-    /// measure different things.
+    /// Converts a number from this unit to `other`, including the zeros of temperature scales: 20 degC is 293.15 K.
+    /// Returns `None` for different dimensions.
     pub fn convert(&self, number: f64, other: &Self) -> Option<f64> {
         let factor = self.factor_to(other)?;
         if self.zero == other.zero || self.is_difference || other.is_difference {
@@ -194,7 +201,7 @@ impl Unit {
         Some((number * self.factor + self.zero - other.zero) / other.factor)
     }
 
-    /// The unit of a product of powers of units; temperatures count as differences.
+    /// Returns the unit of a product of powers of units; temperatures count as differences.
     #[must_use]
     pub fn product(factors: &[(&Self, i32)]) -> Self {
         let factors: Vec<(Self, i32)> = factors.iter().map(|(unit, power)| (unit.difference(), *power)).collect();
@@ -220,7 +227,8 @@ impl Unit {
         Self::known(&text).difference()
     }
 
-    /// The unit of a product of powers of this unit and seconds, as `unit^power s^seconds`; temperatures count as differences.
+    /// Returns the unit of a product of powers of this unit and seconds, as `unit^power s^seconds`; temperatures count
+    /// as differences.
     #[must_use]
     pub fn power(&self, power: i32, seconds: i32) -> Self {
         let own = match (self.difference().text.as_str(), power) {
@@ -244,10 +252,10 @@ impl Unit {
     }
 }
 
-/// Characters of a unit at most: its parentheses are read one within the other.
+/// Largest number of characters of a unit, which limits the nesting of parentheses.
 const LONGEST: usize = 200;
 
-/// Reads one factor: a symbol or a parenthesis, with its exponent. Returns it and the rest of the text.
+/// Parses one factor: a symbol or a parenthesis, with its exponent. Returns the factor and the rest of the text.
 fn factor(text: &str) -> Option<(Unit, &str)> {
     let (mut unit, rest) = if let Some((inner, rest)) = parenthesis(text) {
         (Unit::parse(inner).ok()?, rest)
@@ -268,7 +276,7 @@ fn factor(text: &str) -> Option<(Unit, &str)> {
     Some((unit, rest))
 }
 
-/// What stands in the parenthesis with which a text begins, and the rest.
+/// Returns the content of the parenthesis at the start of a text, and the rest.
 fn parenthesis(text: &str) -> Option<(&str, &str)> {
     let inner = text.strip_prefix('(')?;
     let mut depth = 1;
@@ -280,7 +288,7 @@ fn parenthesis(text: &str) -> Option<(&str, &str)> {
     Some((&inner[..end], &inner[end + 1..]))
 }
 
-/// The exponent with which a text begins, 1 where there is none, and the rest: `2`, `^-1`, `^0.5`, `^(1/2)`, superscripts.
+/// Returns the exponent at the start of a text, or 1, and the rest: `2`, `^-1`, `^0.5`, `^(1/2)`, superscripts.
 fn exponent(text: &str) -> Option<(f64, &str)> {
     const SUPERSCRIPTS: &str = "\u{207b}\u{2070}\u{b9}\u{b2}\u{b3}\u{2074}\u{2075}\u{2076}\u{2077}\u{2078}\u{2079}";
     let end = text.find(|c: char| !SUPERSCRIPTS.contains(c)).unwrap_or(text.len());
@@ -309,12 +317,12 @@ fn exponent(text: &str) -> Option<(f64, &str)> {
     }
 }
 
-/// Exponents beyond 100 are slips.
+/// Returns the exponent, or `None` beyond 100, which is a typing error.
 fn limited(exponent: f64) -> Option<f64> {
     (exponent.abs() < 100.0).then_some(exponent)
 }
 
-/// A power of a factor: whole ones by products, which leaves 10 and its powers exact.
+/// Returns a power of a factor: integer exponents by products, which keeps 10 and its powers exact.
 fn raised(factor: f64, exponent: f64) -> f64 {
     if factor == 1.0 {
         return 1.0;
@@ -367,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn common_spellings_are_known_and_slips_lead_to_the_unit() {
+    fn common_spellings_are_known_and_slips_suggest_the_unit() {
         for (text, known) in
             [("ohm", "Ohm"), ("k\u{3a9}", "kOhm"), ("Nm/rad", "N m"), ("N.m", "N m"), ("ml", "cm3"), ("day", "h")]
         {
@@ -387,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn hertz_count_cycles_and_become_angles_only_where_angles_are_asked_for() {
+    fn hertz_count_cycles_and_become_angles_only_where_angles_are_expected() {
         let factor = |from: &str, to: &str| Unit::known(from).factor_to(&Unit::known(to)).unwrap();
         assert_eq!([factor("Hz", "1/s"), factor("1/s", "Hz"), factor("kHz", "1/ms"), factor("Hz s", "1")], [1.0; 4]);
         assert_eq!(factor("Hz", "rad/s"), 2.0 * PI);
@@ -472,7 +480,7 @@ mod tests {
     fn an_angle_is_not_read_into_a_quantity_that_counts_none() {
         let read = |text: &str, unit: &str| Quantity::parse(text).unwrap().to(&Unit::known(unit));
         for (text, unit) in [("0.3 V", "V/deg"), ("10 1/s", "rpm"), ("50 %", "deg"), ("2 N m s", "N m s/deg")] {
-            assert!(read(text, unit).unwrap_err().contains("counts no angle"), "{text} as {unit}");
+            assert!(read(text, unit).unwrap_err().contains("without an angle unit"), "{text} as {unit}");
         }
         for (text, unit, value) in [
             ("0.3 V", "V/rad", 0.3),

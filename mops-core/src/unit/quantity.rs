@@ -7,49 +7,50 @@ use serde::de::{self, Deserialize, Deserializer, Visitor};
 
 use super::Unit;
 
-/// A number, with its unit where one was given: `15`, `"15 s"`, `"30 deg"`.
+/// Number with an optional unit: `15`, `"15 s"`, `"30 deg"`.
 ///
-/// Without a unit the number is in the unit that the place expects.
+/// A number without a unit has the unit expected at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// The number as written.
+    /// Number as written.
     pub number: f64,
-    /// The unit as written.
+    /// Unit as written.
     pub unit: Option<Unit>,
 }
 
 impl Quantity {
-    /// Reads a number with or without a unit after it.
+    /// Parses a number with or without a unit after it.
     ///
     /// # Errors
-    /// A text that does not begin with a number, or whose unit is unknown.
+    /// If the text does not start with a number, or if the unit is unknown.
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
-        // The longest prefix that reads as a number: `1e3 s` and `5 eV` both come out right.
+        // The longest prefix that parses as a number: both `1e3 s` and `5 eV` are correct.
         let end = (1..=text.len())
             .rev()
             .filter(|&end| text.is_char_boundary(end))
             .find(|&end| text[..end].trim_end().parse::<f64>().is_ok())
-            .ok_or_else(|| format!("`{text}` does not begin with a number, as in \"15 s\""))?;
+            .ok_or_else(|| format!("expected a number such as \"15 s\", found `{text}`"))?;
         let number: f64 = text[..end].trim_end().parse().expect("checked in the search");
         let unit = text[end..].trim();
         if let Some(rest) = unit.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
             let whole = text[..end].trim_end();
-            return Err(format!("`{text}` has a comma for its decimal point; write \"{whole}.{rest}\""));
+            return Err(format!("`{text}` has a decimal comma; write \"{whole}.{rest}\""));
         }
         Ok(Self { number, unit: if unit.is_empty() { None } else { Some(Unit::parse(unit)?) } })
     }
 
-    /// The number in `unit`, scales of temperature by their zeros: 20 degC are 293.15 K, or 20 K as [`Unit::difference`].
+    /// Returns the number in `unit`, including the zeros of temperature scales: 20 degC are 293.15 K, or 20 K for
+    /// [`Unit::difference`].
     ///
     /// # Errors
-    /// A unit that measures something else, or that leaves open in which unit its angles are counted.
+    /// If the unit has another dimension, or if it leaves the angle unit ambiguous.
     pub fn to(&self, unit: &Unit) -> Result<f64, String> {
         match &self.unit {
             None => Ok(self.number),
-            Some(given) if given.leaves_angles_open(unit) => {
-                Err(format!("a quantity in `{given}` counts no angle, one in `{unit}` does; give it in `{unit}`"))
-            }
+            Some(given) if given.leaves_angles_open(unit) => Err(format!(
+                "expected a quantity in `{unit}`, found `{given}` without an angle unit; write it in `{unit}`"
+            )),
             Some(given) => given.convert(self.number, unit).ok_or_else(|| misplaced(given, unit)),
         }
     }
@@ -57,9 +58,9 @@ impl Quantity {
 
 fn misplaced(given: &Unit, unit: &Unit) -> String {
     if unit.to_string() == "1" {
-        return format!("a quantity in `{given}` stands where a pure number is expected");
+        return format!("expected a pure number, found `{given}`");
     }
-    format!("a quantity in `{given}` stands where one in `{unit}` is expected")
+    format!("expected a quantity in `{unit}`, found `{given}`")
 }
 
 impl From<f64> for Quantity {

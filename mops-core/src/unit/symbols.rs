@@ -1,28 +1,28 @@
-//! The symbols that units are made of.
+//! Symbols of units.
 
 use std::f64::consts::PI;
 
 use super::dimension::Dimension;
 
-/// What a symbol says of angles: frequencies are counted in cycles or in angles, which differ by 2 pi.
+/// Kind of angle count of a symbol: frequencies count cycles or angles, which differ by 2 pi.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Turning {
-    /// Nothing.
+    /// Neither angles nor cycles.
     No,
-    /// It counts angles: rad, deg, rev.
+    /// Angles: rad, deg, rev.
     Angle,
-    /// It counts cycles: Hz.
+    /// Cycles: Hz.
     Cycle,
 }
 
-/// A symbol.
+/// Symbol of a unit.
 #[derive(Debug)]
 pub(super) struct Symbol {
     pub symbol: &'static str,
     pub dimension: Dimension,
     /// Value in coherent SI units.
     pub factor: f64,
-    /// The zero of its scale in K, of a temperature.
+    /// Zero of a temperature scale, in K.
     pub zero: f64,
     pub turning: Turning,
 }
@@ -49,8 +49,8 @@ const fn scale(symbol: Symbol, zero: f64) -> Symbol {
     Symbol { zero, ..symbol }
 }
 
-/// Source: BIPM, The International System of Units, 9th edition (2019); degF and degR: NIST Special Publication 811 (2008),
-/// appendix B.8.
+/// Known symbols. Source: BIPM, The International System of Units, 9th edition (2019); degF and degR: NIST Special
+/// Publication 811 (2008), appendix B.8.
 #[rustfmt::skip]
 pub(super) const SYMBOLS: &[Symbol] = &[
     //                          m  kg   s   A  K mol dB
@@ -117,7 +117,7 @@ const PREFIXES: &[(&str, f64)] = &[
     ("T", 1e12),
 ];
 
-/// The symbol of this text, and the factor of a prefix before it. Scales of temperature take no prefix.
+/// Returns the symbol of this text, and the factor of its prefix. Temperature scales take no prefix.
 pub(super) fn find(text: &str) -> Option<(&'static Symbol, f64)> {
     let find = |name: &str| SYMBOLS.iter().find(|known| known.symbol == name);
     let prefixed = || {

@@ -170,7 +170,7 @@ fn a_wrong_dimension_is_refused_at_its_term_wherever_it_stands() {
             "der.v",
             "expected a quantity in m/s2, found one in V",
         ),
-        ("constants = { c = '3 V' }\nder = { x = 'v', v = '(F + c [N])/m' }", "der.v", "stands where `)` is expected"),
+        ("constants = { c = '3 V' }\nder = { x = 'v', v = '(F + c [N])/m' }", "der.v", "expected `)`, found"),
     ] {
         let (mistake, _) = wrong(&format!("{base}{rest}"));
         assert!(mistake.starts_with(place) && mistake.contains(fact), "{rest}\n{mistake}");

@@ -1,21 +1,25 @@
-//! Eigenvalues that are 0 as rows of a matrix depend on one another: those of free bodies and of integrators.
+//! Deflation of eigenvalues that are exactly 0 because rows of a matrix depend on one another: free bodies and
+//! integrators.
 //!
-//! QR steps find a simple one to rounding, `eps |A|`, and the double one of a free body to the root of that, on either side of
-//! the imaginary axis. Whether a number is 0 is decided by bounds of its error. Source (running error analysis): N. J. Higham,
-//! Accuracy and Stability of Numerical Algorithms, 2nd edition (2002), section 3.3.
+//! QR steps find a simple zero eigenvalue to rounding, `eps |A|`. They find the double one of a free body only to the
+//! square root of that, on either side of the imaginary axis. Running error bounds decide whether a number is 0.
+//!
+//! Source (running error analysis): N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd edition (2002),
+//! section 3.3.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::math;
 
-/// Roundings that the entries of a given matrix come with: they are computed from parameters in a few operations.
+/// Number of roundings assumed in the given entries, which are computed from parameters in a few operations.
 const ROUNDINGS: f64 = 4.0;
 
-/// Bounds of errors above this part of the terms decide nothing, as they add up faster than errors do: the root of the machine
-/// precision, to which QR steps find double eigenvalues.
+/// Ratio of an error bound to the terms above which the bound decides nothing, because bounds grow faster than errors.
+///
+/// The value is the square root of the machine precision, to which QR steps find double eigenvalues.
 const CLEAR: f64 = 1e-8;
 
-/// A matrix whose entries are known up to rounding.
+/// Matrix whose entries are known up to rounding.
 #[derive(Debug, Clone)]
 pub(super) struct Rounded {
     pub entries: DMatrix<f64>,
@@ -24,21 +28,21 @@ pub(super) struct Rounded {
 }
 
 impl Rounded {
-    /// A matrix as it is given.
+    /// Wraps a given matrix, assuming a few roundings per entry.
     pub fn given(entries: DMatrix<f64>) -> Self {
         let errors = entries.map(|x| ROUNDINGS * f64::EPSILON * x.abs());
         Self { entries, errors }
     }
 
-    /// Both parts treated alike.
+    /// Applies `f` to the entries and to the error bounds.
     pub fn map(&self, f: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self { entries: f(&self.entries), errors: f(&self.errors) }
     }
 
-    /// A matrix with the same eigenvalues but one that is 0; `None` where the rows are independent.
+    /// Returns a matrix with the same eigenvalues except one zero, or `None` if the rows are independent.
     ///
-    /// A combination `z = y'x` of the states has no rate where `y'A = 0`. It takes the place of the state with the largest
-    /// share: the others then have the rates of `A` with that state replaced.
+    /// A combination `z = y'x` of the states has a zero rate if `y'A = 0`. It replaces the state with the largest
+    /// share. The other states then have the rates of `A` with that state substituted.
     pub fn without_zero(&self) -> Option<Self> {
         let n = self.entries.nrows();
         let (y, dy) = Elimination::of(self).dependency()?;
@@ -63,13 +67,13 @@ impl Rounded {
     }
 }
 
-/// The elimination of the transposed matrix, whose columns are the rows of the matrix, with complete pivoting.
+/// Elimination of the transposed matrix with complete pivoting; its columns are the rows of the matrix.
 struct Elimination {
     m: DMatrix<f64>,
     errors: DMatrix<f64>,
-    /// The row of the matrix that each column is.
+    /// Row of the matrix for each column.
     order: Vec<usize>,
-    /// What the rows of the matrix were divided by, so that a row of small entries is no dependent one.
+    /// Divisors of the rows of the matrix, so that a row of small entries does not count as dependent.
     sizes: Vec<f64>,
 }
 
@@ -90,7 +94,7 @@ impl Elimination {
         Self { m, errors, order: (0..n).collect(), sizes }
     }
 
-    /// Factors `y` with `y'A = 0`, and bounds of their errors; `None` where there are none.
+    /// Returns factors `y` with `y'A = 0` and bounds of their errors, or `None` if the rows are independent.
     fn dependency(mut self) -> Option<(DVector<f64>, DVector<f64>)> {
         let n = self.order.len();
         for k in 0..n {
@@ -108,7 +112,7 @@ impl Elimination {
         None
     }
 
-    /// The largest entry that is not 0, from row and column `k` on.
+    /// Returns the position of the largest nonzero entry from row and column `k` on.
     fn pivot(&self, k: usize) -> Option<(usize, usize)> {
         let n = self.order.len();
         let mut best = (0.0, None);
@@ -141,7 +145,7 @@ impl Elimination {
         }
     }
 
-    /// The combination of columns by which column `rank` depends on those before it.
+    /// Returns the linear combination that expresses column `rank` by the columns before it.
     fn combination(&self, rank: usize) -> (DVector<f64>, DVector<f64>) {
         let n = self.order.len();
         let (mut y, mut dy) = (vec![0.0; n], vec![0.0; n]);

@@ -19,7 +19,7 @@ fn eigenvalues_of_a_companion_matrix_are_the_roots_of_its_polynomial() {
 
 #[test]
 fn a_badly_scaled_matrix_is_balanced_first() {
-    // A similarity by 1e8 of [[1, 2], [3, 4]].
+    // A similarity transformation of [[1, 2], [3, 4]] by 1e8.
     let a = DMatrix::from_row_slice(2, 2, &[1.0, 2e8, 3e-8, 4.0]);
     let exact = (33.0f64).sqrt();
     assert_same_set(&eigenvalues(&a).unwrap(), &[c(2.5 - 0.5 * exact, 0.), c(2.5 + 0.5 * exact, 0.)], 1e-14);
@@ -39,7 +39,7 @@ fn sums_and_products_of_eigenvalues_are_trace_and_determinant() {
 
 #[test]
 fn cyclic_shifts_and_zero_matrices_converge() {
-    // Eigenvalues of a cyclic shift are the roots of unity: plain QR steps stand still on it.
+    // Eigenvalues of a cyclic shift are the roots of unity, on which plain QR steps stagnate.
     let n = 6;
     let a = DMatrix::from_fn(n, n, |i, j| if (i + 1) % n == j { 1.0 } else { 0.0 });
     let exact: Vec<Complex> =
@@ -71,14 +71,14 @@ fn poles_of_chains_are_exact() {
 
 #[test]
 fn eigenvalues_that_rounding_alone_keeps_off_the_axis_are_named() {
-    // Poles on the axis, hidden by a change of coordinates: the computed ones are off it by rounding.
+    // Poles on the axis, hidden by a change of coordinates: rounding moves the computed ones off it.
     let hidden = |j: &DMatrix<f64>| {
         let (p, inverse) = unimodular(j.nrows(), 3);
         &p * j * inverse
     };
     let undamped = hidden(&DMatrix::from_row_slice(3, 3, &[0.0, 2.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0, -1.0]));
     assert_eq!(undecided(&undamped).unwrap().len(), 2);
-    // A pole that is small is not one that is uncertain.
+    // A small pole is not an uncertain one.
     let slow = DMatrix::from_row_slice(2, 2, &[-1.0, 1.0, 1.0, -1.000_001]);
     assert!(undecided(&slow).unwrap().is_empty());
     assert!(undecided(&DMatrix::from_element(1, 1, 1e-300)).unwrap().is_empty());
@@ -110,14 +110,15 @@ fn poles_at_zero_are_exact_whatever_the_coordinates() {
                 }
             }
             assert_eq!(zeros(&a), 2, "{a}");
-            // A spring to the ground, a millionth as stiff as the others, holds the body: no pole is 0.
+            // A spring to the ground with 1e-6 of the other stiffnesses fixes the body: no pole is 0.
             a[(masses, 0)] -= 1.0 / mass[0];
             assert_eq!(zeros(&a), 0, "{a}");
         }
     }
 }
 
-/// An integer matrix with determinant 1 and its inverse, both exact: a product of a lower and an upper triangular one.
+/// Returns an integer matrix with determinant 1 and its inverse, both exact: the product of a lower and an upper
+/// triangular matrix.
 fn unimodular(n: usize, seed: u64) -> (DMatrix<f64>, DMatrix<f64>) {
     let mut stream = stream(seed, "unimodular");
     let mut triangle = |lower: bool| {
@@ -149,14 +150,14 @@ fn unimodular(n: usize, seed: u64) -> (DMatrix<f64>, DMatrix<f64>) {
     (p, inverse)
 }
 
-/// A hard matrix, its eigenvalues, and how many of the largest Jordan block are equal.
+/// Hard matrix, its exact eigenvalues, and the size of the largest Jordan block.
 struct Hard {
     a: DMatrix<f64>,
     exact: Vec<Complex>,
     block: usize,
 }
 
-/// Matrices whose eigenvalues are known in closed form, of five kinds.
+/// Returns a matrix of one of five kinds whose eigenvalues are known in closed form.
 fn hard(kind: u8, n: usize, seed: u64) -> Hard {
     let mut stream = stream(seed, "hard");
     match kind {
@@ -193,7 +194,7 @@ fn hard(kind: u8, n: usize, seed: u64) -> Hard {
             let (p, inverse) = unimodular(n, seed);
             Hard { a: &p * j * inverse, exact: (0..n).map(|i| c(diagonal(i), 0.0)).collect(), block }
         }
-        // Graded and badly scaled: simple eigenvalues of sizes 2^-30 to 2^30, states in units that differ as much.
+        // Graded and badly scaled: simple eigenvalues of magnitudes 2^-30 to 2^30, states in units of equal spread.
         2 => {
             let diagonal: Vec<f64> = (0..n).map(|i| math::exp2(f64::from(4 * i as i32 - 2 * n as i32)) * 3.0).collect();
             let mut t = DMatrix::from_fn(n, n, |i, j| match () {
@@ -222,7 +223,7 @@ fn hard(kind: u8, n: usize, seed: u64) -> Hard {
             }
             Hard { a, exact, block: 1 }
         }
-        // Nilpotent in other coordinates: every eigenvalue is 0, and none stands on the diagonal.
+        // Nilpotent in other coordinates: every eigenvalue is 0, and the diagonal has no zeros.
         _ => {
             let j = DMatrix::from_fn(n, n, |i, j| if j == i + 1 && i % 3 != 2 { 1.0 } else { 0.0 });
             let (p, inverse) = unimodular(n, seed);
@@ -231,7 +232,7 @@ fn hard(kind: u8, n: usize, seed: u64) -> Hard {
     }
 }
 
-/// The same system with its states in another order.
+/// Returns the system with its states in random order.
 fn shuffled(a: &DMatrix<f64>, seed: u64) -> DMatrix<f64> {
     let mut stream = stream(seed, "order");
     let mut order: Vec<usize> = (0..a.nrows()).collect();
@@ -247,7 +248,7 @@ fn every_eigenvalue_of_two_hundred_hard_matrices_is_found() {
         let (kind, n) = ((case % 5) as u8, 3 + (case as usize / 5) % 10);
         let Hard { a, exact, block } = hard(kind, n, case);
         let found = eigenvalues(&a).unwrap_or_else(|why| panic!("{case}: {why}"));
-        // Beside each other or in a Jordan block they move by the root of the rounding error.
+        // Close or defective eigenvalues move by the root of the rounding error.
         for z in &exact {
             let size = if kind == 2 {
                 complex::norm(*z)
@@ -287,7 +288,7 @@ proptest! {
         prop_assert_eq!(found.len(), n);
         for z in &exact {
             let nearest = found.iter().map(|w| complex::norm(w - z)).fold(f64::INFINITY, f64::min);
-            // Near a multiple eigenvalue by the root of the rounding error, in the coordinates of size 1.
+            // Near a multiple eigenvalue the error is the root of the rounding error, in coordinates of magnitude 1.
             let gap = exact.iter().filter(|w| *w != z).map(|w| complex::norm(w - z)).fold(1.0, f64::min);
             let multiplicity = exact.iter().filter(|w| complex::norm(*w - z) < 1e-3).count() as f64;
             let error = if gap > 1e-3 { 1e-11 / (gap * gap) } else { math::powf(1e-12, 1.0 / multiplicity) };

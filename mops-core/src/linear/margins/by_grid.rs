@@ -1,5 +1,5 @@
 //! Margins and peaks of random loops against an independent computation: products of poles and zeros on a dense grid,
-//! poles of the closed loop by the principle of the argument.
+//! closed-loop poles by the argument principle.
 
 use std::f64::consts::{LN_10, PI, TAU};
 
@@ -11,10 +11,10 @@ use crate::linear::{Complex, Loop, TransferFunction};
 use crate::math::{self, complex};
 use crate::random::stream;
 
-/// Frequencies of a grid from which on a loop is not looked at.
+/// Number of grid frequencies from which on a loop is skipped.
 const MOST: usize = 200_000;
 
-/// A loop by its zeros, poles, gain and delay.
+/// Loop given by zeros, poles, gain and delay.
 #[derive(Debug, Clone)]
 struct Factored {
     zeros: Vec<Complex>,
@@ -24,7 +24,8 @@ struct Factored {
 }
 
 impl Factored {
-    /// A random loop: corners over three decades, up to one integrator, sometimes unstable, half of them with a delay.
+    /// Returns a random loop: corners over three decades, at most one integrator, some loops unstable, half of them
+    /// with a delay.
     fn random(seed: u64) -> Self {
         let mut stream = stream(seed, "loop");
         let mut root = |left: bool| {
@@ -50,7 +51,7 @@ impl Factored {
         }
         let delay = if seed.is_multiple_of(2) { math::exp(stream.random_range(-2.0..1.0) * LN_10) } else { 0.0 };
         let bare = Self { zeros, poles, gain: 1.0, delay };
-        // A gain of a thirtieth to thirty somewhere among the corners.
+        // A gain of 1/30 to 30 at a frequency among the corners.
         let omega = math::exp(stream.random_range(-1.0..2.0) * LN_10);
         let gain = math::exp(stream.random_range(-1.5..1.5) * LN_10) / complex::norm(bare.at(omega));
         Self { gain, ..bare }
@@ -70,7 +71,7 @@ impl Factored {
         Loop::new(g.state_space().unwrap()).unwrap()
     }
 
-    /// Frequencies, at most [`MOST`], at which neither L nor its distance from -1 turns by much from one to the next.
+    /// Returns frequencies, at most [`MOST`], between which neither L nor its distance from -1 turns by much.
     fn grid(&self) -> Vec<f64> {
         let mut grid = Vec::new();
         let mut omega: f64 = 1e-7;
@@ -85,15 +86,16 @@ impl Factored {
         grid
     }
 
-    /// Number of unstable poles of the closed loop with L multiplied by `gain`.
+    /// Returns the number of unstable closed-loop poles when L is multiplied by `gain`.
     fn unstable(&self, gain: f64, values: &[Complex]) -> i64 {
         let turn: f64 = values.windows(2).map(|l| complex::arg((l[1] * gain + 1.0) / (l[0] * gain + 1.0))).sum();
         self.count(turn, gain, values[0])
     }
 
-    /// The same by the turn of 1 + L over all frequencies of a grid, which begins at `first`.
+    /// Returns the number of unstable closed-loop poles from the turn of 1 + L over a grid; `first` is L at its first
+    /// frequency.
     fn count(&self, turn: f64, gain: f64, first: Complex) -> i64 {
-        // The way around a pole at 0, or from frequency 0, where the response is real, to the first one.
+        // Turn around a pole at 0, or from frequency 0, where the response is real, to the first grid frequency.
         let integrators = self.poles.iter().filter(|p| complex::norm(**p) == 0.0).count() as f64;
         let at_zero = c(complex::norm(first).copysign(first.re), 0.0);
         let start = if integrators > 0.0 { 0.0 } else { complex::arg((first * gain + 1.0) / (at_zero * gain + 1.0)) };
@@ -101,7 +103,7 @@ impl Factored {
         (poles - (2.0 * (turn + start) - integrators * PI) / TAU).round() as i64
     }
 
-    /// Where `|L| = 1`, on a grid.
+    /// Returns the frequencies at which `|L| = 1`, located on a grid.
     fn crossovers(&self, grid: &[f64], values: &[Complex]) -> Vec<f64> {
         let passes = |l: &[Complex]| (complex::norm(l[0]) >= 1.0) != (complex::norm(l[1]) >= 1.0);
         let pairs = grid.windows(2).zip(values.windows(2)).filter(|(_, l)| passes(l));
@@ -110,7 +112,7 @@ impl Factored {
             .collect()
     }
 
-    /// The number of unstable poles where L is turned by a lead, rad, at all frequencies but the very lowest.
+    /// Returns the number of unstable poles when L is turned by a lead, rad, at all frequencies except the very lowest.
     fn unstable_with_lead(&self, lead: f64, values: &[Complex]) -> i64 {
         let ramp: f64 = (0..2000)
             .map(|i| {
@@ -126,7 +128,7 @@ impl Factored {
         )
     }
 
-    /// Gains above 1/1000 and below 1000 with which L meets -1.
+    /// Returns the gains at which L meets -1.
     fn gains(&self, grid: &[f64], values: &[Complex]) -> Vec<f64> {
         let mut gains = Vec::new();
         for (w, l) in grid.windows(2).zip(values.windows(2)) {
@@ -144,7 +146,7 @@ impl Factored {
     }
 }
 
-/// The end of the range in which `like_low` holds.
+/// Returns the end of the subrange in which `like_low` is true.
 fn bisect(range: &[f64], like_low: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (range[0], range[1]);
     for _ in 0..60 {
@@ -154,8 +156,10 @@ fn bisect(range: &[f64], like_low: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// The change nearest to 0 beside which no pole is unstable, among the forty nearest of those at which one may become so;
-/// else the largest that was tried.
+/// Returns the magnitude of the change nearest to 0 next to which no pole is unstable.
+///
+/// The forty nearest of the given changes are tried, at each of which stability may change. Returns as error the
+/// largest magnitude that was tried.
 fn nearest(mut changes: Vec<f64>, unstable: impl Fn(f64) -> i64) -> Result<f64, f64> {
     changes.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let beside = |x: f64| {
@@ -171,7 +175,7 @@ fn nearest(mut changes: Vec<f64>, unstable: impl Fn(f64) -> i64) -> Result<f64, 
     tried.iter().copied().find(|&x| beside(x)).map(f64::abs).ok_or(all)
 }
 
-/// Whether a margin is minus the nearest change that was found, or beyond all that were tried.
+/// Returns true if a margin is minus the nearest change found, or beyond all that were tried.
 fn agrees(margin: &Result<f64, String>, nearest: Result<f64, f64>) -> bool {
     match (margin, nearest) {
         (Ok(margin), Ok(change)) => (margin + change).abs() <= 1e-6 * (1.0 + change),
@@ -185,7 +189,7 @@ fn decibel(gain: f64) -> f64 {
     20.0 * math::log10(gain)
 }
 
-/// The highest value of a function on a grid, made exact between its neighbours.
+/// Returns the highest value of a function on a grid, refined between grid neighbours.
 fn highest(grid: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let values: Vec<f64> = grid.iter().map(|&w| f(w)).collect();
     let mut best = values.iter().copied().fold(0.0, f64::max);
@@ -246,7 +250,7 @@ proptest! {
             let phase = nearest(leads, |lead| factored.unstable_with_lead(lead, &values));
             let margin = found.phase_margin();
             prop_assert!(agrees(&margin, phase), "phase {:?} {:?} {:?}", margin, phase, factored);
-            // Delays that are left or may be added; the margin may ask for a lead instead.
+            // Remaining or additional delays; the margin may require a lead instead.
             let delays = lags.iter().flat_map(|(w, lag)| (-9..=9).map(move |k| (lag + TAU * f64::from(k)) / w));
             let delays = delays.filter(|more| factored.delay + more > 0.0).collect();
             let delay = nearest(delays, |more| {

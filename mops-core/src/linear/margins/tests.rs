@@ -10,7 +10,7 @@ fn loop_of(numerator: &[f64], denominator: &[f64], delay: f64) -> Loop {
     Loop::new(g.state_space().unwrap()).unwrap()
 }
 
-/// Phase crossovers with a gain above -60 dB.
+/// Returns the phase crossovers with a gain above -60 dB.
 fn phase_crossovers(l: &Loop) -> Vec<Crossing> {
     let mut found = Vec::new();
     l.phase_crossovers_in(|span| span.gain()[1] > math::ln(1e-3), |crossing| found.push(crossing)).unwrap();
@@ -45,7 +45,7 @@ fn an_unstable_loop_has_negative_margins_that_pass_zero_at_the_limit() {
 
 #[test]
 fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
-    // exp(-s T)/s: stable for T < pi/2, phase margin pi/2 - T, delay margin the same, as |L| = 1 at 1 rad/s.
+    // exp(-s T)/s: stable for T < pi/2; phase margin and delay margin are both pi/2 - T, as |L| = 1 at 1 rad/s.
     for delay in [0.1, 1.0, 1.57] {
         let l = loop_of(&[1.0], &[1.0, 0.0], delay);
         assert!(l.is_stable(), "{delay}");
@@ -60,16 +60,16 @@ fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
 
 #[test]
 fn a_loop_may_become_stable_by_a_delay() {
-    // 0.2/(s^2 - 0.1 s + 1), unstable: a delay of a few seconds turns the phase so that feedback damps.
+    // 0.2/(s^2 - 0.1 s + 1), unstable: a delay of a few seconds shifts the phase so that the feedback damps.
     let at = |delay: f64| loop_of(&[0.2], &[1.0, -0.1, 1.0], delay).is_stable();
     let found: Vec<bool> = [0.0, 2.0, 4.5, 7.0].iter().map(|&d| at(d)).collect();
-    // By counting encirclements on a fine grid.
+    // Count of encirclements on a fine grid.
     let counted: Vec<bool> = [0.0, 2.0, 4.5, 7.0].iter().map(|&d| encirclements(d) == -2).collect();
     assert_eq!(found, counted);
     assert!(found.contains(&true) && found.contains(&false), "{found:?}");
 }
 
-/// Clockwise encirclements of -1 by `0.2 exp(-s T)/(s^2 - 0.1 s + 1)`, whose two poles are unstable.
+/// Returns the clockwise encirclements of -1 by `0.2 exp(-s T)/(s^2 - 0.1 s + 1)`, whose two poles are unstable.
 fn encirclements(delay: f64) -> i32 {
     let l = |w: f64| {
         let s = Complex::new(0.0, w);
@@ -135,7 +135,7 @@ fn a_loop_that_never_reaches_gain_one_has_no_finite_margin() {
     assert_eq!((l.phase_margin().unwrap(), l.delay_margin().unwrap()), (f64::INFINITY, f64::INFINITY));
 }
 
-/// The lowest gain with which `k exp(-s T)/(s + 1)` is unstable: where `w T + atan w = pi`, by bisection.
+/// Returns the lowest gain at which `k exp(-s T)/(s + 1)` is unstable, where `w T + atan w = pi`, by bisection.
 fn limit_of_lag(delay: f64) -> f64 {
     let (mut low, mut high) = (0.0, PI / delay);
     for _ in 0..200 {
@@ -146,9 +146,9 @@ fn limit_of_lag(delay: f64) -> f64 {
 }
 
 #[test]
-fn the_margins_of_an_unstable_loop_lead_back_to_stability_whatever_lies_between() {
-    // A lag with a long delay, in ten versions, up to gains with many crossings: from the limit on, the gain margin is
-    // minus the distance in dB, and the phase margin falls too.
+fn the_margins_of_an_unstable_loop_restore_stability_whatever_lies_between() {
+    // A lag with ten different delays, up to gains with many crossings. From the limit on, the gain margin is minus the
+    // distance in dB, and the phase margin falls too.
     for delay in [0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0] {
         let limit = limit_of_lag(delay);
         let mut last = (0.0, 0.0);
@@ -158,7 +158,7 @@ fn the_margins_of_an_unstable_loop_lead_back_to_stability_whatever_lies_between(
             let (gain, phase) = (l.gain_margin(false).unwrap(), l.phase_margin().unwrap());
             assert_near(gain, -20.0 * math::log10(excess), 1e-9);
             assert!(gain < last.0 && phase < last.1, "{delay} {excess}: {phase} after {}", last.1);
-            // The lead that brings the crossover back to -1 from where the delay has turned it.
+            // The lead that turns the crossover from its delayed angle back to -1.
             let w = math::powi(limit * excess, 2) - 1.0;
             let w = w.sqrt();
             assert_near(phase, PI - w * delay - math::atan(w), 1e-8 * (1.0 + w * delay));
@@ -168,8 +168,8 @@ fn the_margins_of_an_unstable_loop_lead_back_to_stability_whatever_lies_between(
 }
 
 #[test]
-fn a_conditionally_stable_loop_is_led_to_the_nearer_of_its_limits() {
-    // k (s + 1)^2/s^3 is stable from k = 1/2 on. With a further lag (0.01 s + 1)^2 there is an upper limit too.
+fn a_conditionally_stable_loop_has_the_margin_to_the_nearer_of_its_limits() {
+    // k (s + 1)^2/s^3 is stable for k > 1/2. A further lag (0.01 s + 1)^2 adds an upper limit.
     let above = |k: f64| loop_of(&[k, 2.0 * k, k], &[1.0, 0.0, 0.0, 0.0], 0.0);
     for k in [0.499, 0.3, 0.1, 0.01, 1e-4] {
         assert_near(above(k).gain_margin(false).unwrap(), 20.0 * math::log10(k / 0.5), 1e-9);
@@ -186,19 +186,19 @@ fn a_conditionally_stable_loop_is_led_to_the_nearer_of_its_limits() {
 }
 
 #[test]
-fn margins_of_what_nothing_makes_stable_are_refused() {
-    // Two unstable poles and no zero: k/(s - 1)^2. A real unstable pole: no turn of the phase takes it away.
+fn margins_of_loops_that_cannot_be_stabilised_are_refused() {
+    // Two unstable poles and no zero: k/(s - 1)^2. A real unstable pole: no phase shift removes it.
     let never = loop_of(&[3.0], &[1.0, -2.0, 1.0], 0.0);
-    assert!(never.gain_margin(false).unwrap_err().contains("no change of the gain"));
+    assert!(never.gain_margin(false).unwrap_err().contains("no gain change"));
     let slow = loop_of(&[0.5], &[1.0, -1.0], 0.1);
-    assert!(slow.phase_margin().unwrap_err().contains("no turn of the phase"));
+    assert!(slow.phase_margin().unwrap_err().contains("no phase shift"));
     assert!(slow.delay_margin().unwrap_err().contains("no delay"));
     assert_near(slow.gain_margin(false).unwrap(), -20.0 * math::log10(2.0), 1e-9);
 }
 
 #[test]
 fn with_a_delay_the_complementary_sensitivity_is_one_at_frequency_zero_whatever_the_gain() {
-    // k exp(-s T)/(s (s + 1)): T is 1 at frequency 0; the gain margin is closed where the delay is small or alone.
+    // k exp(-s T)/(s (s + 1)): T is 1 at frequency 0. The gain margin has a closed form for an integrator with delay.
     for (k, delay) in [(1e-1, 1.0), (1e-2, 1.0), (1e-3, 0.1), (1e-4, 10.0), (1e-6, 1.0), (1e-9, 1.0), (1e-3, 1e-3)] {
         let l = loop_of(&[k], &[1.0, 1.0, 0.0], delay);
         assert_near(l.peak_complementary().unwrap(), 1.0, 1e-12);
@@ -206,7 +206,7 @@ fn with_a_delay_the_complementary_sensitivity_is_one_at_frequency_zero_whatever_
         assert_near(integrator.peak_complementary().unwrap(), 1.0, 1e-12);
         assert_near(integrator.gain_margin(false).unwrap(), 20.0 * math::log10(0.5 * PI / (k * delay)), 1e-8);
     }
-    // Without an integrator it starts at k/(1 + k).
+    // Without an integrator T is k/(1 + k) at frequency 0.
     for k in [0.5, 1e-2, 1e-5] {
         assert_near(loop_of(&[k], &[1.0, 1.0], 0.3).peak_complementary().unwrap(), k / (1.0 + k), 1e-12);
     }
@@ -227,7 +227,7 @@ fn a_loop_of_gain_alone_and_one_of_nothing_have_margins() {
 
 #[test]
 fn undamped_and_lightly_damped_loops_are_searched_in_little_time() {
-    // A double integrator, a resonance of damping 1e-7 under a delay, all-pass gain: none of them exhausts the search.
+    // A double integrator, a resonance of damping 1e-7 with a delay, all-pass gain: none of them exhausts the search.
     let double = loop_of(&[1.0], &[1.0, 0.0, 0.0], 0.1);
     assert!(!double.is_stable() && double.gain_margin(false).is_err());
     let sharp = loop_of(&[1e-9], &[1.0, 2e-7, 1.0, 0.0], 0.3);
@@ -236,7 +236,7 @@ fn undamped_and_lightly_damped_loops_are_searched_in_little_time() {
     assert!(all_pass.is_stable() && all_pass.gain_margin(false).unwrap() > 0.0);
 }
 
-/// Frequencies at which the search divides the axis: corners, and powers of ten beside them.
+/// Checks the frequencies at which the search splits the axis: corners, and powers of ten relative to them.
 #[test]
 fn what_happens_at_a_corner_is_found() {
     let mut stream = crate::random::stream(7, "corners");
@@ -250,7 +250,7 @@ fn what_happens_at_a_corner_is_found() {
         let butterworth = [1.0, 2.0f64.sqrt() * a, a * a];
         assert_near(bandwidth(&system(&[a * a], &butterworth)).unwrap(), a, 1e-10 * a);
         assert_near(loop_of(&[a], &[1.0, 0.0], 0.0).closed_loop_bandwidth().unwrap(), a, 1e-12 * a);
-        // sqrt(2) a/(s + a) and sqrt(2) a^2/(s (s + a)) have the gain 1 at a; a phase of -45 and of -135 degrees.
+        // sqrt(2) a/(s + a) and sqrt(2) a^2/(s (s + a)) have gain 1 at a, and a phase of -45 and -135 degrees.
         let lag = loop_of(&[2.0f64.sqrt() * a], &[1.0, a], 0.0);
         assert_near(crossover(&lag)[0], a, 1e-12 * a);
         assert_near(lag.phase_margin().unwrap(), 0.75 * PI, 1e-12);
@@ -259,13 +259,13 @@ fn what_happens_at_a_corner_is_found() {
         assert_near(servo.phase_margin().unwrap(), 0.25 * PI, 1e-12);
         assert_near(servo.delay_margin().unwrap(), 0.25 * PI / a, 1e-12 / a);
         assert_near(crossover(&loop_of(&[a * a], &[1.0, 0.0, 0.0], 0.0))[0], a, 1e-12 * a);
-        // K/(s (s^2 + 0.8 a s + a^2)) is real at a, where it is -K/(0.8 a^3).
+        // K/(s (s^2 + 0.8 a s + a^2)) is real at a, with the value -K/(0.8 a^3).
         let resonant = loop_of(&[0.4 * a * a * a], &[1.0, 0.8 * a, a * a, 0.0], 0.0);
         assert_near(resonant.gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-9);
     }
 }
 
-/// Two masses that are free to move, coupled by a spring and a damper, driven and measured (position and speed) at the first.
+/// Checks two free masses coupled by a spring and a damper, driven and measured (position and speed) at the first.
 #[test]
 fn loops_around_free_masses_have_the_margins_of_their_transfer_function() {
     let mut stream = crate::random::stream(11, "masses");

@@ -6,20 +6,22 @@ use super::robust::most_independent;
 use crate::linear::Complex;
 use crate::linear::zeros::complement;
 
-/// The feedback that places one pole after the other: an eigenvector of the closed loop, of a pair the plane of both, then
-/// what is left of the system on the complement. Poles may be repeated as often as wanted; they get Jordan blocks where the
-/// inputs allow nothing else. Of several inputs those act that need to least. `None` where a direction cannot be found.
+/// Returns the feedback that places one pole after the other.
+///
+/// Each step fixes a closed-loop eigenvector, or for a pair the plane of both, and continues on the complement. Poles
+/// may be repeated any number of times; they get Jordan blocks where the inputs allow nothing else. With several
+/// inputs, the combination with the smallest effort is used. Returns `None` if a direction cannot be found.
 ///
 /// Source: G. Miminis, C. C. Paige, An algorithm for pole assignment of time invariant linear systems, International
-/// Journal of Control 35 (1982) 341-354; with several inputs in the way of A. Varga, A Schur method for pole assignment,
-/// IEEE Transactions on Automatic Control 26 (1981) 517-519.
+/// Journal of Control 35 (1982) 341-354; with several inputs as in A. Varga, A Schur method for pole assignment, IEEE
+/// Transactions on Automatic Control 26 (1981) 517-519.
 pub(super) fn deflated(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     let (mut a, mut b) = (a.clone(), b.clone());
     let mut basis = DMatrix::<f64>::identity(n, n);
     let mut k = DMatrix::<f64>::zeros(b.ncols(), n);
     for &pole in poles.iter().filter(|pole| pole.im >= 0.0) {
-        // The columns of x are directions of the closed loop, those of v what the feedback makes of them.
+        // Columns of x: directions of the closed loop; columns of v: their feedback.
         let (x, v) = if pole.im == 0.0 { single(&a, &b, pole.re) } else { pair(&a, &b, pole)? };
         let qr = x.qr();
         let (q, r) = (qr.q(), qr.r());
@@ -32,7 +34,7 @@ pub(super) fn deflated(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) ->
     k.iter().all(|x| x.is_finite()).then_some(k)
 }
 
-/// The direction x of a real pole, and its v, with `(A - pole) x = B v` and the smallest v beside x.
+/// Returns the direction x of a real pole and its v, with `(A - pole) x = B v` and the smallest `|v|/|x|`.
 fn single(a: &DMatrix<f64>, b: &DMatrix<f64>, pole: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let (n, inputs) = (a.nrows(), b.ncols());
     let mut both = DMatrix::zeros(n, n + inputs);
@@ -43,13 +45,15 @@ fn single(a: &DMatrix<f64>, b: &DMatrix<f64>, pole: f64) -> (DMatrix<f64>, DMatr
     let upper = solutions.rows(0, n).into_owned();
     let svd = upper.clone().svd(false, true);
     let best = svd.singular_values.imax();
-    let weights = svd.v_t.expect("it was asked for").row(best).transpose();
+    let weights = svd.v_t.expect("the SVD computes V").row(best).transpose();
     let columns = |x: DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
     (columns(upper * &weights), columns(solutions.rows(n, inputs) * weights))
 }
 
-/// The real plane of a complex pair, and its v, with `(A - pole) x = B v` for x and v made of the two columns: of all x
-/// beside whose v `|x|^2 + |v|^2 = 1` one whose parts span the largest area, so that v is small and the plane well defined.
+/// Returns the real plane x of a complex pair and its v, with `(A - pole) x = B v`.
+///
+/// The two columns of x and of v are real and imaginary parts. Among all x with `|x|^2 + |v|^2 = 1`, the parts of the
+/// chosen x span the largest area. Hence v is small and the plane well defined.
 fn pair(a: &DMatrix<f64>, b: &DMatrix<f64>, pole: Complex) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let complex = |m: &DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
     let (n, inputs) = (a.nrows(), b.ncols());
@@ -63,11 +67,11 @@ fn pair(a: &DMatrix<f64>, b: &DMatrix<f64>, pole: Complex) -> Option<(DMatrix<f6
     let solutions = complement(&both.adjoint());
     let upper = solutions.rows(0, n).into_owned();
     let parts = |x: &DVector<Complex>| DMatrix::from_columns(&[x.map(|z| z.re), x.map(|z| z.im)]);
-    // Ascent: the best x beside a plane, then the plane of that x. It starts at the plane that all of them reach most of.
+    // Ascent: the best x for a plane, then the plane of that x. The initial plane is the dominant one of all solutions.
     let mut all = DMatrix::zeros(n, 2 * inputs);
     all.columns_mut(0, inputs).copy_from(&upper.map(|z| z.re));
     all.columns_mut(inputs, inputs).copy_from(&upper.map(|z| z.im));
-    let mut plane = all.svd(true, false).u.expect("it was asked for").columns(0, 2).into_owned();
+    let mut plane = all.svd(true, false).u.expect("the SVD computes U").columns(0, 2).into_owned();
     let mut weights = DVector::from_element(inputs, Complex::new(1.0, 0.0));
     for _ in 0..20 {
         weights = most_independent(&upper, &plane);

@@ -1,4 +1,4 @@
-//! Pole placement by eigenvectors that are as independent as possible.
+//! Robust pole placement: eigenvectors as independent as possible.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,16 +7,16 @@ use crate::linear::system::beside;
 use crate::linear::zeros::complement;
 use crate::math::complex;
 
-/// The closed loop `A - B K` with eigenvectors as independent as possible; `range` spans the columns of `B`. `None` where
-/// they depend on each other.
+/// Returns the closed loop `A - B K` with eigenvectors as independent as possible; `range` spans the columns of `B`.
+/// Returns `None` if the eigenvectors are dependent.
 ///
-/// Source: J. Kautsky, N. K. Nichols, P. Van Dooren, Robust pole assignment in linear state feedback, International Journal
-/// of Control 41 (1985) 1129-1155, method 0; for complex pairs A. L. Tits, Y. Yang, Globally convergent algorithms for robust
-/// pole assignment by state feedback, IEEE Transactions on Automatic Control 41 (1996) 1432-1452.
+/// Source: J. Kautsky, N. K. Nichols, P. Van Dooren, Robust pole assignment in linear state feedback, International
+/// Journal of Control 41 (1985) 1129-1155, method 0; for complex pairs A. L. Tits, Y. Yang, Globally convergent
+/// algorithms for robust pole assignment by state feedback, IEEE Transactions on Automatic Control 41 (1996) 1432-1452.
 pub(super) fn robust(a: &DMatrix<f64>, range: &DMatrix<f64>, poles: &[Complex]) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     let beyond = complement(range).map(|x| Complex::new(x, 0.0));
-    // Eigenvectors to a pole are those that B can make so: the columns of its space.
+    // Eigenvectors attainable for a pole: the span of the columns of its space.
     let leading: Vec<usize> = (0..n).filter(|&j| poles[j].im >= 0.0).collect();
     let space = |pole: Complex| {
         let shifted = a.map(|x| Complex::new(x, 0.0)) - DMatrix::identity(n, n) * pole;
@@ -59,18 +59,18 @@ pub(super) fn robust(a: &DMatrix<f64>, range: &DMatrix<f64>, poles: &[Complex]) 
     closed.iter().all(|z| z.is_finite()).then_some(closed)
 }
 
-/// A first eigenvector of the space, far from those found.
+/// Returns an initial eigenvector in the space, far from the span of those found.
 fn first(space: &DMatrix<Complex>, found: &DMatrix<f64>) -> DVector<Complex> {
     let rest = complement(found).map(|x| Complex::new(x, 0.0));
     let svd = (rest.adjoint() * space).svd(false, true);
-    let v = svd.v_t.expect("it was asked for").adjoint();
+    let v = svd.v_t.expect("the SVD computes V").adjoint();
     let second =
         if v.ncols() > 1 { v.column(1) * Complex::new(0.0, 0.5) } else { v.column(0) * Complex::new(0.0, 0.0) };
     space * (v.column(0) + second)
 }
 
-/// Weights of the columns of the space that make the vector with which the determinant of all eigenvectors is largest: with
-/// its conjugate where the `complement` of the others has two columns.
+/// Returns the weights of the columns of `space` whose combination maximises the determinant of all eigenvectors. If
+/// `complement` has two columns, the eigenvector enters together with its conjugate.
 pub(super) fn most_independent(space: &DMatrix<Complex>, complement: &DMatrix<f64>) -> DVector<Complex> {
     let y = complement.map(|x| Complex::new(x, 0.0));
     if y.ncols() == 1 {
@@ -81,15 +81,15 @@ pub(super) fn most_independent(space: &DMatrix<Complex>, complement: &DMatrix<f6
     eigen.eigenvectors.column(eigen.eigenvalues.iamax()).into_owned()
 }
 
-/// Puts an eigenvector in its place: its real part, and for a complex pole its imaginary part beside it. `None` for a
-/// vector of no length.
+/// Stores a unit eigenvector in column `j`; for a complex pole, its real and imaginary parts in columns `j` and
+/// `j + 1`. Returns `None` for a zero vector.
 fn set(x: &mut DMatrix<f64>, j: usize, pole: Complex, vector: &DVector<Complex>) -> Option<()> {
     let length = vector.norm();
     if !(length > 0.0 && length.is_finite()) {
         return None;
     }
     if pole.im == 0.0 {
-        // The largest entry is made real, and with it all.
+        // Rotated so that the largest entry is real; the others then are real too.
         let turn = vector[vector.icamax()];
         let real = (vector * (turn.conj() / complex::norm(turn))).map(|z| z.re);
         x.set_column(j, &real.normalize());

@@ -11,7 +11,8 @@ use crate::math::{self, complex};
 
 #[test]
 fn the_pendulum_gets_the_feedback_of_the_thesis() {
-    // Section 5.2 prints (-0.1387, -0.0690, -0.7345, -0.1354); further digits by SciPy 1.17.1, `place_poles`.
+    // Section 5.2 of the thesis gives (-0.1387, -0.0690, -0.7345, -0.1354); further digits from SciPy 1.17.1,
+    // `place_poles`.
     let (a, b) = furuta();
     let k = place(&a, &b, &[-5.0, -8.0, -10.0, -14.0].map(|p| c(p, 0.0))).unwrap().k;
     for (found, expected) in k.iter().zip([-0.138_746_07, -0.068_978_83, -0.734_559_28, -0.135_415_5]) {
@@ -21,7 +22,7 @@ fn the_pendulum_gets_the_feedback_of_the_thesis() {
 
 #[test]
 fn a_chain_of_integrators_gets_the_coefficients_of_its_polynomial_also_with_repeated_poles() {
-    // Feedback of the companion form: the coefficients of (s + 1)^n, rising powers.
+    // Feedback of the companion form: the coefficients of (s + 1)^n, ascending powers.
     let n = 10;
     let mut denominator = vec![0.0; n + 1];
     denominator[0] = 1.0;
@@ -51,7 +52,7 @@ fn with_several_inputs_the_poles_are_placed_and_hardly_move_with_the_model() {
         wanted.extend((4..n).map(|i| c(-(i as f64) + 1.0, 0.0)));
         let k = place(&a, &b, &wanted).unwrap().k;
         assert_same_set(&eigenvalues(&(&a - &b * &k)).unwrap(), &wanted, 1e-9);
-        // How far the poles move with the model, which is disturbed by a millionth.
+        // Movement of the poles when the model is perturbed by 1e-6.
         let disturbed = &a + random(n, n, seed + 90) * 1e-6;
         let moved = |k: &DMatrix<f64>| {
             let roots = eigenvalues(&(&disturbed - &b * k)).unwrap();
@@ -64,8 +65,8 @@ fn with_several_inputs_the_poles_are_placed_and_hardly_move_with_the_model() {
 
 #[test]
 fn eigenvectors_are_as_independent_as_those_of_another_implementation() {
-    // Kautsky, Nichols, Van Dooren, example 1 (a chemical reactor). The condition of the eigenvectors by SciPy 1.17.1,
-    // `place_poles`, is 4.28 with method KNV0 and 4.51 with YT.
+    // Kautsky, Nichols, Van Dooren, example 1 (a chemical reactor). SciPy 1.17.1, `place_poles`, gives an eigenvector
+    // condition number of 4.28 with method KNV0 and of 4.51 with YT.
     let a = [
         [1.38, -0.2077, 6.715, -5.676],
         [-0.5814, -4.29, 0.0, 0.675],
@@ -81,7 +82,7 @@ fn eigenvectors_are_as_independent_as_those_of_another_implementation() {
     assert!(condition(&closed, &wanted) < 4.28, "{}", condition(&closed, &wanted));
 }
 
-/// Condition of the unit eigenvectors to real, simple eigenvalues.
+/// Returns the condition number of the unit eigenvectors of real, simple eigenvalues.
 fn condition(a: &DMatrix<f64>, roots: &[Complex]) -> f64 {
     let n = a.nrows();
     let mut x = DMatrix::zeros(n, n);
@@ -98,7 +99,7 @@ fn condition(a: &DMatrix<f64>, roots: &[Complex]) -> f64 {
 fn several_inputs_may_repeat_a_pole_more_often_than_there_are_inputs() {
     let (a, b) = (random(5, 5, 8), random(5, 2, 9));
     let k = place(&a, &b, &[c(-2.0, 0.0); 5]).unwrap().k;
-    // A defective eigenvalue: its computed copies lie on a circle around it.
+    // Defective eigenvalue: its computed copies lie on a circle around the exact one.
     assert!(eigenvalues(&(&a - &b * k)).unwrap().iter().all(|z| complex::norm(z + 2.0) < 0.02));
 }
 
@@ -114,8 +115,9 @@ fn what_cannot_be_placed_is_refused() {
     assert!(place(&a, &b, &[c(f64::NAN, 0.0); 4]).unwrap_err().contains("finite"));
 }
 
-/// By how much the coefficients of the characteristic polynomial of `A - B K`, in 30 digits, are not those of the poles,
-/// relative to those of poles of the same sizes on the negative axis.
+/// Returns the error of the characteristic polynomial of `A - B K`, in 30 digits, against that of the specified poles.
+///
+/// Coefficients are relative to those of poles of equal magnitude on the negative real axis.
 fn error_of_polynomial(a: &DMatrix<f64>, b: &DMatrix<f64>, k: &DMatrix<f64>, poles: &[Complex]) -> f64 {
     use reference::{characteristic, exactly, minus, times};
     let closed = minus(&exactly(a), &times(&exactly(b), &exactly(k)));
@@ -126,7 +128,7 @@ fn error_of_polynomial(a: &DMatrix<f64>, b: &DMatrix<f64>, k: &DMatrix<f64>, pol
     (0..n).map(|i| (found[i].0 - wanted[n - i]).abs() / size[n - i]).fold(0.0, f64::max)
 }
 
-/// An axis of third order and a heater of first order.
+/// Third-order axis and first-order heater.
 fn axis_and_heater(gain: f64, lag: f64, loss: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let a = [[0.0, 1.0, 0.0, 0.0], [0.0, -0.3, 3.0, 0.0], [0.0, -2.0, -lag, 0.0], [0.0, 0.0, 0.0, -loss]];
     let b = [[0.0, 0.0], [0.0, 0.0], [gain, 0.0], [0.0, 0.7]];
@@ -135,7 +137,7 @@ fn axis_and_heater(gain: f64, lag: f64, loss: f64) -> (DMatrix<f64>, DMatrix<f64
 
 #[test]
 fn poles_that_the_controllability_indices_allow_in_jordan_blocks_only_are_placed_in_them() {
-    // Indices (3, 1): two double poles cannot have four independent eigenvectors.
+    // Controllability indices (3, 1): two double poles cannot have four independent eigenvectors.
     for (gain, lag, loss) in [(4.0, 8.0, 0.2), (1e-3, 8.0, 0.2), (1e4, 8.0, 5.0), (4.0, 300.0, 1e-3)] {
         let (a, b) = axis_and_heater(gain, lag, loss);
         for poles in [[-3.0, -3.0, -5.0, -5.0], [-1.0, -1.0, -20.0, -20.0], [-2.0, -2.0, -2.0, -7.0], [-4.0; 4]] {
@@ -146,7 +148,7 @@ fn poles_that_the_controllability_indices_allow_in_jordan_blocks_only_are_placed
             assert_eq!(placed.defective, Some(vec![3, 1]));
             assert!(placed.k.amax() < 1e3 * 400.0 / gain.min(0.7), "{}", placed.k);
         }
-        // Three and one that differ allow independent eigenvectors, and so do a double one and two others.
+        // A double pole and two simple ones, or four simple ones, allow independent eigenvectors.
         for poles in [[-3.0, -4.0, -5.0, -5.0], [-3.0, -4.0, -5.0, -6.0]] {
             let poles = poles.map(|p| c(p, 0.0));
             let placed = place(&a, &b, &poles).unwrap();
@@ -181,8 +183,8 @@ fn repeated_pairs_are_placed_with_several_inputs_too() {
 }
 
 #[test]
-fn an_ill_conditioned_request_says_how_far_poles_move_or_is_refused() {
-    // Ten poles of nearly equal stable modes from one input, to where they are fast: the gains are huge.
+fn an_ill_conditioned_request_reports_the_pole_movement_or_is_refused() {
+    // Ten nearly equal stable poles moved far to the left with one input: the gains are huge.
     let n = 10;
     let a = DMatrix::from_fn(n, n, |i, j| if i == j { -1.0 - 0.5 * i as f64 } else { 0.0 });
     let b = DMatrix::from_element(n, 1, 1.0);
@@ -191,13 +193,13 @@ fn an_ill_conditioned_request_says_how_far_poles_move_or_is_refused() {
         Ok(placed) => assert!(placed.error > 1e-3 || placed.sensitivity > 1e-3),
         Err(why) => assert!(why.contains("ill-conditioned"), "{why}"),
     }
-    // The same way with four is fine, though sensitive.
+    // With four poles the same request is accepted, but sensitive.
     let (a, b) = (a.view((0, 0), (4, 4)).into_owned(), b.rows(0, 4).into_owned());
     let placed = place(&a, &b, &wanted[..4]).unwrap();
     assert!(placed.error < 10.0 && placed.sensitivity > 1.0, "{} {}", placed.error, placed.sensitivity);
 }
 
-/// What is checked of random systems: the polynomial in 30 digits, and that the distance that is stated is right.
+/// Checks the characteristic polynomial in 30 digits and the reported distance of the poles.
 fn check(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<(), TestCaseError> {
     let placed = match place(a, b, poles) {
         Ok(placed) => placed,
@@ -211,7 +213,7 @@ fn check(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<(), Te
     let exact = reference::roots(&reference::characteristic(&closed));
     let far = distance(&exact, poles, |_| 1.0);
     prop_assert!(error < 1e-7, "{} {} {} {:?} {}", error, a, b, poles, placed.k);
-    // The reference has 30 digits, of which a multiple root keeps its part.
+    // The reference has 30 digits; a multiple root keeps only a fraction of them.
     let copies = poles.iter().map(|p| poles.iter().filter(|q| *q == p).count()).max().unwrap_or(1);
     prop_assert!(
         far <= 10.0 * placed.error + 100.0 * math::powf(1e-29, 1.0 / copies as f64) + 1e-10,
@@ -223,7 +225,7 @@ fn check(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<(), Te
     Ok(())
 }
 
-/// Poles with conjugates, some of them repeated.
+/// Returns random poles with their conjugates, some of them repeated.
 fn random_poles(n: usize, seed: u64, repeats: f64) -> Vec<Complex> {
     let mut stream = stream(seed, "poles");
     let mut poles: Vec<Complex> = Vec::new();
@@ -260,7 +262,7 @@ proptest! {
     fn chains_in_other_coordinates_get_the_poles_asked_for(
         first in 1usize..5, second in 1usize..4, seed in 0u64..1_000_000_000, repeats in 0.3f64..0.9,
     ) {
-        // Two chains of integrators that act on each other: controllability indices as their lengths.
+        // Two chains of integrators that act on each other: the controllability indices are their lengths.
         let n = first + second;
         let mut a = DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(j == i + 1 && i + 1 != first)));
         let mut b = DMatrix::zeros(n, 2);

@@ -15,7 +15,7 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
     warnings.extend(draft.warnings.iter().cloned());
     let mut parameters = Vec::new();
     for (name, quantity) in &draft.parameters {
-        // In a file, an experiment has a table of them.
+        // In a file, the parameters of an experiment are in a table of their own.
         let within = |mistake: Mistake| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
         let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
         let parameter = known.iter().find(|p| p.variable.name == *name).ok_or_else(|| {
@@ -29,7 +29,7 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
         Some(measured) => Some(build_experiment(&draft.name, measured, models, warnings)?),
         None => None,
     };
-    // Frequency responses end at no time.
+    // Frequency responses have no end time.
     let end = experiment.as_ref().map(Experiment::end).filter(|&end| end > 0.0);
     let horizon = draft.horizon.or(end);
     check_horizon(draft.horizon)?;
@@ -58,8 +58,8 @@ fn build_input(
     let mut input = input.clone();
     if let Some(unit) = unit {
         let difference = unit.factor_to(&variable.unit).ok_or_else(|| {
-            Mistake::new(name, format!("the input `{name}` is given in `{unit}`, the model takes `{}`", variable.unit))
-                .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here")
+            Mistake::new(name, format!("the input `{name}` is in `{unit}`, but the model expects `{}`", variable.unit))
+                .with_help("choose another column, or correct the unit in the file header or in `unit`")
                 .within("inputs")
         })?;
         let convert =
@@ -76,13 +76,13 @@ fn build_input(
     }
     if let Some(at) = input.uneven() {
         return Err(Mistake::new(name, format!("the input `{name}` is not evenly sampled at {at} s"))
-            .with_help("hold = \"band-limited\" needs even steps: cut the record with `from` and `to`, or say hold = \"first\"")
+            .with_help("hold = \"band-limited\" needs even sampling: cut the record with `from` and `to`, or use hold = \"first\"")
             .within("inputs"));
     }
     Ok((name.clone(), input))
 }
 
-/// What is recorded once for all models has one unit in them.
+/// Checks that a signal or input recorded once for all models has one unit in all of them.
 fn same_unit(name: &str, unit: &Unit, known: &[&Variable]) -> Result<(), Mistake> {
     match known.iter().find(|variable| variable.name == name && variable.unit != *unit) {
         Some(other) => {
@@ -93,7 +93,7 @@ fn same_unit(name: &str, unit: &Unit, known: &[&Variable]) -> Result<(), Mistake
     }
 }
 
-/// Recordings without a unit where the model has one, each signal or input with the experiments in which it is so.
+/// Returns notes on recordings without a unit for quantities with one: each signal or input with its experiments.
 pub(super) fn assumed_units(drafts: &[CaseDraft], models: &Models) -> Vec<String> {
     let interfaces = || models.iter().map(|(_, model)| model.interface());
     let signals: Vec<&Variable> = interfaces().flat_map(|interface| &interface.signals).collect();
@@ -117,7 +117,7 @@ pub(super) fn assumed_units(drafts: &[CaseDraft], models: &Models) -> Vec<String
         }
     }
     let note = |(name, unit, experiments): (&str, String, Vec<String>)| {
-        format!("`{name}` has no unit in the file of {}: taken as {unit}", experiments.join(", "))
+        format!("`{name}` has no unit in the file of {}: assumed {unit}", experiments.join(", "))
     };
     assumed.into_iter().map(note).collect()
 }
@@ -156,12 +156,13 @@ fn build_experiment(
     let responses = draft.responses.iter().map(|response| build_response(response, models));
     let responses = responses.collect::<Result<_, _>>()?;
     if channels.is_empty() && draft.responses.is_empty() {
-        return Err(Mistake::new("channels", "the experiment measures nothing").with_help("name at least one channel"));
+        return Err(Mistake::new("channels", "the experiment has no channels and no responses")
+            .with_help("add at least one channel"));
     }
     Ok(Experiment { channels, responses, role: draft.role })
 }
 
-/// A measured frequency response in the units of the model that it fits.
+/// Returns a measured frequency response, converted to the units of the model that it fits.
 fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData, Mistake> {
     let Some(unit) = &draft.unit else { return Ok(draft.clone()) };
     let linear = models.iter().map(|(_, model)| model.interface()).filter(|i| i.analysis == AnalysisKind::Linear);
@@ -174,9 +175,9 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
     let ratios: Vec<Unit> = ratios.collect();
     let factor = ratios.iter().find_map(|ratio| unit.factor_to(ratio)).ok_or_else(|| {
         let wanted = ratios.first().map_or_else(String::new, ToString::to_string);
-        let fact = format!("the response is measured in `{unit}`, that of the model is in `{wanted}`");
+        let fact = format!("expected a response in `{wanted}`, found `{unit}`");
         Mistake::new(&draft.signal, fact)
-            .with_help("take other columns, or correct the unit in the header of the file")
+            .with_help("choose other columns, or correct the unit in the header of the file")
             .within("responses")
     })?;
     let values = draft.values.iter().map(|value| value.map(|part| part * factor)).collect();
@@ -186,9 +187,9 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
 fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     let unit = draft.unit.as_ref().unwrap_or(to);
     if !unit.is_compatible(to) {
-        let fact = format!("the column is in `{unit}`, the signal `{}` in `{to}`", draft.signal);
+        let fact = format!("the column is in `{unit}`, but the signal `{}` is in `{to}`", draft.signal);
         return Err(Mistake::new("column", fact)
-            .with_help("take another column, or correct the unit: in the header of the file, or as `unit` here"));
+            .with_help("choose another column, or correct the unit in the file header or in `unit`"));
     }
     let noise = match &draft.noise {
         None => None,
@@ -196,7 +197,7 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
             let value = converted(noise, &to.difference()).map_err(|m| m.within("noise"))?;
             if !(value.is_finite() && value > 0.0) {
                 return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}"))
-                    .with_help("leave `noise` out where it is not known; `mops data` estimates it"));
+                    .with_help("omit `noise` if it is unknown; `mops data` estimates it"));
             }
             Some(value)
         }
@@ -205,18 +206,22 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     let in_model = |value: f64| unit.convert(value, to).expect("the units are compatible");
     let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();
     if let Some(early) = times.first().filter(|&&t| t < 0.0) {
-        return Err(Mistake::new("column", format!("the first sample is at {early} s, before the simulation begins"))
-            .with_help("a simulation begins at 0 s: leave `reset-time` away, or cut with `from`"));
+        return Err(Mistake::new(
+            "column",
+            format!("the first sample is at {early} s, before the start of the simulation at 0 s"),
+        )
+        .with_help("omit `reset-time`, or cut the record with `from`"));
     }
     if times.len() < 2 {
-        let count = if times.is_empty() { "no sample" } else { "one sample" };
-        return Err(Mistake::new("column", format!("{count} of the column is left, and two are needed"))
-            .with_help("the others are gaps, or cut off by `from`, `to` and `skip`"));
+        let count = if times.is_empty() { "none" } else { "one" };
+        return Err(Mistake::new("column", format!("expected at least two samples of the column, found {count}"))
+            .with_help("missing samples and samples cut off by `from`, `to` and `skip` do not count"));
     }
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
 }
 
-/// The thesis (4.2.3) found the very first sample wrong: say so where it lies far from what the next ones lead to.
+/// Returns a warning if the first sample lies far from the extrapolation of the next ones. The thesis (4.2.3) found the very
+/// first sample wrong.
 fn suspicious_start(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     if v.len() < 8 {

@@ -1,4 +1,4 @@
-//! Criteria in the cases they apply to, and their demands.
+//! Criteria in their cases, and their demands.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
         None if study.models.len() == 1 => 0,
         None => {
             let known: Vec<String> = study.models.iter().map(|(name, _)| format!("model = \"{name}\"")).collect();
-            return Err(Mistake::here("the study has several models, and the criterion does not say which it reads")
+            return Err(Mistake::here("the study has several models: the criterion needs `model`")
                 .with_help(format!("add {}", known.join(" or "))));
         }
     };
@@ -58,7 +58,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
     Ok(())
 }
 
-/// Refuses a criterion for a model whose analyses it cannot read.
+/// Rejects a criterion for a model whose analyses it cannot read.
 fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: usize) -> Result<(), Mistake> {
     if reads == gives {
         return Ok(());
@@ -70,10 +70,9 @@ fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: 
     };
     let other = models.iter().find(|(_, model)| model.interface().analysis == reads);
     let way_out = match (other, reads) {
-        (Some((other, _)), _) => format!("read another model: model = \"{other}\""),
+        (Some((other, _)), _) => format!("choose another model: model = \"{other}\""),
         (None, AnalysisKind::Linear) => {
-            "add a model that is linear: `linearise = { ... }` beside the kind makes one of a simulated model"
-                .to_owned()
+            "add a linear model: `linearise = { ... }` next to the kind linearises a simulated model".to_owned()
         }
         (None, AnalysisKind::Time) => "add a model that is simulated".to_owned(),
     };
@@ -86,15 +85,15 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
         (Some(signal), Some(experiment), AnalysisKind::Time) => experiment.channel(signal).is_some(),
         (Some(signal), Some(experiment), AnalysisKind::Linear) => experiment.response(signal).is_some(),
         (Some(_), None, _) => false,
-        // Where only frequency responses were measured, nothing is simulated over time.
+        // Experiments with frequency responses only are not simulated over time.
         (None, Some(experiment), AnalysisKind::Time) => !experiment.channels.is_empty(),
         (None, ..) => true,
     };
     let signal = draft.criterion.needs_measurement().unwrap_or_default();
     let way_out = match (reads, signal) {
-        (_, "") => "name cases without a measurement over frequency, or experiments with `channels`".to_owned(),
-        (AnalysisKind::Time, _) => format!("name experiments with `{signal}` among their `channels`"),
-        (AnalysisKind::Linear, _) => format!("name experiments with `{signal}` among their `responses`"),
+        (_, "") => "list cases without frequency responses, or experiments with `channels`".to_owned(),
+        (AnalysisKind::Time, _) => format!("list experiments with `{signal}` among their `channels`"),
+        (AnalysisKind::Linear, _) => format!("list experiments with `{signal}` among their `responses`"),
     };
     let chosen: Vec<usize> = match &draft.cases {
         None => (0..study.cases.len()).filter(|&i| measures(&study.cases[i])).collect(),
@@ -111,9 +110,9 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
                 } else {
                     let fact = match signal {
                         "" => {
-                            format!("nothing is simulated over time in `{name}`, only frequency responses are measured")
+                            format!("`{name}` has frequency responses only and is not simulated over time")
                         }
-                        signal => format!("nothing in `{name}` measures `{signal}`"),
+                        signal => format!("`{name}` does not measure `{signal}`"),
                     };
                     Err(Mistake::new(name, fact).with_help(way_out.clone()).within("cases"))
                 }
@@ -126,7 +125,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
             AnalysisKind::Linear => "add it to the `responses` of an experiment with `frequency`",
         };
         return Err(match signal {
-            "" => Mistake::here("no case is simulated over time: only frequency responses are measured")
+            "" => Mistake::here("no case is simulated over time: all have frequency responses only")
                 .with_help("add a case under [cases]"),
             signal => Mistake::new("signal", format!("no experiment measures `{signal}`")).with_help(help),
         });
@@ -134,7 +133,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
     Ok(chosen)
 }
 
-/// The demand of a criterion in its unit, in the sense and the range of its kind.
+/// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind.
 fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, Mistake> {
     let value = |key: &str, given: &Option<Quantity>| {
         given.as_ref().map_or(Ok(()), |q| refuse_mixed_angles(key, q, unit))?;
@@ -163,13 +162,13 @@ fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Res
                 let (good, bad) = (unit.amount(bad), unit.amount(good));
                 return Err(Mistake::new(
                     "good",
-                    format!("{better} is better here, so that `good` and `bad` are swapped"),
+                    format!("`good` and `bad` are swapped: {better} is better for this criterion"),
                 )
                 .with_help(format!("write good = \"{good}\", bad = \"{bad}\"")));
             }
             Ok(Demand::Pair { good, bad })
         }
-        (Some(_), _, _) => Err(Mistake::new("demand", "a demand and the pair `good`, `bad` exclude each other")
+        (Some(_), _, _) => Err(Mistake::new("demand", "`demand` and the pair `good`, `bad` are mutually exclusive")
             .with_help("remove one or the other")),
         (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
         (None, None, None) => match criterion.natural_demand() {
@@ -177,34 +176,37 @@ fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Res
             None => Err(Mistake::here("the criterion has no demand")
                 .with_help("add `demand = ...`, or the pair `good` and `bad`")),
         },
-        (None, Some(_), None) => Err(Mistake::new("good", "`good` needs `bad` beside it")
-            .with_help("add `bad = ...`, the value that scales to 1")),
-        (None, None, Some(_)) => Err(Mistake::new("bad", "`bad` needs `good` beside it")
-            .with_help("add `good = ...`, the value that scales to 0")),
+        (None, Some(_), None) => {
+            Err(Mistake::new("good", "`good` requires `bad`").with_help("add `bad = ...`, the value that scales to 1"))
+        }
+        (None, None, Some(_)) => {
+            Err(Mistake::new("bad", "`bad` requires `good`").with_help("add `good = ...`, the value that scales to 0"))
+        }
     }
 }
 
-/// A demand that the sense of a kind has no use for.
+/// Returns the error for a demand that is invalid under the sense of its kind.
 fn impossible(demand: f64, sense: Sense) -> Mistake {
     let pair = "`good` and `bad`, the values that scale to 0 and to 1";
     let (fact, way_out) = match sense {
         Sense::Target if demand.is_finite() && demand != 0.0 => (
-            "neither less nor more is better here, so that a demand alone is ambiguous".to_owned(),
-            format!("add usage = \"equality\" for this value itself, or give {pair}"),
+            "a single demand is ambiguous, because neither less nor more is better for this criterion".to_owned(),
+            format!("set usage = \"equality\" for exactly this value, or give {pair}"),
         ),
         Sense::More => (
             format!("expected a demand other than 0, found {demand}"),
-            format!("the value is compared with it in relation to its size; give {pair} instead"),
+            format!("the distance to the demand is divided by its absolute value; give {pair} instead"),
         ),
         _ => (
             format!("a demand must be positive, not {demand}"),
-            format!("the value is divided by it; where that does not fit, give {pair} instead"),
+            format!("the value is divided by the demand; otherwise give {pair} instead"),
         ),
     };
     Mistake::new("demand", fact).with_help(way_out)
 }
 
-/// Refuses an angle for a value that is none, and a share for an angle: both are pure numbers, but nobody means that.
+/// Rejects an angle for a value that is not an angle, and a share for an angle. Both are pure numbers, but certainly a
+/// mistake.
 fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<(), Mistake> {
     let Some(given) = quantity.unit.as_ref().filter(|given| given.dimension().is_none() && given.to_string() != "1")
     else {
@@ -214,21 +216,21 @@ fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<()
         return Ok(());
     }
     let fact = match given.is_angle() {
-        true => format!("the values of this kind are pure numbers, not angles in {given}"),
-        false => format!("the values of this kind are angles, not shares in {given}"),
+        true => format!("expected a pure number, found an angle in {given}"),
+        false => format!("expected an angle, found a share in {given}"),
     };
     let way_out = if given.is_angle() { "write a pure number" } else { "write an angle, such as \"45 deg\"" };
     Err(Mistake::new(key, fact).with_help(way_out))
 }
 
-/// Refuses a value that the kind can never have.
+/// Rejects a value outside the range of the kind.
 fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
     if value.is_nan() || (low..=high).contains(&value) {
         return Ok(value);
     }
     let amount = |x: f64| unit.amount((1e6 * x).round() / 1e6);
     let range = format!("{} to {}", amount(low), amount(high));
-    let fact = format!("{} is outside of the range of this kind, {range}", unit.amount(value));
+    let fact = format!("{} is outside the range of this criterion, {range}", unit.amount(value));
     let degrees = Unit::known("deg");
     let as_degrees = degrees.factor_to(unit).filter(|_| is_bare && unit.is_angle()).map(|factor| value * factor);
     let way_out = match as_degrees.filter(|angle| (low..=high).contains(angle)) {

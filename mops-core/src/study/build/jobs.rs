@@ -1,4 +1,4 @@
-//! Jobs: what is simulated, and where its parameters come from.
+//! Jobs (model-case pairs) and the sources of their parameters.
 
 use super::values::signal_names;
 use crate::diagnostic::suggestion;
@@ -7,8 +7,7 @@ use crate::model::{AnalysisKind, Interface, Variable};
 use crate::study::{JobPlan, ParameterSource, Study};
 use crate::unit::Unit;
 
-/// The job of a model in a case, made at the first need and still to be completed; the signals are added to those it
-/// computes.
+/// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it computes.
 pub(super) fn job(
     study: &mut Study,
     model: usize,
@@ -37,7 +36,7 @@ pub(super) fn job(
     Ok(index)
 }
 
-/// Gives a job its horizon and its parameters.
+/// Sets the horizon and the parameters of a job.
 pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), Mistake> {
     let JobPlan { model, case, .. } = study.jobs[index];
     let interface = study.models[model].1.interface();
@@ -45,8 +44,8 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
         (Some(horizon), _) => horizon,
         (None, AnalysisKind::Linear) => 0.0,
         (None, AnalysisKind::Time) => {
-            let fact = format!("nothing says how long `{}` is simulated", study.cases[case].name);
-            return Err(Mistake::here(fact).with_help("give the case or the model a `horizon`"));
+            let fact = format!("case `{}` has no horizon", study.cases[case].name);
+            return Err(Mistake::here(fact).with_help("set `horizon` in the case or in the model"));
         }
     };
     let parameters = sources(study, interface, fixed, case)?;
@@ -55,14 +54,14 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
     Ok(())
 }
 
-/// A parameter that measures one thing in one model and another in another.
+/// Returns the error for a parameter with incompatible units in two models.
 fn apart(name: &str, unit: &Unit, other: &Unit) -> Mistake {
     Mistake::here(format!("`{name}` is in {unit} in one model and in {other} in another"))
         .with_help("give them different names, or one unit")
 }
 
-/// Where each parameter comes from: a tuner of the case, a value in the case, a tuner of the study, the model's table,
-/// the default.
+/// Returns the source of each parameter. The first existing one is used: a tuner of the case, a value in the case, a tuner
+/// of the study, the table of the model, the default.
 fn sources(
     study: &Study,
     interface: &Interface,
@@ -98,9 +97,8 @@ fn sources(
                 return by(tuner);
             }
             find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
-                Mistake::here(format!("nothing gives a value to `{name}` in `{}`", study.cases[case].name)).with_help(
-                    format!("make `{name}` a tuner, or give it a value in the case or in the model's `parameters`"),
-                )
+                Mistake::here(format!("the parameter `{name}` has no value in case `{}`", study.cases[case].name))
+                    .with_help(format!("make `{name}` a tuner, or set it in the case or in `parameters` of the model"))
             })
         })
         .collect()

@@ -1,4 +1,4 @@
-//! Checks a draft: every name, size, bound and unit, before anything runs.
+//! Check of a draft: every name, size, bound and unit, before anything runs.
 
 mod cases;
 mod criteria;
@@ -27,7 +27,7 @@ type Models = [(String, Arc<dyn Model>)];
 pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     if draft.models.is_empty() {
         return Err(Mistake::new("models", "the study has no model")
-            .with_help("add a table such as [models.loop.pid-loop]; `mops list` names the kinds"));
+            .with_help("add a table such as [models.loop.pid-loop]; `mops list` shows the kinds"));
     }
     let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
     let mut fixed = Vec::new();
@@ -67,7 +67,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         Task::Design => Objective::Max,
         Task::Calibration | Task::Diagnosis => Objective::Sum,
         Task::Pareto => Objective::Each,
-        // As the study of which they tell would be solved.
+        // Default objective of the study that these tasks examine.
         Task::Excitation | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => {
             if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
         }
@@ -90,7 +90,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
         notes,
         warnings,
     };
-    // How rich an input is can be told without a criterion, and in a diagnosis every channel counts with its noise.
+    // Excitation needs no criterion, and in a diagnosis every channel counts with its noise.
     if draft.criteria.is_empty() && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
         return Err(Mistake::new("criteria", "the study has no criterion").with_help(
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
@@ -114,7 +114,8 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     study.warnings.extend(cold);
     let solved = matches!(study.task, Task::Design | Task::Calibration);
     if solved && study.rows.iter().all(|row| row.usage == Usage::Monitor) {
-        let fact = "nothing to minimise: every criterion is a monitor, so that the tuners stay at their start values";
+        let fact =
+            "nothing to minimise: every criterion has usage monitor, so that the tuners keep their initial guess";
         study.warnings.push(fact.to_owned());
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
@@ -126,17 +127,16 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     };
     if is_sure && !study.tasks.uncertain.is_empty() {
         let fact = match study.task {
-            Task::Design => {
-                "the design takes no notice of [uncertain]: a table [robust] makes it one against the worst cases"
-            }
-            _ => "this task takes no notice of [uncertain]",
+            Task::Design => "the design ignores [uncertain]: add [robust] for a design against worst cases",
+            _ => "this task ignores [uncertain]",
         };
         study.notes.push(fact.to_owned());
     }
     Ok(study)
 }
 
-/// Inputs on a scale of temperature that nothing drives: they are at the zero of the scale, which is seldom meant.
+/// Returns warnings for undriven inputs on a temperature scale: they stay at the zero of the scale, which is rarely
+/// intended.
 fn temperatures_of_nothing(study: &Study) -> Vec<String> {
     let mut found: Vec<(String, Vec<&str>)> = Vec::new();
     for job in &study.jobs {
@@ -145,7 +145,7 @@ fn temperatures_of_nothing(study: &Study) -> Vec<String> {
             if input.unit.zero() == 0.0 || case.input(&input.name).is_some() {
                 continue;
             }
-            let fact = format!("nothing drives `{}`, which is 0 {} throughout", input.name, input.unit);
+            let fact = format!("input `{}` is not driven and stays at 0 {}", input.name, input.unit);
             match found.iter_mut().find(|(known, _)| *known == fact) {
                 Some((_, cases)) if cases.contains(&case.name.as_str()) => {}
                 Some((_, cases)) => cases.push(&case.name),

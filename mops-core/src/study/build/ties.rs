@@ -5,8 +5,8 @@ use crate::expression::units::{Conflict, Dimensions, Measure, Named};
 use crate::mistake::Mistake;
 use crate::tuner::Tuner;
 
-/// Checks that an expression measures what the tuner `name` does, which it sets. Tuners that are `loose` have no unit, neither
-/// their own nor that of a parameter.
+/// Checks that an expression has the dimension of the tuner `name`, which it sets. Tuners that are `loose` have no unit,
+/// neither their own nor that of a parameter.
 pub(super) fn check(
     expression: &Expression,
     name: &str,

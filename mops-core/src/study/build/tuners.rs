@@ -1,4 +1,4 @@
-//! Tuners, their ties, and free start values.
+//! Tuners, their ties, and free initial states.
 
 use super::Models;
 use super::values::{check_range, converted, names, parameter};
@@ -27,12 +27,12 @@ pub(super) fn build_tuner(
         (Some(unit), Some(p)) if !unit.is_compatible(&p.variable.unit) => {
             return Err(Mistake::new(
                 "unit",
-                format!("`{name}` is in `{}` in the model, not in `{unit}`", p.variable.unit),
+                format!("expected a unit of `{name}` that converts to `{}`, found `{unit}`", p.variable.unit),
             )
-            .with_help("give a unit that converts to it, or leave `unit` out"));
+            .with_help("correct `unit`, or omit it"));
         }
-        // A tuner is its parameter times a factor, in ties too: a temperature on another scale, or a frequency in Hz of a
-        // parameter in rad/s, is in the unit of the parameter.
+        // A tuner is its parameter times a factor, in ties too. A temperature on another scale, or a frequency in Hz for a
+        // parameter in rad/s, therefore takes the unit of the parameter.
         (Some(unit), Some(p))
             if unit.zero() != p.variable.unit.zero() || unit.counts_cycles() != p.variable.unit.counts_cycles() =>
         {
@@ -42,7 +42,7 @@ pub(super) fn build_tuner(
         (None, Some(p)) => p.variable.unit.clone(),
         (None, None) => Unit::one(),
     };
-    // A number without a unit is in that of the tuner, even where this is on another scale of temperature.
+    // A number without a unit is in the unit of the tuner, even on another temperature scale.
     let converted = |quantity: &Quantity, unit: &Unit| {
         let own = quantity.unit.clone().or_else(|| draft.unit.clone());
         converted(&Quantity { unit: own, ..quantity.clone() }, unit)
@@ -54,7 +54,7 @@ pub(super) fn build_tuner(
             Ok(Some(value))
         } else {
             Err(Mistake::new(key, format!("`{key}` must be a finite number, not {value}"))
-                .with_help("every tuner moves between two finite bounds"))
+                .with_help("every tuner needs finite bounds"))
         }
     };
     let (start, mut min, mut max) =
@@ -69,7 +69,7 @@ pub(super) fn build_tuner(
         values.dedup();
         if values.len() < 2 {
             return Err(Mistake::new("values", "a tuner needs at least two different values")
-                .with_help("add values, or say `active = false` to keep the one"));
+                .with_help("add values, or set `active = false` to keep the only one"));
         }
         (min, max) = (values.first().copied(), values.last().copied());
         grid = Grid::List(values);
@@ -77,14 +77,14 @@ pub(super) fn build_tuner(
     if let (Some(_), Some(key)) =
         (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
     {
-        return Err(Mistake::new(key.0, format!("a tied tuner follows others and has no `{}` of its own", key.0))
+        return Err(Mistake::new(key.0, format!("`{}` is not allowed for a tied tuner", key.0))
             .with_help(format!("remove `{}`, or remove `tie`", key.0)));
     }
     let fixed = draft.inactive || draft.tie.is_some();
     let start = match (start, &draft.tie) {
         (Some(start), _) => start,
         (None, Some(_)) => f64::NAN,
-        (None, None) => return Err(Mistake::here("the tuner has no start value").with_help("add `start = ...`")),
+        (None, None) => return Err(Mistake::here("the tuner has no initial guess").with_help("add `start = ...`")),
     };
     let bounds = match (min, max) {
         (Some(min), Some(max)) => [min, max],
@@ -98,7 +98,7 @@ pub(super) fn build_tuner(
     let [min, max] = bounds;
     if max <= min {
         return Err(Mistake::new("max", format!("the range is empty: min is {min}, max is {max}")).with_help(
-            if max < min { "swap the bounds" } else { "widen the range, or say `active = false` to keep the value" },
+            if max < min { "swap the bounds" } else { "widen the range, or set `active = false` to keep the value" },
         ));
     }
     let check_start = |key: &str, start: f64| {
@@ -106,7 +106,7 @@ pub(super) fn build_tuner(
             return Ok(());
         }
         let (start, max) = (unit.amount(start), unit.amount(max));
-        Err(Mistake::new(key, format!("the start value {start} is outside the bounds, {min} to {max}"))
+        Err(Mistake::new(key, format!("the initial guess {start} is outside the bounds, {min} to {max}"))
             .with_help("correct it, or widen the bounds"))
     };
     check_start("start", start)?;
@@ -115,14 +115,13 @@ pub(super) fn build_tuner(
         Grid::Integer => {
             let is_fraction = |(_, value): &(&str, f64)| value.fract() != 0.0;
             let found = [("start", start), ("min", min), ("max", max)].into_iter().find(is_fraction);
-            found.map(|(key, value)| {
-                (key, value, "with `integer = true`, all of `start`, `min` and `max` are whole numbers")
-            })
+            found.map(|(key, value)| (key, value, "with `integer = true`, `start`, `min` and `max` must be integers"))
         }
         Grid::List(values) => (!values.contains(&start)).then_some(("start", start, "start at one of `values`")),
     };
     if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
-        return Err(Mistake::new(key, format!("the tuner cannot be at {}", unit.amount(value))).with_help(way_out));
+        return Err(Mistake::new(key, format!("{} is not an allowed value of the tuner", unit.amount(value)))
+            .with_help(way_out));
     }
     let elsewhere = own_starts(draft, cases, |case, quantity| {
         let start = converted(quantity, &unit).map_err(|m| m.within(case))?;
@@ -130,17 +129,17 @@ pub(super) fn build_tuner(
         if fixed || grid.has(start) {
             return Ok(start);
         }
-        Err(Mistake::new(case, format!("the tuner cannot be at {}", unit.amount(start)))
-            .with_help("start at a whole number, or at one of `values`"))
+        Err(Mistake::new(case, format!("{} is not an allowed value of the tuner", unit.amount(start)))
+            .with_help("start at an integer, or at one of `values`"))
     })?;
     if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
-        return Err(Mistake::new("scale", format!("a logarithmic range cannot reach zero, but `min` is {min}"))
-            .with_help("raise `min`, or leave `scale` out"));
+        return Err(Mistake::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
+            .with_help("raise `min`, or omit `scale`"));
     }
     let width = if draft.scale == Scale::Log { math::ln(max / min) } else { max - min };
     if !fixed && !width.is_finite() {
-        return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} is wider than numbers reach"))
-            .with_help("narrow the bounds to what is plausible"));
+        return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} overflows"))
+            .with_help("narrow the bounds to plausible values"));
     }
     if let Some(parameter) = parameter {
         let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
@@ -174,7 +173,7 @@ pub(super) fn build_tuner(
     Ok(())
 }
 
-/// Start values in the cases that begin elsewhere, by index of the case.
+/// Returns the initial guesses of single cases, by index of the case.
 fn own_starts(
     draft: &TunerDraft,
     cases: &[Case],
@@ -182,7 +181,7 @@ fn own_starts(
 ) -> Result<Vec<(usize, f64)>, Mistake> {
     if !draft.starts.is_empty() && !draft.per_case {
         return Err(Mistake::new("starts", "the tuner has one value for all cases")
-            .with_help("say `per-case = true` too, or leave `starts` out"));
+            .with_help("set `per-case = true` too, or omit `starts`"));
     }
     let one = |(name, quantity): &(String, Quantity)| {
         let index = cases.iter().position(|case| case.name == *name).ok_or_else(|| {
@@ -194,7 +193,7 @@ fn own_starts(
     draft.starts.iter().map(|entry| one(entry).map_err(|mistake: Mistake| mistake.within("starts"))).collect()
 }
 
-/// Every tuner must set a parameter, or be followed by one that does.
+/// Checks that every tuner sets a parameter or is used by one that does.
 pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Result<(), Mistake> {
     let known: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
     let ties: Vec<Expression> =
@@ -210,7 +209,7 @@ pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Res
     Ok(())
 }
 
-/// Binds the expressions of tied tuners, in an order in which each follows what it names.
+/// Binds the expressions of tied tuners, in an order in which each expression uses earlier tuners only.
 pub(super) fn tie_tuners(
     drafts: &[(String, TunerDraft)],
     tuners: &mut [Tuner],
@@ -226,17 +225,17 @@ pub(super) fn tie_tuners(
         for used in expression.names() {
             let earlier: Vec<&str> = drafts[..position].iter().map(|(n, _)| n.as_str()).collect();
             if used == name {
-                return Err(wrong("a tuner cannot follow itself".to_owned(), "name tuners that stand before it"));
+                return Err(wrong("a tuner cannot be tied to itself".to_owned(), "use tuners defined before it"));
             }
             if drafts[position..].iter().any(|(n, _)| n == used) {
-                let fact = format!("`{used}` stands after this tuner");
-                return Err(wrong(fact, &format!("a tie names tuners that stand before it: move `{used}` up")));
+                let fact = format!("`{used}` is defined after this tuner");
+                return Err(wrong(fact, &format!("a tie uses tuners defined before it: move `{used}` up")));
             }
             if !earlier.contains(&used.as_str()) {
                 return Err(wrong(format!("there is no tuner `{used}`"), &suggestion(used, earlier.iter().copied())));
             }
             of.push(tuners.iter().position(|t| t.name == *used).ok_or_else(|| {
-                wrong(format!("`{used}` has a value of its own in every case"), "tie to tuners of the whole study")
+                wrong(format!("`{used}` has a separate value in every case"), "tie to tuners of the whole study")
             })?);
         }
         let loose = |name: &str| {
@@ -252,7 +251,8 @@ pub(super) fn tie_tuners(
     Ok(())
 }
 
-/// The tuner of a free start value; guess and bounds from the data where the study gives none.
+/// Returns the tuner of a free initial state; the initial guess and bounds are derived from the data if the study gives
+/// none.
 pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result<Tuner, Mistake> {
     let states: Vec<_> = models.iter().flat_map(|(_, m)| m.interface().states.iter().map(move |s| (m, s))).collect();
     let (model, state) = states.iter().find(|(_, s)| s.name == free.state).ok_or_else(|| {
@@ -260,14 +260,14 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
             .with_help(suggestion(&free.state, states.iter().map(|(_, s)| s.name.as_str())))
     })?;
     let parameter =
-        parameter(&model.interface().parameters, &state.start).expect("a state's start value is a parameter");
+        parameter(&model.interface().parameters, &state.start).expect("a state's initial value is a parameter");
     let unit = parameter.variable.unit.clone();
     let given = |key: &str, q: &Option<Quantity>| {
         q.as_ref().map(|q| converted(q, &unit).map_err(|m| m.within(key).within(&free.state))).transpose()
     };
     let (start, min, max) = (given("start", &free.start)?, given("min", &free.min)?, given("max", &free.max)?);
     let in_case = case.parameters.iter().find(|(name, _)| *name == state.start).map(|(_, value)| *value);
-    let experiment = case.experiment.as_ref().expect("only experiments have free start values");
+    let experiment = case.experiment.as_ref().expect("only experiments have free initial states");
     let guess = guess_start(state.signal.as_deref(), state.rate_of.as_deref(), experiment);
     let (start, spread) = match (start.or(in_case), guess) {
         (Some(start), Some((_, spread))) => (start, spread),
@@ -280,10 +280,10 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
                 state.signal.as_deref().and_then(|s| experiment.channel(s)).filter(|channel| begins_late(channel));
             let fact = match late {
                 Some(channel) => format!(
-                    "the first sample of `{}` comes at {} s and does not tell where it starts at 0 s",
+                    "the first sample of `{}` is at {} s and does not determine its value at 0 s",
                     channel.signal, channel.times[0]
                 ),
-                None => format!("nothing measured tells where `{}` starts", free.state),
+                None => format!("the initial value of `{}` is not determined by any measurement", free.state),
             };
             return Err(Mistake::new(&free.state, fact)
                 .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
@@ -295,13 +295,13 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
         return Err(Mistake::new(
             &free.state,
             format!(
-                "the start value {} does not lie inside its bounds, {} to {}",
+                "the initial guess {} is outside its bounds, {} to {}",
                 unit.amount(start),
                 bounds[0],
                 unit.amount(bounds[1])
             ),
         )
-        .with_help("correct `start`, `min` and `max`; what is left out is read off the data"));
+        .with_help("correct `start`, `min` and `max`; omitted values are derived from the data"));
     }
     Ok(Tuner {
         name: format!("{}/{}", case.name, state.start),
@@ -318,13 +318,14 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
     })
 }
 
-/// Whether the first sample comes more than one interval, and a half, after the start of the simulation at 0 s.
+/// Returns true if the first sample comes more than 1.5 intervals after the start of the simulation at 0 s.
 fn begins_late(channel: &Channel) -> bool {
     matches!(channel.times[..], [first, second, ..] if first > 1.5 * (second - first))
 }
 
-/// First value and half-width of the search: of a measured state, its first sample and half its range; of the rate of a
-/// measured signal, the slope over the first samples and the largest slope anywhere.
+/// Returns the initial guess and half-width of the search for an initial state. For a measured state: its first sample and
+/// half its range. For the rate of a measured signal: its derivative over the first samples and 1.5 times its largest
+/// derivative.
 fn guess_start(signal: Option<&str>, rate_of: Option<&str>, experiment: &Experiment) -> Option<(f64, f64)> {
     let measured = |name: &str| experiment.channel(name).filter(|channel| !begins_late(channel));
     if let Some(channel) = signal.and_then(measured) {

@@ -25,14 +25,14 @@ pub(super) fn signal_names(signals: &[Variable]) -> impl Iterator<Item = &str> +
 pub(super) fn check_horizon(end: Option<f64>) -> Result<(), Mistake> {
     match end {
         Some(end) if !(end.is_finite() && end > 0.0) => {
-            Err(Mistake::new("horizon", format!("a simulation must end after its start, not at {end} s"))
-                .with_help("it starts at 0 s; give the time of its end, such as \"60 s\""))
+            Err(Mistake::new("horizon", format!("expected a positive horizon, found {end} s"))
+                .with_help("a simulation starts at 0 s; give its end time, such as \"60 s\""))
         }
         _ => Ok(()),
     }
 }
 
-/// Values of a model's parameters that the study fixes, in the parameters' units.
+/// Returns the parameter values of a model that the study fixes, in the units of the parameters.
 pub(super) fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) -> Result<Vec<(String, f64)>, Mistake> {
     given
         .iter()
@@ -46,7 +46,7 @@ pub(super) fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) ->
         .collect()
 }
 
-/// The value of a parameter, in its unit.
+/// Returns the value of a parameter, in its unit.
 pub(super) fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64, Mistake> {
     let value = converted(quantity, &parameter.variable.unit)?;
     check_range(value, parameter)?;
@@ -76,13 +76,13 @@ pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mista
         .with_help(format!("`{name}` is: {about}")))
 }
 
-/// The number in `unit`.
+/// Returns the number in `unit`.
 pub(super) fn converted(quantity: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
     quantity.to(unit).map_err(|why| {
         let unit = unit.to_string();
         Mistake::here(why).with_help(match unit.as_str() {
             "1" => "write a pure number".to_owned(),
-            _ => format!("a number without a unit counts in `{unit}`"),
+            _ => format!("a number without a unit is in `{unit}`"),
         })
     })
 }
