@@ -1,11 +1,11 @@
-//! A solver of mops under argmin's executor: a problem with argmin's traits, a box, and CMA-ES with its restarts.
+//! Runs a solver of mops under argmin's executor: a problem with argmin's traits, bounds, and CMA-ES with restarts.
 
 use argmin::core::{CostFunction, Error, Executor, State};
 use mops::math;
 use mops::solvers::cma_es::CmaEsOptions;
 use mops::solvers::for_argmin::Driven;
 
-/// Rastrigin's function: about `10^n` basins, the least value 0 at the origin.
+/// Rastrigin's function: about `10^n` local minima, with the global minimum 0 at the origin.
 struct Rastrigin;
 
 impl CostFunction for Rastrigin {
@@ -17,7 +17,7 @@ impl CostFunction for Rastrigin {
     }
 }
 
-/// The best point, its cost, and how often the cost was asked for.
+/// Returns the best point, its cost, and the number of evaluations of the cost.
 pub fn solve() -> Result<(Vec<f64>, f64, u64), Error> {
     let solver = Driven::new(&CmaEsOptions::default(), &[[-5.12, 4.0]; 3]).with_evaluations(20_000);
     let done = Executor::new(Rastrigin, solver)

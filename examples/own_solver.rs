@@ -1,4 +1,4 @@
-//! A solver of one's own: the command line of mops with one more kind, `shrinking-box`, that studies and `--solver` can name.
+//! Adds a solver to mops: its command line with one more kind, `shrinking-box`, for studies and `--solver`.
 //!
 //!     cargo run --release --example own_solver -- run pid-design --solver shrinking-box
 
@@ -9,19 +9,19 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Draws points from a box around the best one, all at once, and goes to the best of them; where none is better, the box
-/// shrinks. It reads no slopes, and takes criteria as they come.
+/// Random search in a shrinking box: each iteration draws points from a box around the best one, evaluates all of them in one
+/// batch, and moves to the best. If none is better, the box shrinks. Uses no gradients, and accepts criteria of any kind.
 ///
 /// Source: R. Luus, T. H. I. Jaakola, AIChE Journal 19 (1973) 760-766.
-/// N.B.: there the box shrinks after every draw; here only after one that brought nothing.
+/// N.B.: there the box shrinks after every iteration; here only after one without improvement.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct ShrinkingBoxOptions {
-    /// Points of a draw, per tuner.
+    /// Number of points per iteration and tuner.
     pub points: usize,
-    /// What is left of the box's sides after a draw that brought nothing.
+    /// Factor on the sides of the box after an iteration without improvement.
     pub shrink: f64,
-    /// It ends when the sides are shorter than this, in the unit box.
+    /// Length of the sides, in the unit box, below which the search ends.
     pub tolerance: f64,
 }
 
@@ -39,12 +39,13 @@ impl SolverOptions for ShrinkingBoxOptions {
     }
 }
 
+/// The solver.
 struct ShrinkingBox {
     options: ShrinkingBoxOptions,
     state: Option<State>,
 }
 
-/// Where it stands; the best point is kept by the run.
+/// State of the search; the run keeps the best point.
 struct State {
     random: Stream,
     side: f64,
@@ -53,13 +54,13 @@ struct State {
 impl Solver for ShrinkingBox {
     fn accepts(&self, shape: &Shape) -> Result<(), String> {
         match shape.objective {
-            Objective::Each => Err("`shrinking-box` looks for one point; take `nsga2` for a front".into()),
+            Objective::Each => Err("`shrinking-box` finds one point; use `nsga2` for a front".into()),
             Objective::Max | Objective::Sum => Ok(()),
         }
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        // The run has evaluated the start already: it is the best point so far.
+        // The run has already evaluated the start: it is the best point so far.
         self.state = (!start.is_empty()).then(|| State { random: oracle.stream("shrinking-box"), side: 1.0 });
         Ok(())
     }
@@ -72,16 +73,16 @@ impl Solver for ShrinkingBox {
         };
         let drawn: Vec<Vec<f64>> = (0..self.options.points * best.point.len()).map(|_| draw()).collect();
         let answers = oracle.evaluate(&drawn)?;
-        // A point that could not be simulated is worse than every other: nothing needs to be asked.
+        // A failed point ranks below every other: no check is needed.
         if !answers.iter().any(|answer| answer.merit.is_better_than(&best.merit)) {
             state.side *= self.options.shrink;
         }
-        // Chance shows no optimum.
+        // A random search cannot prove an optimum.
         Ok(if state.side < self.options.tolerance { Progress::Stalled } else { Progress::Continue })
     }
 }
 
-/// Everything that comes with mops, and this solver.
+/// Returns the catalogue of mops with this solver added.
 pub fn catalogue() -> Catalogue {
     mops::catalogue().with_solver(SolverKind::of::<ShrinkingBoxOptions>())
 }

@@ -1,7 +1,7 @@
-//! A study wholly in Rust: a model of one's own, a criterion of one's own, the run and its result.
+//! Defines a study in Rust: a new model, a new criterion, the run and its result.
 //!
-//! A wheel suspension `m x'' = -k x - d x'` is hit by a pothole that gives it a speed of 1 m/s. Spring and damper are to
-//! be chosen so that it settles soon and shakes its load little.
+//! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are chosen for a short
+//! settling time and a small acceleration of the load.
 
 use mops::criteria::settling_time::SettlingTime;
 use mops::models::kernel::{PlantModel, Simulated};
@@ -10,7 +10,7 @@ use mops::{
     Parameter, Plant, Scalar, Study, TunerDraft, Unit, Value, Variable,
 };
 
-/// The model: what it offers.
+/// Interface of the model: its signals and parameters.
 struct Suspension(Interface);
 
 impl Suspension {
@@ -27,7 +27,7 @@ impl Suspension {
 /// Mass, kg.
 const MASS: f64 = 250.0;
 
-/// The plant, written once for values and for derivatives.
+/// Plant, written once for values and derivatives.
 struct Wheel<S> {
     k: S,
     d: S,
@@ -63,7 +63,7 @@ impl PlantModel for Suspension {
     }
 }
 
-/// The criterion: root mean square of the acceleration, m/s2.
+/// Root mean square of the acceleration, m/s2.
 #[derive(Clone)]
 struct Shaking;
 
@@ -88,7 +88,7 @@ impl Criterion for Shaking {
     }
 }
 
-/// The study.
+/// Builds the study.
 pub fn study() -> Result<Study, Mistake> {
     let settling = SettlingTime {
         signal: "x".into(),

@@ -1,5 +1,5 @@
 //! The evaluations of a run, kept as they come in `evaluations.sqlite` in its folder: a run that was killed goes on where it
-//! was, and a study that asks for something else simulates no known point again. `docs/store.md` has the tables.
+//! was, and a study that asks for something else simulates no known point again. `docs/reference/run-files.md` has the tables.
 
 mod aside;
 mod best;
