@@ -43,7 +43,8 @@ impl Files for Anything<'_> {
 impl Corpus {
     fn new() -> Self {
         let catalogue = mops::catalogue();
-        let files = || catalogue.studies.iter().flat_map(|study| study.files.iter());
+        let shipped = mops::studies::shipped();
+        let files = || shipped.iter().flat_map(|study| study.files.iter());
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let studies: Vec<String> =
             files().filter(|(name, _)| name.ends_with(".toml")).map(|(_, bytes)| text(bytes)).collect();

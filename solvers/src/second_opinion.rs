@@ -38,7 +38,7 @@ struct Other {
 }
 
 /// Share of the way from the start to an end within which another point is on the way to the same. Of the 53 problems of
-/// `mops bench more-wild` as many are solved with 0.05.
+/// `mops-bench more-wild` as many are solved with 0.05.
 const NEAR: f64 = 0.3;
 
 /// Factor of the pattern's size where nothing in it is better: coarse, since the search is to look elsewhere, not to be
