@@ -12,10 +12,10 @@
 //! Models written in Rust have no bounds; their guards vary as smoothly as their states. Their guards are evaluated at
 //! four nodes of a step and at a minimum below 0 of the quartic through these values.
 //!
-//! **Event time.** A zero is located to the resolution of the clock, and the event occurs at the end of the bracket
-//! where the guard *is* negative. So rounding cannot leave the guard positive, and one crossing is never found twice. A
-//! guard that has crossed zero is negative at the start of the next step; a mode that waits for it to become positive
-//! starts from there.
+//! **Event time.** A zero is located to the resolution of the clock. The event occurs at the end of the bracket where
+//! the guard *is* negative. So rounding cannot leave the guard positive, and one crossing is never found twice. A guard
+//! that has crossed zero is negative at the start of the next step. A mode that waits for it to become positive starts
+//! from there.
 //!
 //! **Simultaneous events.** Instants closer than the resolution count as one. At an instant inputs and clocks first
 //! take their new values ([`Dynamics::pass_break`]). Then the negative guard with the lowest index switches, until no
@@ -237,8 +237,8 @@ impl<S: Scalar> Events<S> {
     }
 }
 
-/// Returns true if a guard without bounds over the whole step has bounds over parts of it; only a jump or a pole then
-/// lies between them.
+/// Returns true if a guard without bounds over the whole step has bounds over parts of it. Only a jump or a pole then
+/// prevents bounds over the whole.
 fn is_bounded(enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
     // Irregularly placed, and far narrower than the time between jumps.
     const WIDTH: f64 = 1e-6;
@@ -364,8 +364,8 @@ fn quartic(values: &[f64; 5], place: f64) -> f64 {
     (0..4).rev().fold(d[4], |sum, k| d[k] + (place - PLACES[k]) * sum)
 }
 
-/// Refines a bracket whose guard is zero at its start and may rise before it falls, such as the speed of a joint that
-/// just broke away.
+/// Refines a bracket whose guard is zero at its start and may rise before it falls. An example is the speed of a joint
+/// that just broke away.
 fn rise_before([a, b]: Bracket, value: &mut impl FnMut(f64) -> f64) -> Bracket {
     if a.1 > 0.0 {
         return [a, b];

@@ -165,8 +165,8 @@ pub trait Dynamics<S: Scalar> {
         None
     }
 
-    /// Sets the delay of the events that follow: a number with tangents and zero value, the derivative of the event
-    /// time with respect to the parameters. The time and the inputs that resets read are delayed with the event.
+    /// Sets the delay of the events that follow: a number with zero value whose tangents are the derivatives of the
+    /// event time. The time and the inputs that resets read are delayed with the event.
     fn delay_events(&mut self, _delay: S) {}
 
     /// Returns the state that a signal equals; `None` if the signal must be computed.

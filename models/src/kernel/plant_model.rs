@@ -146,8 +146,8 @@ impl<M: PlantModel> Simulated<M> {
     }
 }
 
-/// Returns for each signal the index of the state that it equals: the state that names the signal, or the state of the
-/// same name if that has no initial state parameter.
+/// Returns for each signal the index of the state that it equals, if any. A state equals the signal that the interface
+/// gives for it. A state that is not in the interface equals the signal of its own name.
 pub(crate) fn shown(interface: &Interface, states: &[Variable]) -> Vec<Option<usize>> {
     let signal_of = |state: &Variable| match interface.states.iter().find(|s| s.name == state.name) {
         Some(named) => named.signal.clone(),

@@ -50,8 +50,8 @@ impl StepSizes {
     }
 }
 
-/// Returns the base-2 logarithm of a normal positive number, to 0.0011: its exponent plus a cubic of its mantissa that
-/// is exact at powers of 2. Step size control needs no higher accuracy and calls this at every step.
+/// Returns the base-2 logarithm of a normal positive number, to 0.0011. Adds to its exponent a cubic of its mantissa
+/// that is exact at powers of 2. Step size control needs no higher accuracy and calls this at every step.
 #[inline]
 fn log2(x: f64) -> f64 {
     const MANTISSA: u64 = (1 << 52) - 1;

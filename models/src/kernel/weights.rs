@@ -12,7 +12,7 @@ use super::Dynamics;
 ///
 /// The floor is the tolerance for a state that is small relative to its usual size: `absolute` if the user gives it,
 /// else `SHARE relative s_i`. The scale `s_i` is declared for the state, or else the largest `|x_i|` so far. A state
-/// that rests at 0 from the start has no scale; its error is relative to the value that the state reaches in the step.
+/// that rests at 0 from the start has no scale. Its error is relative to the value that the state reaches in the step.
 ///
 /// The weights allow for rounding errors, which no step size can reduce. Rates of states that are differences of large
 /// numbers are rough. A step of length `h` has at least an error of `h` times that roughness (see [`Weights::feel`]).

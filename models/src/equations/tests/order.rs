@@ -22,7 +22,7 @@ fn numbers_constants_and_what_they_make_are_refused_out_of_order() {
         "clip(2*x, two, 1)",
     ] {
         let mistake = read(&text(value)).err().unwrap_or_else(|| panic!("{value} is accepted"));
-        assert!(mistake.to_string().contains("must rise"), "{value}: {mistake}");
+        assert!(mistake.to_string().contains("must increase"), "{value}: {mistake}");
     }
     for value in ["clip(x, 1, 1)", "deadzone(x, -1, 1)", "clip(x, one, two)", "table(x, one, 0, two, 1)"] {
         assert!(read(&text(value)).is_ok(), "{value}");
@@ -41,6 +41,6 @@ fn a_parameter_that_makes_the_order_wrong_makes_a_failure() {
         let model = read(&text(value)).unwrap();
         assert!(attempt(&model, &[], &[("p", right)], 1.0).is_ok(), "{value}");
         let failure = attempt(&model, &[], &[("p", wrong)], 1.0).unwrap_err();
-        assert!(failure.to_string().contains("must rise"), "{value}: {failure}");
+        assert!(failure.to_string().contains("must increase"), "{value}: {failure}");
     }
 }

@@ -3,7 +3,7 @@
 use mops_core::Scalar;
 
 /// Backlash of width `gap`. The driven part `y` follows the driving part `u` at a distance of `gap/2` while it is
-/// pushed, and stays at rest while `u` crosses the gap. The driven part has no inertia of its own.
+/// pushed. It stays at rest while `u` crosses the gap. The driven part has no inertia of its own.
 ///
 /// Source: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002),
 /// section 2 (the play operator).

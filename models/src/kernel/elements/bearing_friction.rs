@@ -32,7 +32,7 @@ impl<S: Scalar> BearingFriction<S> {
         }
         if !(1.0..).contains(&peak.value()) {
             return undefined(format!(
-                "the break-away torque must be at least the sliding torque at rest: expected peak >= 1, found {}",
+                "the break-away torque must be at least the sliding torque: expected peak >= 1, found {}",
                 peak.value()
             ));
         }
