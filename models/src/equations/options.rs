@@ -25,9 +25,9 @@ use crate::kernel::Tolerance;
 /// Expressions may contain `+ - * / ^`, parentheses, `pi` and `time` (s).
 /// Smooth functions: `sin cos tan asin acos atan atan2(y, x) sinh cosh tanh exp ln log10 sqrt`.
 /// Functions with kinks or jumps: `abs sign min max clip(x, low, high) deadzone(x, low, high)`.
-/// `table(x, x1, y1, x2, y2, ..)` is piecewise linear through points. `if(condition, a, b)` takes conditions of `> >= <
-/// <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an `if`
-/// changes its branch. So no step crosses a kink or a jump.
+/// `table(x, x1, y1, x2, y2, ..)` is piecewise linear through points. `if(condition, a, b)` takes conditions of
+/// `> >= < <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an
+/// `if` changes its branch. So no step crosses a kink or a jump.
 ///
 /// Expressions use coherent SI units for all quantities, whatever unit they are declared in, and their dimensions are
 /// checked. A number in a product is a pure number. A number that is a whole term has the SI unit of the other terms.

@@ -40,7 +40,7 @@ pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<V
                 .zip(what.into_iter().zip([*start, 0.0]))
         {
             let parameter = format!("{name}0");
-            parameters.push(Parameter::new(&parameter, unit, format!("{about} at the start")).with_default(start));
+            parameters.push(Parameter::new(&parameter, unit, format!("initial {about}")).with_default(start));
             interface.signals.push(Variable::new(&name, unit, about));
             interface.states.push(State { name: name.clone(), start: parameter, signal: Some(name), rate_of });
         }

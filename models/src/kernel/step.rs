@@ -62,8 +62,8 @@ impl<S: Scalar> Step<S> {
         value([r0[i], r1[i], r2[i], r3[i], r4[i]], s * self.share)
     }
 
-    /// Writes the state at `start + theta length` to `x`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta)
-    /// r4)))`.
+    /// Writes the state at `start + theta length` to `x`:
+    /// `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
     #[inline]
     pub(super) fn at(&self, theta: f64, x: &mut [S]) {
         by_size!(x.len(), S, N => state_of::<S, N>(&self.dense, theta, x));
