@@ -373,7 +373,7 @@ mod tests {
         Tolerance { relative, method: IntegrationMethod::Stiff, ..Tolerance::DEFAULT }
     }
 
-    /// `x'' = mu (1 - x^2) x' - x`.
+    /// Van der Pol oscillator `x'' = mu (1 - x^2) x' - x`.
     struct VanDerPol<S>(S);
     impl<S: Scalar> Dynamics<S> for VanDerPol<S> {
         fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
@@ -393,7 +393,7 @@ mod tests {
 
     #[test]
     fn the_error_falls_with_the_fourth_power_of_the_step() {
-        // `x' = -cos(t) x^2`, `x(0) = 1`, has the solution `1/(1 + sin t)`.
+        // The solution of `x' = -cos(t) x^2`, `x(0) = 1` is `1/(1 + sin t)`.
         struct Rational;
         impl Dynamics<f64> for Rational {
             fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {
@@ -435,7 +435,7 @@ mod tests {
 
     #[test]
     fn a_chain_that_rests_at_zero_is_driven() {
-        /// `x1' = x2`, ..., `xn' = push(t)`, all 0 at the start.
+        /// Chain of integrators `x1' = x2`, ..., `xn' = push(t)`, with all states 0 at the start.
         struct Chain<const N: usize>(fn(f64) -> f64);
         impl<const N: usize> Dynamics<f64> for Chain<N> {
             fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {

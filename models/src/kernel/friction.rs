@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_joint_that_moves_can_tear_another_loose() {
-        // Joint 0 accelerates by about 10/2; through M01 it needs 2.5 of joint 1, more than its limit of 1.
+        // Joint 0 accelerates by about 10/2; through M01 joint 1 needs a torque of 2.5, above its limit of 1.
         let contact = contacts(&MASS, &[10.0, 0.0], &[0.0, 1.0], &[1.0, 0.0]);
         assert_eq!(contact, [Contact::Forward, Contact::Backward]);
     }
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn every_situation_at_rest_has_contacts_that_agree() {
+    fn consistent_contacts_exist_for_all_forces_at_rest() {
         for i in -20..=20 {
             for j in -20..=20 {
                 let force = [f64::from(i) * 0.1, f64::from(j) * 0.1];

@@ -201,7 +201,7 @@ mod tests {
     use super::*;
     use mops_core::{Dual, math};
 
-    /// `x'' = -x`.
+    /// Harmonic oscillator `x'' = -x`.
     struct Oscillator;
     impl<S: Scalar> Dynamics<S> for Oscillator {
         fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
@@ -227,7 +227,7 @@ mod tests {
         assert!((dual[0].tangent[0] - math::cos(3.0)).abs() < 1e-9);
     }
 
-    /// `x' = x^2`, with a solution from `x = 1` that is infinite at `t = 1`.
+    /// System `x' = x^2`, whose solution from `x = 1` is infinite at `t = 1`.
     struct Explosion;
     impl Dynamics<f64> for Explosion {
         fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn tangents_jump_at_events_as_the_closed_form_does() {
-        // Height and speed at 1.2 s, after bounces at 0.45 s and, for a rebound of 0.8, at 1.17 s.
+        // Height and speed at 1.2 s, after bounces at 0.45 s and at 1.17 s (for a rebound of 0.8).
         let closed = |height: f64, rebound: f64| {
             let (g, fall) = (9.81, (2.0 * height / 9.81).sqrt());
             let second = fall * (1.0 + 2.0 * rebound);
