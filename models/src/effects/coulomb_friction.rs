@@ -1,4 +1,4 @@
-//! Dry friction.
+//! Coulomb friction.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
 

@@ -13,7 +13,7 @@ use super::options::{EquationsOptions, Formula};
 /// Expression or equation, with its path in the study.
 #[derive(Debug, Clone)]
 pub struct Text {
-    /// Keys from the options down.
+    /// Keys from the options to the expression.
     pub path: Vec<String>,
     /// Parsed expression or equation.
     pub equation: Arc<Equation>,

@@ -5,7 +5,7 @@ use mops_core::Mistake;
 /// Key of a table of declarations or definitions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// The name before the bracket.
+    /// Name before the bracket.
     pub name: String,
     /// Index in the bracket.
     pub index: Index,

@@ -19,9 +19,9 @@ struct Row {
 /// Dry friction of a joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Contact {
-    /// The position, as a state.
+    /// Position, as a state.
     pub position: usize,
-    /// The speed, as a state.
+    /// Speed, as a state.
     pub velocity: usize,
     /// Mode: 1 forward, -1 backward, 0 stuck.
     pub direction: usize,

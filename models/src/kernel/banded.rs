@@ -9,7 +9,7 @@ pub(super) struct Banded {
     lower: usize,
     /// Stored diagonals above the main diagonal: `upper`, plus the fill-in from row exchanges.
     reach: usize,
-    /// Row by row, from the lowest diagonal to the highest.
+    /// Entries row by row, from the lowest diagonal to the highest.
     rows: Vec<f64>,
     /// Pivot row of each row, after factorisation.
     exchanged: Vec<usize>,

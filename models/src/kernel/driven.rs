@@ -10,7 +10,7 @@ use super::drive::Drive;
 
 /// Plant with given inputs and without external forces: the system that a simulation integrates.
 pub struct Driven<'a, S, P> {
-    /// The plant.
+    /// Plant.
     pub plant: P,
     drives: Vec<Drive<'a, S>>,
     /// Inputs since the last break, if all of them are constant up to the next.

@@ -1,4 +1,4 @@
-//! The implicit Runge-Kutta method ARK4(3)6L\[2\]SA-ESDIRK: order 4(3), L-stable, stiffly accurate.
+//! Implicit Runge-Kutta method ARK4(3)6L\[2\]SA-ESDIRK: order 4(3), L-stable, stiffly accurate.
 //!
 //! The first stage is explicit. The last stage is the new state, so that its derivative is the first stage of the next
 //! step. Each of the other five stages solves `z - h/4 f(z) = r` by Newton's method. All use one matrix `I - h/4 J`,

@@ -96,11 +96,11 @@ pub trait PlantModel: Send + Sync {
 ///         &self.0
 ///     }
 ///     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-///         Ok(At(parameters.try_into().expect("three parameters and two start values")))
+///         Ok(At(parameters.try_into().expect("three parameters and two initial states")))
 ///     }
 /// }
 ///
-/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which takes effects.
+/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which accepts effects.
 /// use mops_core::{Catalogue, EffectDraft, ModelDraft};
 /// let catalogue = Catalogue {
 ///     effects: mops_models::effects::effects(),

@@ -1,4 +1,4 @@
-//! An accepted step and its dense output.
+//! Accepted step and its dense output.
 
 use mops_core::Scalar;
 use mops_core::enclosure::{Enclosure, Interval};
