@@ -265,7 +265,7 @@ fn coulomb_friction_brings_the_pendulum_to_rest_and_it_stays_there_exactly() {
         assert_eq!(trace.at(last + 0.5), trace.at(20.0), "{signal} does not creep");
     }
     let theta = response.trace("theta").unwrap().at(20.0);
-    assert!(theta != std::f64::consts::PI, "it rests off centre, held by friction");
+    assert!(theta != std::f64::consts::PI, "the pendulum rests off centre because of friction");
 }
 
 #[test]

@@ -494,7 +494,10 @@ fn definitions_are_in_any_order_and_initial_values_may_be_expressions() {
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1)], 1.0);
     assert!((at(&response, "x", 1.0) - (0.1 * math::cos(3.0) + math::sin(3.0))).abs() < 1e-9);
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1), ("v0", 0.0)], 1.0);
-    assert!((at(&response, "x", 1.0) - 0.1 * math::cos(3.0)).abs() < 1e-9, "a start value that is given goes over it");
+    assert!(
+        (at(&response, "x", 1.0) - 0.1 * math::cos(3.0)).abs() < 1e-9,
+        "a given initial value overrides the expression"
+    );
     assert_eq!(model.start_values(&[3.0, 0.5, 0.1, f64::NAN]), Some(vec![0.1, 3.0]));
     assert_eq!(model.interface().states[0].start, "s");
     assert_eq!(model.interface().states[1].rate_of.as_deref(), Some("x"));

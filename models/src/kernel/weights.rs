@@ -6,9 +6,9 @@ use super::Dynamics;
 
 /// Weights of the errors of all states: `relative |x_i| + floor_i`.
 ///
-/// The size `|x_i|` is the larger of the values at both ends of the step. It is at least the change at the current rate
-/// over [`BRIEF`] of the simulated time. A state that leaves 0 at a kink without a guard would otherwise need
-/// infinitely short steps.
+/// The size `|x_i|` is the larger of the values at both ends of the step. The size is at least the change over
+/// [`BRIEF`] of the simulated time at the rate at the end of the step. A state that leaves 0 at a kink without a guard
+/// would otherwise need infinitely short steps.
 ///
 /// The floor is the tolerance for a state that is small relative to its usual size: `absolute` if the user gives it,
 /// else `SHARE relative s_i`. The scale `s_i` is declared for the state, or else the largest `|x_i|` so far. A state

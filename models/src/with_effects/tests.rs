@@ -255,7 +255,10 @@ fn pushed(
     let job = Job { case: &case, parameters: &parameters, signals: &wanted, horizon: 6.0 };
     let analysis = model.analyse(&job).expect("it simulates");
     let response = analysis.response().expect("it is a simulation").clone();
-    (signals.iter().map(|name| response.trace(name).expect("it was asked for").clone()).collect(), response.events)
+    (
+        signals.iter().map(|name| response.trace(name).expect("the signal was requested").clone()).collect(),
+        response.events,
+    )
 }
 
 /// Returns the largest difference of two models' signals, each divided by the maximum of the signal or 1.
@@ -360,7 +363,7 @@ impl PlantModel for Pendulum {
         &self.0
     }
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-        Ok(At(parameters.try_into().expect("one parameter and two start values")))
+        Ok(At(parameters.try_into().expect("one parameter and two initial states")))
     }
 }
 
