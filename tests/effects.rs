@@ -116,7 +116,7 @@ fn in_rust_a_model_takes_its_effects_by_the_same_names() {
     let names: Vec<&str> = draft.model.interface().parameters.iter().map(|p| &*p.variable.name).collect();
     assert_eq!(names[names.len() - 2..], ["arm.c", "swing.c"]);
     let taken = draft.with_effects(&catalogue, &friction("arm", "joint:theta")).err().unwrap();
-    assert_eq!(taken.to_string(), "arm: the model has a parameter `arm.c` already; give the effect another name");
+    assert_eq!(taken.to_string(), "arm: the model already has a parameter `arm.c`; give the effect another name");
 }
 
 #[test]

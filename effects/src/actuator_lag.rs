@@ -1,14 +1,14 @@
-//! An actuator of first order.
+//! First-order actuator.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::damped;
 
-/// `actuator-lag`.
+/// Effect `actuator-lag`.
 pub struct ActuatorLag;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     tau: S,
 }

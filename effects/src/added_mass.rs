@@ -1,20 +1,21 @@
-//! Mass that moves along.
+//! Additional mass that moves with a joint.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `added-mass`.
+/// Effect `added-mass`.
 pub struct AddedMass;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     m: S,
 }
 
 impl Definition for AddedMass {
     const NAME: &'static str = "added-mass";
-    const ABOUT: &'static str = "Mass or inertia that moves along: a load, the water around a body.";
+    const ABOUT: &'static str =
+        "Additional mass or inertia that moves with the joint, such as a load or the water around a body.";
     const FORMULA: &'static str = "-m q''";
     const SOURCE: &'static str = "H. Lamb, Hydrodynamics, 6th edition (Cambridge 1932), chapter VI";
     const CLASS: EffectClass = EffectClass::Inertial;

@@ -1,13 +1,13 @@
-//! Dry friction of different size forward and backward.
+//! Dry friction that depends on the direction of motion.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 
-/// `asymmetric-friction`.
+/// Effect `asymmetric-friction`.
 pub struct AsymmetricFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     skew: S,
@@ -17,7 +17,7 @@ impl Definition for AsymmetricFriction {
     const NAME: &'static str = "asymmetric-friction";
     const ABOUT: &'static str = "Dry friction that differs between forward and backward motion.";
     const FORMULA: &'static str =
-        "-c (1 + skew) forward, c (1 - skew) backward; at rest whatever holds it, up to these";
+        "-c (1 + skew) forward, c (1 - skew) backward; at rest any balancing force within these";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
@@ -27,7 +27,7 @@ impl Definition for AsymmetricFriction {
         Strength::positive("c", "mean of both friction forces", Dimension::OUTPUT),
         Strength::shape(
             "skew",
-            "difference of both over their sum, positive where forward motion is harder",
+            "difference of both friction forces divided by their sum, positive if friction is larger forward",
             Dimension::ONE,
             [-1.0, 1.0],
             Trials::Plain(&[-0.4, 0.4]),

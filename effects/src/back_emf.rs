@@ -1,20 +1,20 @@
-//! An actuator that a motion weakens.
+//! Back electromotive force of a motor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `back-emf`.
+/// Effect `back-emf`.
 pub struct BackEmf;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
 }
 
 impl Definition for BackEmf {
     const NAME: &'static str = "back-emf";
-    const ABOUT: &'static str = "The motion of a joint induces a voltage against the command.";
+    const ABOUT: &'static str = "The motion of a joint induces a voltage that opposes the command.";
     const FORMULA: &'static str = "u - k v, v the speed of the companion joint";
     const SOURCE: &'static str = "G. F. Franklin, J. D. Powell, A. Emami-Naeini, Feedback Control of Dynamic Systems, \
                                   6th edition (Pearson 2010), section 2.3";
@@ -22,7 +22,7 @@ impl Definition for BackEmf {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
     const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("k", "command lost per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
+        &[Strength::positive("k", "loss of command per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { k: s[0] })

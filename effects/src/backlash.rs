@@ -1,22 +1,23 @@
-//! Play.
+//! Backlash.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::clamp;
 
-/// `backlash`.
+/// Effect `backlash`.
 pub struct Backlash;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     gap: S,
 }
 
 impl Definition for Backlash {
     const NAME: &'static str = "backlash";
-    const ABOUT: &'static str = "Play of a gear: the output follows only after the gap is crossed.";
-    const FORMULA: &'static str = "the output moves as little as keeps it within u - gap/2 and u + gap/2";
+    const ABOUT: &'static str = "Backlash of a gear: after a reversal the output follows only once the gap is crossed.";
+    const FORMULA: &'static str =
+        "play operator: the output moves only as far as needed to stay between u - gap/2 and u + gap/2";
     const SOURCE: &'static str =
         "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Gain;

@@ -1,14 +1,14 @@
-//! A force with hysteresis.
+//! Force with hysteresis.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{power, sign};
 
-/// `bouc-wen`.
+/// Effect `bouc-wen`.
 pub struct BoucWen;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     y: S,
@@ -18,7 +18,8 @@ struct AtStrengths<S> {
 
 impl Definition for BoucWen {
     const NAME: &'static str = "bouc-wen";
-    const ABOUT: &'static str = "A force with hysteresis, elastic at first and yielding towards a limit.";
+    const ABOUT: &'static str =
+        "A restoring force with hysteresis that is elastic for small displacements and yields towards a limit.";
     const FORMULA: &'static str = "-c z, z' = (v - sigma |v| |z|^(n-1) z + (sigma - 1) v |z|^n)/y";
     const SOURCE: &'static str = "R. Bouc, Forced vibration of mechanical systems with hysteresis, Proc. 4th Conf. on \
                                   Nonlinear Oscillation, Prague (1967); Y.-K. Wen, Method for random vibration of \
@@ -28,7 +29,7 @@ impl Definition for BoucWen {
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "force at which it yields", Dimension::OUTPUT),
+        Strength::positive("c", "yield force", Dimension::OUTPUT),
         Strength::shape(
             "y",
             "displacement over which the force builds up",
@@ -38,12 +39,18 @@ impl Definition for BoucWen {
         ),
         Strength::shape(
             "sigma",
-            "1/2: unloads like a spring, more: takes energy at once",
+            "1/2: elastic unloading; larger: energy is dissipated immediately",
             Dimension::ONE,
             [0.5, 10.0],
             Trials::Plain(&[0.5, 1.0]),
         ),
-        Strength::shape("n", "sharpness of the yielding", Dimension::ONE, [1.0, 10.0], Trials::Plain(&[1.0, 2.0])),
+        Strength::shape(
+            "n",
+            "sharpness of the transition to yielding",
+            Dimension::ONE,
+            [1.0, 10.0],
+            Trials::Plain(&[1.0, 2.0]),
+        ),
     ];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];

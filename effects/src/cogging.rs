@@ -1,14 +1,14 @@
-//! A force that repeats with the teeth or magnets.
+//! Cogging force of teeth or magnets.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{phase, waves};
 
-/// `cogging`.
+/// Effect `cogging`.
 pub struct Cogging;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     n: S,
@@ -17,7 +17,8 @@ struct AtStrengths<S> {
 
 impl Definition for Cogging {
     const NAME: &'static str = "cogging";
-    const ABOUT: &'static str = "A force that repeats a whole number of times in a turn, from magnets or teeth.";
+    const ABOUT: &'static str =
+        "A force from magnets or teeth that is periodic in the angle, an integer number of periods per turn.";
     const FORMULA: &'static str = "a sin(n q + phase)";
     const SOURCE: &'static str =
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";

@@ -1,25 +1,26 @@
-//! A load that does not change.
+//! Constant load.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `constant-force`.
+/// Effect `constant-force`.
 pub struct ConstantForce;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     f: S,
 }
 
 impl Definition for ConstantForce {
     const NAME: &'static str = "constant-force";
-    const ABOUT: &'static str = "A constant force, torque, flow or gain of heat: an unknown load, a slope, the sun.";
+    const ABOUT: &'static str =
+        "A constant force, torque, flow or heat gain, such as an unknown load, an incline or solar radiation.";
     const FORMULA: &'static str = "f";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 3";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed("f", "what is added", Dimension::OUTPUT)];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed("f", "added force, torque or flow", Dimension::OUTPUT)];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

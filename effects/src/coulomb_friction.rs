@@ -1,13 +1,13 @@
-//! Dry friction.
+//! Coulomb friction.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `coulomb-friction`.
+/// Effect `coulomb-friction`.
 pub struct CoulombFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 pub struct Coulomb<S> {
     torque: S,
 }
@@ -15,8 +15,8 @@ pub struct Coulomb<S> {
 impl Definition for CoulombFriction {
     const NAME: &'static str = "coulomb-friction";
     const ABOUT: &'static str =
-        "A force of constant size against the motion, that holds a joint at rest up to the same size.";
-    const FORMULA: &'static str = "-c sgn(v); at rest whatever holds it, up to c";
+        "A force of constant magnitude against the motion; a joint at rest sticks up to the same magnitude.";
+    const FORMULA: &'static str = "-c sgn(v); at rest any balancing force up to c";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;

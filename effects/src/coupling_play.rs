@@ -1,14 +1,14 @@
-//! A coupling with play.
+//! Elastic coupling with backlash.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, Pressed};
 
-/// `coupling-play`.
+/// Effect `coupling-play`.
 pub struct CouplingPlay;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     gap: S,
@@ -17,13 +17,14 @@ struct AtStrengths<S> {
 
 impl Definition for CouplingPlay {
     const NAME: &'static str = "coupling-play";
-    const ABOUT: &'static str = "Play in a declared elastic coupling of two joints: within the gap a stiffness k, and \
-                                 damping k tau of it, transmit nothing, and contact never pulls.";
+    const ABOUT: &'static str = "Backlash in an elastic coupling of two joints that the model declares: within the gap \
+                                 its stiffness k and damping k tau transmit nothing, and contact never pulls.";
     const FORMULA: &'static str = "k (e + tau e' - c) with c = max(e - gap/2 + tau e', 0) for e = q - q2 > gap/2, \
-                                   min(e + gap/2 + tau e', 0) for e < -gap/2, else 0, and its reaction at the \
-                                   companion joint: what a coupling -k (e + tau e') with play lacks";
+                                   min(e + gap/2 + tau e', 0) for e < -gap/2, else 0, and the reaction at the \
+                                   companion joint: the difference between a coupling with backlash and the \
+                                   coupling -k (e + tau e')";
     const SOURCE: &'static str = "Modelica Standard Library 4.0, Modelica.Mechanics.Rotational.Components.ElastoBacklash2: \
-                                  contact is made again where it was lost, without the relaxation of a damped shaft \
+                                  contact is regained where it was lost, without the relaxation of a damped shaft \
                                   in the gap";
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
@@ -31,7 +32,7 @@ impl Definition for CouplingPlay {
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
     const MUTUAL: bool = true;
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the coupling that has play", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::positive("k", "stiffness of the coupling with backlash", Dimension::OUTPUT.over(Dimension::POSITION)),
         Strength::shape(
             "gap",
             "width of the gap",
@@ -41,7 +42,7 @@ impl Definition for CouplingPlay {
         ),
         Strength::shape(
             "tau",
-            "damping of the coupling that acts in contact alone, over its stiffness",
+            "damping of the coupling that acts only in contact, divided by its stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
             Trials::Plain(&[0.0]),
@@ -54,7 +55,7 @@ impl Definition for CouplingPlay {
 }
 
 impl<S: Scalar> AtStrengths<S> {
-    /// The contact on the side on which one is ahead of the other, and which that is.
+    /// Returns the contact on the side on which one joint leads the other, and the sign of that side.
     fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
         let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
         let side = if ahead.value() < 0.0 { -1.0 } else { 1.0 };

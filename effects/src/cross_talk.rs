@@ -1,27 +1,27 @@
-//! A sensor that another one disturbs.
+//! Sensor with crosstalk from another sensor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `cross-talk`.
+/// Effect `cross-talk`.
 pub struct CrossTalk;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
 }
 
 impl Definition for CrossTalk {
     const NAME: &'static str = "cross-talk";
-    const ABOUT: &'static str = "What another sensor measures is seen in this one too.";
+    const ABOUT: &'static str = "A fraction of the signal of another sensor appears in this signal.";
     const FORMULA: &'static str = "y + k y2, y2 the signal of the companion sensor";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const COMPANION: Option<PortKind> = Some(PortKind::Sensor);
     const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("k", "share of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
+        &[Strength::signed("k", "fraction of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { k: s[0] })

@@ -1,20 +1,20 @@
-//! Damping with the third power of the speed.
+//! Drag proportional to the third power of the speed.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `cubic-drag`.
+/// Effect `cubic-drag`.
 pub struct CubicDrag;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
 }
 
 impl Definition for CubicDrag {
     const NAME: &'static str = "cubic-drag";
-    const ABOUT: &'static str = "A force against the motion in proportion to the third power of the speed.";
+    const ABOUT: &'static str = "A force against the motion, proportional to the third power of the speed.";
     const FORMULA: &'static str = "-k v^3";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;

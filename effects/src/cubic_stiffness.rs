@@ -1,14 +1,14 @@
-//! A spring that hardens or softens.
+//! Hardening or softening spring.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::ANY;
 
-/// `cubic-stiffness`.
+/// Effect `cubic-stiffness`.
 pub struct CubicStiffness;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     rest: S,
@@ -16,8 +16,8 @@ struct AtStrengths<S> {
 
 impl Definition for CubicStiffness {
     const NAME: &'static str = "cubic-stiffness";
-    const ABOUT: &'static str = "A spring whose force has a share with the third power of the displacement: hardening, \
-                                 or softening where it is negative.";
+    const ABOUT: &'static str = "A spring force proportional to the third power of the displacement: hardening if \
+                                 positive, softening if negative.";
     const FORMULA: &'static str = "-k (q - rest)^3";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4 (Duffing)";
     const CLASS: EffectClass = EffectClass::Elastic;

@@ -1,13 +1,13 @@
-//! Dry friction with elastic asperities.
+//! Dry friction with elastic presliding.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 
-/// `dahl-friction`.
+/// Effect `dahl-friction`.
 pub struct DahlFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     y: S,
@@ -15,7 +15,7 @@ struct AtStrengths<S> {
 
 impl Definition for DahlFriction {
     const NAME: &'static str = "dahl-friction";
-    const ABOUT: &'static str = "Dry friction that builds up over a small displacement, like a spring that yields.";
+    const ABOUT: &'static str = "Dry friction that builds up over a small displacement, like a yielding spring.";
     const FORMULA: &'static str = "-c z, z' = (v/y) (1 - z sgn(v))";
     const SOURCE: &'static str =
         "P. R. Dahl, A solid friction model, report TOR-0158(3107-18)-1, The Aerospace Corporation (1968)";

@@ -1,20 +1,21 @@
-//! Friction in proportion to the speed that changes with time.
+//! Viscous friction that drifts with time.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `damping-drift`.
+/// Effect `damping-drift`.
 pub struct DampingDrift;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     r: S,
 }
 
 impl Definition for DampingDrift {
     const NAME: &'static str = "damping-drift";
-    const ABOUT: &'static str = "Viscous friction that grows or falls steadily, as in a bearing that warms up.";
+    const ABOUT: &'static str =
+        "Viscous friction that increases or decreases linearly with time, for example in a bearing that warms up.";
     const FORMULA: &'static str = "-r t v";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
@@ -22,7 +23,7 @@ impl Definition for DampingDrift {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[Strength::signed(
         "r",
-        "force per speed, gained per time",
+        "change of force per speed, per time",
         Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::TIME),
     )];
 

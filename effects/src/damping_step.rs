@@ -1,14 +1,14 @@
-//! Friction in proportion to the speed that changes once.
+//! Viscous friction that changes once.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
 
-/// `damping-step`.
+/// Effect `damping-step`.
 pub struct DampingStep;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     d: S,
     span: Span<S>,
@@ -16,15 +16,15 @@ struct AtStrengths<S> {
 
 impl Definition for DampingStep {
     const NAME: &'static str = "damping-step";
-    const ABOUT: &'static str = "Viscous friction that becomes more or less once, as when something begins to rub.";
+    const ABOUT: &'static str = "Viscous friction that changes once, for example when a part starts to rub.";
     const FORMULA: &'static str =
-        "-d s v with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 later";
+        "-d s v with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 after";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("d", "force per speed that is gained", Dimension::OUTPUT.over(Dimension::SPEED)),
+        Strength::signed("d", "change of force per speed", Dimension::OUTPUT.over(Dimension::SPEED)),
         from(STEPS_BEGIN),
         length(STEPS_LAST),
     ];

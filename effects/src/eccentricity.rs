@@ -1,14 +1,14 @@
-//! A scale off its centre.
+//! Eccentric angular scale.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 use super::terms::phase;
 
-/// `eccentricity`.
+/// Effect `eccentricity`.
 pub struct Eccentricity;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     phase: S,
@@ -16,13 +16,13 @@ struct AtStrengths<S> {
 
 impl Definition for Eccentricity {
     const NAME: &'static str = "eccentricity";
-    const ABOUT: &'static str = "An angle is measured with a scale whose centre is off the axis.";
+    const ABOUT: &'static str = "An angle is measured with a scale whose centre is off the axis of rotation.";
     const FORMULA: &'static str = "y + a sin(y + phase)";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    // In rad, as the angle is, it is the offset of the centre over the radius of the scale. An assumption: at half the radius it
-    // is no scale any more.
+    // In rad, as the angle is, the amplitude is the offset of the centre divided by the radius of the scale. The bound
+    // of half the radius is an assumption.
     const STRENGTHS: &'static [Strength] =
         &[Strength::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
 

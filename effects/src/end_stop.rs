@@ -1,14 +1,14 @@
-//! Stops at both ends: springs, with dampers that cannot pull.
+//! Elastic end stops with dampers that cannot pull.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, Pressed};
 
-/// `end-stop`.
+/// Effect `end-stop`.
 pub struct EndStop;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     low: S,
@@ -18,8 +18,9 @@ struct AtStrengths<S> {
 
 impl Definition for EndStop {
     const NAME: &'static str = "end-stop";
-    const ABOUT: &'static str = "Damped stops that push back, and never pull, beyond a lower and an upper position.";
-    const FORMULA: &'static str = "-k max(q - high + tau v, 0) where q > high, k max(low - q - tau v, 0) where q < low";
+    const ABOUT: &'static str =
+        "Damped elastic stops beyond a lower and an upper position; they push back but never pull.";
+    const FORMULA: &'static str = "-k max(q - high + tau v, 0) for q > high, k max(low - q - tau v, 0) for q < low";
     const SOURCE: &'static str = "B. Brogliato, Nonsmooth Mechanics, 3rd edition (Springer 2016), chapter 2";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
@@ -42,7 +43,7 @@ impl Definition for EndStop {
         ),
         Strength::shape(
             "tau",
-            "damping of the stops over their stiffness",
+            "damping of the stops divided by their stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
             Trials::Plain(&[0.0]),
@@ -55,7 +56,8 @@ impl Definition for EndStop {
 }
 
 impl<S: Scalar> AtStrengths<S> {
-    /// The contact with the nearer stop, and where that pushes. Stops that have crossed meet in the middle.
+    /// Returns the contact with the nearer stop, and the direction of its force. If the stops have crossed, both are at
+    /// their middle.
     fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
         let middle = (self.low + self.high) * 0.5;
         let (low, high) = if self.low.value() > self.high.value() { (middle, middle) } else { (self.low, self.high) };

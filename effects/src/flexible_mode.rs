@@ -1,14 +1,14 @@
-//! A mass on a spring that hangs on a joint.
+//! Flexible mode: a mass attached to a joint by a spring.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `flexible-mode`.
+/// Effect `flexible-mode`.
 pub struct FlexibleMode;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     m: S,
     w: S,
@@ -17,8 +17,7 @@ struct AtStrengths<S> {
 
 impl Definition for FlexibleMode {
     const NAME: &'static str = "flexible-mode";
-    const ABOUT: &'static str =
-        "A second mass, attached to the joint through a spring and a damper, with a resonance of its own.";
+    const ABOUT: &'static str = "A second mass attached to the joint by a spring and a damper, which adds a resonance.";
     const FORMULA: &'static str = "m (w^2 (z - q) + 2 d w (z' - v)), z'' = -w^2 (z - q) - 2 d w (z' - v)";
     const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), section 3.3";
     const CLASS: EffectClass = EffectClass::Inertial;
@@ -31,7 +30,7 @@ impl Definition for FlexibleMode {
         ),
         Strength::shape(
             "w",
-            "frequency of the attached mass with the joint held, rad/s",
+            "natural frequency of the attached mass with the joint fixed, rad/s",
             Dimension::PER_TIME,
             NOT_NEGATIVE,
             Trials::Frequencies,
@@ -61,7 +60,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
 }
 
 impl<S: Scalar> AtStrengths<S> {
-    /// Force on the joint per attached mass.
+    /// Returns the force on the joint per attached mass.
     fn pull(&self, at: &At<'_, S>, z: &[S]) -> S {
         self.w * self.w * (z[0] - at.q) + self.d * self.w * (z[1] - at.v) * 2.0
     }

@@ -1,14 +1,14 @@
-//! A store that nobody drew.
+//! Hidden store of heat or matter.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `hidden-store`.
+/// Effect `hidden-store`.
 pub struct HiddenStore;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     tau: S,
@@ -16,7 +16,8 @@ struct AtStrengths<S> {
 
 impl Definition for HiddenStore {
     const NAME: &'static str = "hidden-store";
-    const ABOUT: &'static str = "A second store of heat or matter that exchanges with this one: walls, a dead volume.";
+    const ABOUT: &'static str =
+        "A second store of heat or matter that exchanges with this one, such as walls or a dead volume.";
     const FORMULA: &'static str = "k (z - x), z' = (x - z)/tau";
     const SOURCE: &'static str = "P. Bacher, H. Madsen, Identifying suitable models for the heat dynamics of \
                                   buildings, Energy and Buildings 43 (2011)";

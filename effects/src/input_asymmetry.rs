@@ -1,27 +1,30 @@
-//! An actuator that is stronger one way.
+//! Actuator whose gain depends on the direction.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `input-asymmetry`.
+/// Effect `input-asymmetry`.
 pub struct InputAsymmetry;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
 }
 
 impl Definition for InputAsymmetry {
     const NAME: &'static str = "input-asymmetry";
-    const ABOUT: &'static str = "The command acts stronger one way than the other.";
+    const ABOUT: &'static str = "The gain of the command differs between positive and negative commands.";
     const FORMULA: &'static str = "u + a |u|";
     const SOURCE: &'static str = "R. Isermann, Fault-Diagnosis Systems (Springer 2006)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("a", "how much stronger forward and weaker backward, as a share", Dimension::ONE)
-            .within(-1.0, 1.0)];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+        "a",
+        "relative increase of the gain for positive and decrease for negative commands",
+        Dimension::ONE,
+    )
+    .within(-1.0, 1.0)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { a: s[0] })

@@ -1,27 +1,28 @@
-//! A command that must be large enough.
+//! Dead zone of an actuator.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::clamp;
 
-/// `input-dead-zone`.
+/// Effect `input-dead-zone`.
 pub struct InputDeadZone;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     width: S,
 }
 
 impl Definition for InputDeadZone {
     const NAME: &'static str = "input-dead-zone";
-    const ABOUT: &'static str = "Small commands do nothing, and larger ones act less by as much.";
+    const ABOUT: &'static str =
+        "Small commands have no effect, and larger ones are reduced by the width of the dead zone.";
     const FORMULA: &'static str = "u - clamp(u, -width, width)";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("width", "largest command without an effect", Dimension::VALUE)
+        &[Strength::positive("width", "largest command without effect", Dimension::VALUE)
             .tried(Trials::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
     const RARITY: u8 = 0;
 

@@ -1,20 +1,20 @@
-//! An input that acts late.
+//! Delay of an input.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 
-/// `input-delay`.
+/// Effect `input-delay`.
 pub struct InputDelay;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     delay: S,
 }
 
 impl Definition for InputDelay {
     const NAME: &'static str = "input-delay";
-    const ABOUT: &'static str = "The command acts late by a constant time.";
+    const ABOUT: &'static str = "The command acts after a constant delay.";
     const FORMULA: &'static str = "u(t - delay)";
     const SOURCE: &'static str =
         "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";

@@ -1,26 +1,26 @@
-//! A factor on an input.
+//! Gain error of an input.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `input-gain`.
+/// Effect `input-gain`.
 pub struct InputGain;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     g: S,
 }
 
 impl Definition for InputGain {
     const NAME: &'static str = "input-gain";
-    const ABOUT: &'static str = "The command acts stronger or weaker than declared.";
+    const ABOUT: &'static str = "The gain of the command is larger or smaller than declared.";
     const FORMULA: &'static str = "u (1 + g)";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 2-2";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("g", "error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
+        &[Strength::signed("g", "relative error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { g: s[0] })

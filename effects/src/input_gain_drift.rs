@@ -1,27 +1,28 @@
-//! A factor on an input that changes with time.
+//! Gain of an input that drifts with time.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `input-gain-drift`.
+/// Effect `input-gain-drift`.
 pub struct InputGainDrift;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     r: S,
 }
 
 impl Definition for InputGainDrift {
     const NAME: &'static str = "input-gain-drift";
-    const ABOUT: &'static str = "The command acts steadily stronger or weaker, as with a battery that runs down.";
+    const ABOUT: &'static str =
+        "The gain of the command drifts linearly with time, for example as a battery discharges.";
     const FORMULA: &'static str = "u (1 + r t)";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("r", "share gained per time", Dimension::ONE.over(Dimension::TIME))];
+        &[Strength::signed("r", "relative change of the gain per time", Dimension::ONE.over(Dimension::TIME))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { r: s[0] })

@@ -1,14 +1,14 @@
-//! A factor on an input that changes once.
+//! Gain of an input that changes once.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
 
-/// `input-gain-step`.
+/// Effect `input-gain-step`.
 pub struct InputGainStep;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     g: S,
     span: Span<S>,
@@ -17,15 +17,15 @@ struct AtStrengths<S> {
 impl Definition for InputGainStep {
     const NAME: &'static str = "input-gain-step";
     const ABOUT: &'static str =
-        "The command begins to act stronger or weaker, as when a supply or a valve fails in part.";
+        "The gain of the command changes once, for example when a supply or a valve fails partially.";
     const FORMULA: &'static str =
-        "u (1 + g s) with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 later";
+        "u (1 + g s) with s = (1 - cos(pi (t - from)/length))/2 for from < t < from + length, 0 before, 1 after";
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("g", "share that is gained", Dimension::ONE).within(-1.0, f64::INFINITY),
+        Strength::signed("g", "relative change of the gain", Dimension::ONE).within(-1.0, f64::INFINITY),
         from(STEPS_BEGIN),
         length(STEPS_LAST),
     ];

@@ -1,26 +1,27 @@
-//! An input in steps.
+//! Quantised input.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::quantised;
 
-/// `input-quantisation`.
+/// Effect `input-quantisation`.
 pub struct InputQuantisation;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     step: S,
 }
 
 impl Definition for InputQuantisation {
     const NAME: &'static str = "input-quantisation";
-    const ABOUT: &'static str = "The command acts in steps.";
+    const ABOUT: &'static str = "The command is quantised.";
     const FORMULA: &'static str = "step round(u/step)";
     const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("step", "step", Dimension::VALUE).tried(Trials::Steps)];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("step", "quantisation step", Dimension::VALUE).tried(Trials::Steps)];
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

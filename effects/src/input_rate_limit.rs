@@ -1,27 +1,27 @@
-//! An actuator of limited speed.
+//! Actuator with a rate limit.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::clamp;
 
-/// `input-rate-limit`.
+/// Effect `input-rate-limit`.
 pub struct InputRateLimit;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     rate: S,
 }
 
 impl Definition for InputRateLimit {
     const NAME: &'static str = "input-rate-limit";
-    const ABOUT: &'static str = "The actuator follows the command no faster than a rate.";
+    const ABOUT: &'static str = "The actuator follows the command with a limited rate.";
     const FORMULA: &'static str = "u' between -rate and rate";
     const SOURCE: &'static str = "L. Zaccarian, A. R. Teel, Modern Anti-windup Synthesis (Princeton 2011)";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("rate", "largest rate", Dimension::VALUE.over(Dimension::TIME))
+        &[Strength::positive("rate", "maximum rate", Dimension::VALUE.over(Dimension::TIME))
             .neutral_at(f64::INFINITY)
             .tried(Trials::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
     const MEMORY: usize = 2;

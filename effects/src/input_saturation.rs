@@ -1,21 +1,21 @@
-//! An input with a limit.
+//! Actuator with saturation.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::clamp;
 
-/// `input-saturation`.
+/// Effect `input-saturation`.
 pub struct InputSaturation;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     limit: S,
 }
 
 impl Definition for InputSaturation {
     const NAME: &'static str = "input-saturation";
-    const ABOUT: &'static str = "The actuator gives no more than a limit, either way.";
+    const ABOUT: &'static str = "The actuator saturates at the same limit in both directions.";
     const FORMULA: &'static str = "clamp(u, -limit, limit)";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;

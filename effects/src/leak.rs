@@ -1,14 +1,14 @@
-//! A hole in a store.
+//! Leak of a store.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `leak`.
+/// Effect `leak`.
 pub struct Leak;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     hole: S,
@@ -16,7 +16,7 @@ struct AtStrengths<S> {
 
 impl Definition for Leak {
     const NAME: &'static str = "leak";
-    const ABOUT: &'static str = "Outflow through a hole, with the square root of the level above it.";
+    const ABOUT: &'static str = "Outflow through a hole, proportional to the square root of the level above it.";
     const FORMULA: &'static str = "-k sqrt(max(x - hole, 0))";
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 3 (Torricelli)";
     const CLASS: EffectClass = EffectClass::Flow;

@@ -1,6 +1,6 @@
-//! The catalogue of effects that models may lack: one file per effect.
+//! Catalogue of effects that models may lack: one file per effect.
 //!
-//! An effect is a [`Definition`]: constants that describe it, and its formula written once over the scalar.
+//! An effect is a [`Definition`]: constants that describe the effect, and its formula written once over the scalar.
 
 mod actuator_lag;
 mod added_mass;
@@ -76,46 +76,46 @@ use std::sync::Arc;
 
 use mops_core::{Acting, Along, Dimension, Effect, EffectClass, PortKind, Scalar, Strength};
 
-/// What the file of an effect says; see [`Effect`] for the meaning of each.
+/// Definition of an effect in its file; see [`Effect`] for the meaning of each item.
 pub trait Definition: Send + Sync + 'static {
-    /// [`Effect::name`].
+    /// Value of [`Effect::name`].
     const NAME: &'static str;
-    /// [`Effect::about`].
+    /// Value of [`Effect::about`].
     const ABOUT: &'static str;
-    /// [`Effect::formula`].
+    /// Value of [`Effect::formula`].
     const FORMULA: &'static str;
-    /// [`Effect::source`].
+    /// Value of [`Effect::source`].
     const SOURCE: &'static str;
-    /// [`Effect::class`].
+    /// Value of [`Effect::class`].
     const CLASS: EffectClass;
-    /// [`Effect::form_of`].
+    /// Value of [`Effect::form_of`].
     const FORM_OF: Option<&'static str> = None;
-    /// [`Effect::ports`].
+    /// Value of [`Effect::ports`].
     const PORTS: &'static [PortKind];
-    /// [`Effect::companion`].
+    /// Value of [`Effect::companion`].
     const COMPANION: Option<PortKind> = None;
-    /// [`Effect::mutual`].
+    /// Value of [`Effect::mutual`].
     const MUTUAL: bool = false;
-    /// [`Effect::strengths`].
+    /// Value of [`Effect::strengths`].
     const STRENGTHS: &'static [Strength];
-    /// [`Effect::states`].
+    /// Value of [`Effect::states`].
     const STATES: usize = 0;
-    /// [`Effect::free_starts`].
+    /// Value of [`Effect::free_starts`].
     const FREE_STARTS: &'static [Dimension] = &[];
-    /// [`Effect::memory`].
+    /// Value of [`Effect::memory`].
     const MEMORY: usize = 0;
-    /// [`Effect::is_inertial`].
+    /// Value of [`Effect::is_inertial`].
     const IS_INERTIAL: bool = false;
-    /// [`Effect::is_one_off`].
+    /// Value of [`Effect::is_one_off`].
     const IS_ONE_OFF: bool = false;
-    /// [`Effect::rarity`].
+    /// Value of [`Effect::rarity`].
     const RARITY: u8 = 1;
 
-    /// The effect at these strengths.
+    /// Creates the effect at given parameters.
     fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>>;
 }
 
-/// An effect by its definition.
+/// Effect given by its definition.
 struct Defined<D>(std::marker::PhantomData<fn() -> D>);
 
 impl<D: Definition> Effect for Defined<D> {
@@ -175,12 +175,12 @@ impl<D: Definition> Effect for Defined<D> {
     }
 }
 
-/// An effect, by the type that defines it.
+/// Creates an effect from the type that defines it.
 pub fn effect<D: Definition>() -> Arc<dyn Effect> {
     Arc::new(Defined::<D>(std::marker::PhantomData))
 }
 
-/// Every effect that is shipped, the simplest and most common first.
+/// Returns all built-in effects, the simplest and most common first.
 pub fn effects() -> Vec<Arc<dyn Effect>> {
     vec![
         effect::<coulomb_friction::CoulombFriction>(),

@@ -1,14 +1,14 @@
-//! A loss in proportion.
+//! Loss proportional to a difference.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::ANY;
 
-/// `linear-loss`.
+/// Effect `linear-loss`.
 pub struct LinearLoss;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     around: S,
@@ -16,7 +16,7 @@ struct AtStrengths<S> {
 
 impl Definition for LinearLoss {
     const NAME: &'static str = "linear-loss";
-    const ABOUT: &'static str = "A loss or exchange in proportion to the difference from the surroundings.";
+    const ABOUT: &'static str = "A loss or exchange proportional to the difference from the surroundings.";
     const FORMULA: &'static str = "-k (x - around)";
     const SOURCE: &'static str = "F. P. Incropera, D. P. DeWitt, T. L. Bergman, A. S. Lavine, Fundamentals of Heat and \
                                   Mass Transfer, 6th edition (Wiley 2007), section 5.1";

@@ -1,14 +1,14 @@
-//! A spring.
+//! Linear spring.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::ANY;
 
-/// `linear-stiffness`.
+/// Effect `linear-stiffness`.
 pub struct LinearStiffness;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     rest: S,
@@ -16,7 +16,7 @@ struct AtStrengths<S> {
 
 impl Definition for LinearStiffness {
     const NAME: &'static str = "linear-stiffness";
-    const ABOUT: &'static str = "A spring or cable that pulls back to a position of rest.";
+    const ABOUT: &'static str = "A spring or cable that pulls back to a rest position.";
     const FORMULA: &'static str = "-k (q - rest)";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 1";
     const CLASS: EffectClass = EffectClass::Elastic;

@@ -1,13 +1,13 @@
-//! Dry friction that grows with the force that is transmitted.
+//! Dry friction proportional to the transmitted load.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `load-dependent-friction`.
+/// Effect `load-dependent-friction`.
 pub struct LoadDependentFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     mu: S,
 }
@@ -15,9 +15,9 @@ struct AtStrengths<S> {
 impl Definition for LoadDependentFriction {
     const NAME: &'static str = "load-dependent-friction";
     const ABOUT: &'static str =
-        "Dry friction of a gear or bearing in proportion to the force that an actuator loads it with.";
+        "Dry friction of a gear or bearing, proportional to the force with which an actuator loads it.";
     const FORMULA: &'static str =
-        "-mu |u| sgn(v), u the input of the companion actuator; at rest whatever holds it, up to mu |u|";
+        "-mu |u| sgn(v), u the input of the companion actuator; at rest any balancing force up to mu |u|";
     const SOURCE: &'static str = "A. C. Bittencourt, S. Gunnarsson, Static friction in a robot joint: modeling and \
                                   identification of load and temperature effects, Journal of Dynamic Systems, \
                                   Measurement, and Control 134 (2012)";
@@ -25,7 +25,7 @@ impl Definition for LoadDependentFriction {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const COMPANION: Option<PortKind> = Some(PortKind::Actuator);
     const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("mu", "friction force over the input", Dimension::OUTPUT.over(Dimension::VALUE))];
+        &[Strength::positive("mu", "friction force per input", Dimension::OUTPUT.over(Dimension::VALUE))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { mu: s[0] })

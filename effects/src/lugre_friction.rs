@@ -1,14 +1,14 @@
-//! Dry friction of bristles that bend and slip.
+//! Dry friction of elastic bristles that slip.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `lugre-friction`.
+/// Effect `lugre-friction`.
 pub struct LugreFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     rise: S,
@@ -19,8 +19,7 @@ struct AtStrengths<S> {
 
 impl Definition for LugreFriction {
     const NAME: &'static str = "lugre-friction";
-    const ABOUT: &'static str =
-        "Dry friction as the bending of bristles, with a force that falls as the joint moves faster.";
+    const ABOUT: &'static str = "Dry friction modelled by elastic bristles, with a force that decreases with speed.";
     const FORMULA: &'static str = "-c (z + tau z'), z' = (v - |v| z/(1 + rise exp(-(v/vs)^2)))/y";
     const SOURCE: &'static str = "C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control \
                                   of systems with friction, IEEE Transactions on Automatic Control 40 (1995)";
@@ -30,14 +29,14 @@ impl Definition for LugreFriction {
         Strength::positive("c", "friction force at high speed", Dimension::OUTPUT),
         Strength::shape(
             "rise",
-            "friction force at break-away over that at high speed, less 1",
+            "break-away force divided by the friction force at high speed, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
             Trials::Plain(&[0.5]),
         ),
         Strength::shape(
             "vs",
-            "speed at which the rise has fallen to 1/e",
+            "speed at which the rise has decreased to 1/e",
             Dimension::SPEED,
             NOT_NEGATIVE,
             Trials::Scaled(&[0.05, 0.2]),
@@ -51,7 +50,7 @@ impl Definition for LugreFriction {
         ),
         Strength::shape(
             "tau",
-            "damping of the bristles over their stiffness",
+            "damping of the bristles divided by their stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
             Trials::Scaled(&[0.01]),
@@ -76,7 +75,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
 }
 
 impl<S: Scalar> AtStrengths<S> {
-    /// Rate of the deflection.
+    /// Returns the rate of the deflection.
     fn slip(&self, at: &At<'_, S>, z: S) -> S {
         let mut steady = S::from(1.0);
         if self.vs.value() > 0.0 {

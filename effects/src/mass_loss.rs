@@ -1,13 +1,13 @@
-//! Mass that becomes less.
+//! Mass that decreases with time.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `mass-loss`.
+/// Effect `mass-loss`.
 pub struct MassLoss;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     r: S,
 }
@@ -15,8 +15,8 @@ struct AtStrengths<S> {
 impl Definition for MassLoss {
     const NAME: &'static str = "mass-loss";
     const ABOUT: &'static str =
-        "Mass or inertia that falls with time, such as fuel or water that runs out without a thrust of its own.";
-    const FORMULA: &'static str = "r t q''; at most 95 % of what moves";
+        "Mass or inertia that decreases linearly with time, such as fuel or water flowing out without thrust.";
+    const FORMULA: &'static str = "r t q''; the loss is limited to 95 % of the moving mass";
     const SOURCE: &'static str = "F. O. Eke, Dynamics of variable mass systems, NASA/CR-1998-208246 (1998)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
@@ -31,7 +31,7 @@ impl Definition for MassLoss {
 
 impl<S: Scalar> Acting<S> for AtStrengths<S> {
     fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
-        // The share of what moves that is gone, not more than leaves something to move.
+        // The lost mass as a fraction of the moving mass, limited so that some mass remains.
         let gone = self.r * at.t;
         let left = -gone * at.mobility + 1.0;
         if left.value() > 0.05 { gone * at.a / left } else { at.a / at.mobility * 19.0 }

@@ -1,14 +1,14 @@
-//! An outflow with another power.
+//! Outflow with a general exponent.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::power;
 
-/// `orifice-exponent`.
+/// Effect `orifice-exponent`.
 pub struct OrificeExponent;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     n: S,
@@ -16,14 +16,14 @@ struct AtStrengths<S> {
 
 impl Definition for OrificeExponent {
     const NAME: &'static str = "orifice-exponent";
-    const ABOUT: &'static str = "An outflow with a power of the level other than the square root.";
+    const ABOUT: &'static str = "An outflow proportional to a power of the level other than the square root.";
     const FORMULA: &'static str = "-k max(x, 0)^n";
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6 (orifices)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("k", "outflow at a level of 1", Dimension::OUTPUT),
-        Strength::shape("n", "power", Dimension::ONE, [0.2, 3.0], Trials::Plain(&[0.3, 0.75, 1.5])),
+        Strength::shape("n", "exponent", Dimension::ONE, [0.2, 3.0], Trials::Plain(&[0.3, 0.75, 1.5])),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

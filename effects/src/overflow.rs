@@ -1,14 +1,14 @@
-//! Spilling above a level.
+//! Overflow above a level.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, power};
 
-/// `overflow`.
+/// Effect `overflow`.
 pub struct Overflow;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     level: S,
@@ -17,7 +17,7 @@ struct AtStrengths<S> {
 
 impl Definition for Overflow {
     const NAME: &'static str = "overflow";
-    const ABOUT: &'static str = "Outflow over an edge above a level.";
+    const ABOUT: &'static str = "Outflow over an edge, above its level.";
     const FORMULA: &'static str = "-k max(x - level, 0)^n";
     const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
     const CLASS: EffectClass = EffectClass::Flow;
@@ -33,7 +33,7 @@ impl Definition for Overflow {
         ),
         Strength::shape(
             "n",
-            "power: 1 a plain edge, 3/2 a rectangular weir",
+            "exponent: 1 for a plain edge, 3/2 for a rectangular weir",
             Dimension::ONE,
             [1.0, 2.5],
             Trials::Plain(&[1.0, 1.5]),

@@ -1,14 +1,14 @@
-//! A vibration.
+//! Sinusoidal disturbance.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, phase};
 
-/// `periodic-disturbance`.
+/// Effect `periodic-disturbance`.
 pub struct PeriodicDisturbance;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     w: S,
@@ -17,7 +17,7 @@ struct AtStrengths<S> {
 
 impl Definition for PeriodicDisturbance {
     const NAME: &'static str = "periodic-disturbance";
-    const ABOUT: &'static str = "A force, torque or flow that changes like a sine over time.";
+    const ABOUT: &'static str = "A force, torque or flow that is sinusoidal in time.";
     const FORMULA: &'static str = "a sin(w t + phase)";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 7";
     const CLASS: EffectClass = EffectClass::Periodic;

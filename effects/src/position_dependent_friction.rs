@@ -1,14 +1,14 @@
-//! Dry friction that changes with the position.
+//! Dry friction that depends on the position.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{phase, waves};
 
-/// `position-dependent-friction`.
+/// Effect `position-dependent-friction`.
 pub struct PositionDependentFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     a: S,
@@ -19,8 +19,9 @@ struct AtStrengths<S> {
 impl Definition for PositionDependentFriction {
     const NAME: &'static str = "position-dependent-friction";
     const ABOUT: &'static str =
-        "Dry friction that grows and falls along the position, as with a bent shaft or a rail worn in places.";
-    const FORMULA: &'static str = "-c (1 + a cos(n q + phase)) sgn(v); at rest whatever holds it, up to that";
+        "Dry friction that varies with the position, for example of a bent shaft or a rail with local wear.";
+    const FORMULA: &'static str =
+        "-c (1 + a cos(n q + phase)) sgn(v); at rest any balancing force up to this magnitude";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
@@ -28,7 +29,7 @@ impl Definition for PositionDependentFriction {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("c", "mean friction force", Dimension::OUTPUT),
-        Strength::shape("a", "share that changes", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
+        Strength::shape("a", "relative amplitude of the variation", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
         waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
         phase(),
     ];

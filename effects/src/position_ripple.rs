@@ -1,14 +1,14 @@
-//! A force that repeats along the way.
+//! Force that is periodic along a position.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{phase, waves};
 
-/// `position-ripple`.
+/// Effect `position-ripple`.
 pub struct PositionRipple;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     n: S,
@@ -17,7 +17,7 @@ struct AtStrengths<S> {
 
 impl Definition for PositionRipple {
     const NAME: &'static str = "position-ripple";
-    const ABOUT: &'static str = "A force that repeats along the position with a period of its own: the magnets of a \
+    const ABOUT: &'static str = "A force that is periodic in the position with an arbitrary period: the magnets of a \
                                  linear motor, the pitch of a screw.";
     const FORMULA: &'static str = "a sin(n q + phase)";
     const SOURCE: &'static str =

@@ -1,14 +1,14 @@
-//! Friction with a power of the speed.
+//! Friction proportional to a power of the speed.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{power, sign};
 
-/// `power-friction`.
+/// Effect `power-friction`.
 pub struct PowerFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     p: S,
@@ -17,14 +17,14 @@ struct AtStrengths<S> {
 impl Definition for PowerFriction {
     const NAME: &'static str = "power-friction";
     const ABOUT: &'static str =
-        "A force against the motion with any power of the speed, between dry friction and steep drag.";
+        "A force against the motion, proportional to a power of the speed, between dry friction and steep drag.";
     const FORMULA: &'static str = "-c |v|^p sgn(v)";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::positive("c", "force at a speed of 1", Dimension::OUTPUT),
-        Strength::shape("p", "power", Dimension::ONE, [0.5, 4.0], Trials::Plain(&[0.5, 1.5, 2.5])),
+        Strength::shape("p", "exponent", Dimension::ONE, [0.5, 4.0], Trials::Plain(&[0.5, 1.5, 2.5])),
     ];
     const RARITY: u8 = 2;
 

@@ -1,20 +1,20 @@
-//! Drag of a fluid.
+//! Quadratic drag of a fluid.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `quadratic-drag`.
+/// Effect `quadratic-drag`.
 pub struct QuadraticDrag;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
 }
 
 impl Definition for QuadraticDrag {
     const NAME: &'static str = "quadratic-drag";
-    const ABOUT: &'static str = "A force against the motion in proportion to the square of the speed.";
+    const ABOUT: &'static str = "A force against the motion, proportional to the square of the speed.";
     const FORMULA: &'static str = "-k v |v|";
     const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965)";
     const CLASS: EffectClass = EffectClass::Dissipative;

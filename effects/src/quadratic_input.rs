@@ -1,27 +1,29 @@
-//! A thrust with the square of the command.
+//! Thrust with a quadratic part in the command.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `quadratic-input`.
+/// Effect `quadratic-input`.
 pub struct QuadraticInput;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
 }
 
 impl Definition for QuadraticInput {
     const NAME: &'static str = "quadratic-input";
-    const ABOUT: &'static str =
-        "The command acts with a share that grows with its square, as the thrust of a fan does.";
+    const ABOUT: &'static str = "The command has a quadratic part, like the thrust of a fan.";
     const FORMULA: &'static str = "u + a u |u|";
     const SOURCE: &'static str = "T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (Wiley 2011)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("a", "share per command", Dimension::OUTPUT.over(Dimension::VALUE.power(2)))];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+        "a",
+        "relative change of the gain per command",
+        Dimension::OUTPUT.over(Dimension::VALUE.power(2)),
+    )];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
         Box::new(AtStrengths { a: s[0] })

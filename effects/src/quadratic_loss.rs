@@ -1,20 +1,20 @@
-//! A loss with the square.
+//! Quadratic loss.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `quadratic-loss`.
+/// Effect `quadratic-loss`.
 pub struct QuadraticLoss;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
 }
 
 impl Definition for QuadraticLoss {
     const NAME: &'static str = "quadratic-loss";
-    const ABOUT: &'static str = "A loss in proportion to the square of the state.";
+    const ABOUT: &'static str = "A loss proportional to the square of the state.";
     const FORMULA: &'static str = "-k x |x|";
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6";
     const CLASS: EffectClass = EffectClass::Dissipative;

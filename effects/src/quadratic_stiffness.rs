@@ -1,4 +1,4 @@
-//! A spring that is stiffer to one side.
+//! Spring that is stiffer on one side.
 
 use std::f64::consts::PI;
 
@@ -7,10 +7,10 @@ use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, 
 use super::Definition;
 use super::terms::ANY;
 
-/// `quadratic-stiffness`.
+/// Effect `quadratic-stiffness`.
 pub struct QuadraticStiffness;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     rest: S,
@@ -19,14 +19,14 @@ struct AtStrengths<S> {
 impl Definition for QuadraticStiffness {
     const NAME: &'static str = "quadratic-stiffness";
     const ABOUT: &'static str =
-        "A spring whose force has a share with the square of the displacement, so that it is stiffer to one side.";
+        "A spring force with a part proportional to the squared displacement, so that one side is stiffer.";
     const FORMULA: &'static str = "-k (q - rest)^2";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
         Strength::signed("k", "force per squared displacement", Dimension::OUTPUT.over(Dimension::POSITION.power(2))),
-        // Fitted, it would be at odds with the stiffness: the force is far from linear in both.
+        // Not fitted, as its estimate would conflict with the stiffness: the force is strongly nonlinear in both.
         Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Plain(&[0.0, PI])).kept(),
     ];
 

@@ -1,14 +1,14 @@
-//! Heat that is radiated to surroundings whose temperature is an input.
+//! Radiation to surroundings whose temperature is an input.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, RADIATION, emission, radiated};
 
-/// `radiation-exchange`.
+/// Effect `radiation-exchange`.
 pub struct RadiationExchange;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     zero: S,
@@ -27,7 +27,7 @@ impl Definition for RadiationExchange {
         emission(),
         Strength::shape(
             "zero",
-            "what makes state and input absolute temperatures: 0, 273.15 for degC",
+            "offset to the absolute temperature of state and input: 0, or 273.15 for degC",
             Dimension::POSITION,
             NOT_NEGATIVE,
             Trials::Plain(&[0.0, 273.15]),

@@ -1,14 +1,14 @@
-//! Heat that is radiated.
+//! Radiation to the surroundings.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, RADIATION, emission, radiated};
 
-/// `radiation-loss`.
+/// Effect `radiation-loss`.
 pub struct RadiationLoss;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     around: S,
@@ -26,14 +26,14 @@ impl Definition for RadiationLoss {
         emission(),
         Strength::shape(
             "around",
-            "temperature of the surroundings, as the state counts",
+            "temperature of the surroundings, on the scale of the state",
             Dimension::POSITION,
             ANY,
             Trials::Within(&[-0.3, 0.0, 0.3]),
         ),
         Strength::shape(
             "zero",
-            "what makes the state an absolute temperature: 0, 273.15 for degC, 293.15 above a room",
+            "offset to the absolute temperature of the state: 0, 273.15 for degC, 293.15 relative to a room",
             Dimension::POSITION,
             NOT_NEGATIVE,
             Trials::Plain(&[0.0, 273.15, 293.15]),

@@ -1,14 +1,14 @@
-//! An actuator or sensor of second order.
+//! Second-order actuator or sensor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::damped;
 
-/// `second-order-lag`.
+/// Effect `second-order-lag`.
 pub struct SecondOrderLag;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     tau: S,
     d: S,
@@ -16,13 +16,13 @@ struct AtStrengths<S> {
 
 impl Definition for SecondOrderLag {
     const NAME: &'static str = "second-order-lag";
-    const ABOUT: &'static str = "The actuator or sensor follows with a lag of second order.";
+    const ABOUT: &'static str = "The actuator or sensor follows with a second-order lag.";
     const FORMULA: &'static str = "z, tau^2 z'' + 2 d tau z' + z = u";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-3";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("tau", "1 over the natural frequency", Dimension::TIME)
+        Strength::positive("tau", "inverse of the natural frequency", Dimension::TIME)
             .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3])),
         Strength::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], Trials::Plain(&[0.3, 0.8, 1.5])),
     ];

@@ -1,25 +1,25 @@
-//! A constant on a measurement.
+//! Constant offset of a measurement.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `sensor-bias`.
+/// Effect `sensor-bias`.
 pub struct SensorBias;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     b: S,
 }
 
 impl Definition for SensorBias {
     const NAME: &'static str = "sensor-bias";
-    const ABOUT: &'static str = "A constant is added to what is measured.";
+    const ABOUT: &'static str = "A constant offset is added to the measurement.";
     const FORMULA: &'static str = "y + b";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed("b", "what is added", Dimension::OUTPUT)];
+    const STRENGTHS: &'static [Strength] = &[Strength::signed("b", "added offset", Dimension::OUTPUT)];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

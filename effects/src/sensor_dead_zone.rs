@@ -1,14 +1,14 @@
-//! A measurement that is blind to small changes.
+//! Dead zone of a sensor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, clamp};
 
-/// `sensor-dead-zone`.
+/// Effect `sensor-dead-zone`.
 pub struct SensorDeadZone;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     width: S,
     centre: S,
@@ -16,14 +16,15 @@ struct AtStrengths<S> {
 
 impl Definition for SensorDeadZone {
     const NAME: &'static str = "sensor-dead-zone";
-    const ABOUT: &'static str = "Changes about a value are not seen, and larger ones less by as much.";
+    const ABOUT: &'static str =
+        "Small changes about a value are not measured, and larger ones are reduced by the width of the dead zone.";
     const FORMULA: &'static str = "y - clamp(y - centre, -width, width)";
     const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
                                   Nonlinearities (Wiley 1996), chapter 2";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("width", "largest change that is not seen", Dimension::VALUE)
+        Strength::positive("width", "largest change that is not measured", Dimension::VALUE)
             .tried(Trials::Scaled(&[0.05, 0.2, 0.5])),
         Strength::shape(
             "centre",

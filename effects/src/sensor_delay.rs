@@ -1,21 +1,22 @@
-//! A measurement that comes late.
+//! Delay of a measurement.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 
-/// `sensor-delay`.
+/// Effect `sensor-delay`.
 pub struct SensorDelay;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     delay: S,
 }
 
 impl Definition for SensorDelay {
     const NAME: &'static str = "sensor-delay";
-    const ABOUT: &'static str = "What is measured comes late by a constant time.";
-    const FORMULA: &'static str = "y(t - delay); before the start, y goes on with its first slope and curvature";
+    const ABOUT: &'static str = "The measurement is delayed by a constant time.";
+    const FORMULA: &'static str =
+        "y(t - delay); before the start, y is extrapolated with its initial slope and curvature";
     const SOURCE: &'static str =
         "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
     const CLASS: EffectClass = EffectClass::DelayLike;

@@ -1,20 +1,20 @@
-//! A measurement that drifts.
+//! Drift of a measurement.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `sensor-drift`.
+/// Effect `sensor-drift`.
 pub struct SensorDrift;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     r: S,
 }
 
 impl Definition for SensorDrift {
     const NAME: &'static str = "sensor-drift";
-    const ABOUT: &'static str = "What is measured drifts with time.";
+    const ABOUT: &'static str = "The measurement drifts linearly with time.";
     const FORMULA: &'static str = "y + r t";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::TimeVarying;

@@ -1,14 +1,14 @@
-//! A potentiometer with a gap.
+//! Potentiometer with a gap.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::ANY;
 
-/// `sensor-gap`.
+/// Effect `sensor-gap`.
 pub struct SensorGap;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     width: S,
     centre: S,
@@ -16,8 +16,8 @@ struct AtStrengths<S> {
 
 impl Definition for SensorGap {
     const NAME: &'static str = "sensor-gap";
-    const ABOUT: &'static str = "Within a gap the sensor shows one value, and the right one outside of it.";
-    const FORMULA: &'static str = "centre where |y - centre| < width, else y";
+    const ABOUT: &'static str = "Within a gap the sensor shows a constant value, outside it the correct value.";
+    const FORMULA: &'static str = "centre if |y - centre| < width, else y";
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const FORM_OF: Option<&'static str> = Some("sensor-dead-zone");
@@ -27,7 +27,7 @@ impl Definition for SensorGap {
             .tried(Trials::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
         Strength::shape(
             "centre",
-            "middle of the gap, and what is shown there",
+            "middle of the gap, and the value shown there",
             Dimension::VALUE,
             ANY,
             Trials::WithinAndGap(&[0.2, 0.35, 0.5, 0.65, 0.8]),

@@ -1,14 +1,14 @@
-//! A sensor of first order.
+//! First-order sensor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::damped;
 
-/// `sensor-lag`.
+/// Effect `sensor-lag`.
 pub struct SensorLag;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     tau: S,
 }

@@ -1,26 +1,27 @@
-//! A measurement in steps.
+//! Quantised measurement.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::quantised;
 
-/// `sensor-quantisation`.
+/// Effect `sensor-quantisation`.
 pub struct SensorQuantisation;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     step: S,
 }
 
 impl Definition for SensorQuantisation {
     const NAME: &'static str = "sensor-quantisation";
-    const ABOUT: &'static str = "What is measured comes in steps.";
+    const ABOUT: &'static str = "The measurement is quantised.";
     const FORMULA: &'static str = "step round(y/step)";
     const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("step", "step", Dimension::VALUE).tried(Trials::Steps)];
+    const STRENGTHS: &'static [Strength] =
+        &[Strength::positive("step", "quantisation step", Dimension::VALUE).tried(Trials::Steps)];
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

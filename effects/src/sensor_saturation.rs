@@ -1,14 +1,14 @@
-//! A sensor with a limited range.
+//! Sensor with a limited range.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, clamp};
 
-/// `sensor-saturation`.
+/// Effect `sensor-saturation`.
 pub struct SensorSaturation;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     limit: S,
     side: f64,
@@ -16,7 +16,7 @@ struct AtStrengths<S> {
 
 impl Definition for SensorSaturation {
     const NAME: &'static str = "sensor-saturation";
-    const ABOUT: &'static str = "The sensor shows nothing beyond a limit: above, below, or either way.";
+    const ABOUT: &'static str = "The sensor saturates at a limit: above, below, or on both sides.";
     const FORMULA: &'static str =
         "side 1: min(y, limit); side -1: max(y, limit); side 0: clamp(y, -limit, limit); limit infinite: y";
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
@@ -27,8 +27,14 @@ impl Definition for SensorSaturation {
             .within(ANY[0], ANY[1])
             .neutral_at(f64::INFINITY)
             .tried(Trials::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
-        Strength::shape("side", "the side that is cut", Dimension::ONE, [-1.0, 1.0], Trials::Plain(&[1.0, 0.0, -1.0]))
-            .kept(),
+        Strength::shape(
+            "side",
+            "side that saturates: 1 above, -1 below, 0 both",
+            Dimension::ONE,
+            [-1.0, 1.0],
+            Trials::Plain(&[1.0, 0.0, -1.0]),
+        )
+        .kept(),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {

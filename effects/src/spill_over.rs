@@ -1,14 +1,14 @@
-//! Spilling above a level, into another store.
+//! Overflow above a level into another store.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, power};
 
-/// `spill-over`.
+/// Effect `spill-over`.
 pub struct SpillOver;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     level: S,
@@ -18,7 +18,7 @@ struct AtStrengths<S> {
 
 impl Definition for SpillOver {
     const NAME: &'static str = "spill-over";
-    const ABOUT: &'static str = "Outflow over an edge above a level, of which a share runs into another store.";
+    const ABOUT: &'static str = "Outflow over an edge, above its level, of which a fraction flows into another store.";
     const FORMULA: &'static str = "-k max(x - level, 0)^n, and share times as much into the companion process";
     const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
     const CLASS: EffectClass = EffectClass::Flow;
@@ -36,7 +36,7 @@ impl Definition for SpillOver {
         ),
         Strength::shape(
             "n",
-            "power: 1 a plain edge, 3/2 a rectangular weir",
+            "exponent: 1 for a plain edge, 3/2 for a rectangular weir",
             Dimension::ONE,
             [1.0, 2.5],
             Trials::Plain(&[1.0, 1.5]),
@@ -44,7 +44,7 @@ impl Definition for SpillOver {
         .kept(),
         Strength::shape(
             "share",
-            "share that runs into the companion, times the ratio of the areas where the equations are of levels",
+            "fraction that flows into the companion, times the ratio of the areas if the states are levels",
             Dimension::ONE,
             NOT_NEGATIVE,
             Trials::Plain(&[0.3, 1.0]),

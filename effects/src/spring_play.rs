@@ -1,14 +1,14 @@
-//! A spring with play.
+//! Spring with backlash.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, clamp};
 
-/// `spring-play`.
+/// Effect `spring-play`.
 pub struct SpringPlay;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     gap: S,
@@ -16,15 +16,17 @@ struct AtStrengths<S> {
 
 impl Definition for SpringPlay {
     const NAME: &'static str = "spring-play";
-    const ABOUT: &'static str = "Play in a declared spring at a joint: within the gap the spring does not pull.";
-    const FORMULA: &'static str = "k clamp(q, -gap/2, gap/2), which a spring -k q with play lacks";
+    const ABOUT: &'static str =
+        "Backlash in a spring at a joint that the model declares: within the gap the spring has no force.";
+    const FORMULA: &'static str =
+        "k clamp(q, -gap/2, gap/2): the difference between a spring with backlash and the spring -k q";
     const SOURCE: &'static str =
         "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the spring that has play", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::positive("k", "stiffness of the spring with backlash", Dimension::OUTPUT.over(Dimension::POSITION)),
         Strength::shape("gap", "width of the gap", Dimension::POSITION, NOT_NEGATIVE, Trials::Scaled(&[0.1, 0.4, 1.0])),
     ];
 

@@ -1,14 +1,14 @@
-//! Break-away force above the force of sliding.
+//! Break-away force above the sliding force.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `stiction`.
+/// Effect `stiction`.
 pub struct Stiction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     rise: S,
@@ -16,8 +16,8 @@ struct AtStrengths<S> {
 
 impl Definition for Stiction {
     const NAME: &'static str = "stiction";
-    const ABOUT: &'static str = "Dry friction with a larger force at rest than in motion.";
-    const FORMULA: &'static str = "-c sgn(v); at rest whatever holds it, up to c (1 + rise)";
+    const ABOUT: &'static str = "Dry friction that is larger at rest than in motion.";
+    const FORMULA: &'static str = "-c sgn(v); at rest any balancing force up to c (1 + rise)";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
@@ -27,7 +27,7 @@ impl Definition for Stiction {
         Strength::positive("c", "friction force in motion", Dimension::OUTPUT),
         Strength::shape(
             "rise",
-            "friction force at rest over that in motion, less 1",
+            "friction force at rest divided by that in motion, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
             Trials::Jumps(&[0.0, 0.5]),

@@ -1,14 +1,14 @@
-//! Dry friction that falls with the speed.
+//! Dry friction that decreases with speed.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `stribeck-friction`.
+/// Effect `stribeck-friction`.
 pub struct StribeckFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     rise: S,
@@ -17,9 +17,8 @@ struct AtStrengths<S> {
 
 impl Definition for StribeckFriction {
     const NAME: &'static str = "stribeck-friction";
-    const ABOUT: &'static str =
-        "Dry friction that is larger at rest and falls to a constant as the joint moves faster.";
-    const FORMULA: &'static str = "-c (1 + rise exp(-(v/vs)^2)) sgn(v); at rest whatever holds it, up to c (1 + rise)";
+    const ABOUT: &'static str = "Dry friction that decreases from a larger value at rest to a constant at high speed.";
+    const FORMULA: &'static str = "-c (1 + rise exp(-(v/vs)^2)) sgn(v); at rest any balancing force up to c (1 + rise)";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
@@ -29,14 +28,14 @@ impl Definition for StribeckFriction {
         Strength::positive("c", "friction force at high speed", Dimension::OUTPUT),
         Strength::shape(
             "rise",
-            "friction force at rest over that at high speed, less 1",
+            "friction force at rest divided by that at high speed, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
             Trials::Plain(&[0.4, 1.5]),
         ),
         Strength::shape(
             "vs",
-            "speed at which the rise has fallen to 1/e",
+            "speed at which the rise has decreased to 1/e",
             Dimension::SPEED,
             NOT_NEGATIVE,
             Trials::Scaled(&[0.03, 0.1, 0.3, 0.8]),

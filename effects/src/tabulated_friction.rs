@@ -1,14 +1,14 @@
-//! Dry friction over the speed, without a formula.
+//! Dry friction as a table over the speed.
 
 use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `tabulated-friction`.
+/// Effect `tabulated-friction`.
 pub struct TabulatedFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     c: S,
     r1: S,
@@ -19,7 +19,8 @@ struct AtStrengths<S> {
 
 impl Definition for TabulatedFriction {
     const NAME: &'static str = "tabulated-friction";
-    const ABOUT: &'static str = "Dry friction with any curve over the speed, as a table between rest and a top speed.";
+    const ABOUT: &'static str =
+        "Dry friction as an arbitrary function of speed, given by a table from rest to a top speed.";
     const FORMULA: &'static str =
         "-c r(|v|) sgn(v), r linear between 1, r1, r2, r3 at 0, top/4, top/2, top, constant above";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis \
@@ -31,21 +32,21 @@ impl Definition for TabulatedFriction {
         Strength::positive("c", "friction force at rest", Dimension::OUTPUT),
         Strength::shape(
             "r1",
-            "force at a quarter of the top speed over that at rest",
+            "force at a quarter of the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
             Trials::Plain(&[0.7, 1.5]),
         ),
         Strength::shape(
             "r2",
-            "force at half the top speed over that at rest",
+            "force at half the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
             Trials::Plain(&[0.7, 2.5]),
         ),
         Strength::shape(
             "r3",
-            "force at the top speed over that at rest",
+            "force at the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
             Trials::Plain(&[1.0, 4.0]),

@@ -1,4 +1,4 @@
-//! What holds for every effect of the catalogue.
+//! Properties of all effects of the catalogue.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use mops_core::{Acting, Along, At, Effect, EffectClass, PortKind, Scalar, Streng
 
 use super::effects;
 
-/// Numbers between 0 and 1 that fill it evenly: the fractional parts of multiples of the golden section.
+/// Numbers that fill the range from 0 to 1 evenly: the fractional parts of multiples of the golden ratio.
 struct Even(f64);
 
 impl Even {
@@ -17,16 +17,16 @@ impl Even {
     }
 }
 
-/// Everything that an effect can see, and its states: one number each.
+/// Names of all quantities that an effect may use, including its states: one number each.
 const SEEN: [&str; 11] =
     ["value", "q", "v", "a", "mobility", "other", "other speed", "z1", "z2", "memory 1", "memory 2"];
 
-/// A place at which every quantity has some value.
+/// Returns a value for every quantity.
 fn place(even: &mut Even) -> [f64; 11] {
     SEEN.map(|name| match name {
         "mobility" => even.between(0.5, 2.0),
         "z1" | "z2" => even.between(-0.9, 0.9),
-        // The second is a time that has passed.
+        // The second is a time in the past.
         "memory 2" => even.between(-2.0, 0.2),
         _ => even.between(-2.0, 2.0),
     })
@@ -37,7 +37,7 @@ fn at<S: Scalar>(seen: &[S; 11]) -> At<'static, S> {
     At { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
 }
 
-/// What the effect gives at a place: its value, its delay, the four numbers of dry friction, the rates of its states.
+/// Returns the output of an effect: value, delay, the four numbers of dry friction, and the rates of its states.
 fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn Acting<S>, seen: &[S; 11]) -> Vec<S> {
     let at = at(seen);
     let z = &seen[7..7 + effect.states()];
@@ -57,7 +57,7 @@ fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn Acting<S>, seen: &[S; 11]
     all
 }
 
-/// Some value within the bounds.
+/// Returns a value within the bounds.
 fn strength(of: &Strength, even: &mut Even) -> f64 {
     match of.bounds {
         [low, high] if high.is_finite() => low + (high.min(low + 3.0) - low) * even.between(0.2, 0.8),
@@ -83,7 +83,7 @@ fn names_are_unique_and_in_kebab_case() {
 }
 
 #[test]
-fn every_effect_says_what_it_is_and_where_it_comes_from() {
+fn every_effect_has_a_description_a_formula_and_a_source() {
     for effect in effects() {
         for text in [effect.about(), effect.formula(), effect.source()] {
             assert!(!text.is_empty() && !text.contains("  "), "{}: {text}", effect.name());
@@ -95,7 +95,7 @@ fn every_effect_says_what_it_is_and_where_it_comes_from() {
 }
 
 #[test]
-fn the_first_strength_alone_is_neutral_somewhere_and_within_its_bounds() {
+fn only_the_first_strength_has_a_null_value_and_it_is_within_the_bounds() {
     for effect in effects() {
         let [first, shapes @ ..] = effect.strengths() else { panic!("{} has no strength", effect.name()) };
         let neutral = first.neutral.expect("the first strength makes it vanish");
@@ -155,7 +155,7 @@ fn a_neutral_effect_changes_no_bit() {
 }
 
 #[test]
-fn what_takes_energy_gives_none() {
+fn dissipative_effects_add_no_energy() {
     let mut even = Even(0.2);
     let dissipative = |e: &&_| -> bool {
         let e: &std::sync::Arc<dyn Effect> = e;
@@ -176,12 +176,12 @@ fn what_takes_energy_gives_none() {
 }
 
 #[test]
-fn friction_with_states_takes_energy_over_a_cycle() {
+fn friction_with_states_dissipates_energy_over_a_cycle() {
     for effect in effects().iter().filter(|e| e.class() == EffectClass::Dissipative && e.states() > 0) {
         let acting = effect.act(&strengths(effect.as_ref(), &mut Even(0.3)));
         let (mut z, mut dz) = ([0.0], [0.0]);
         let (mut work, h) = (0.0, 1e-4);
-        // q = sin t over three turns, of which the last counts.
+        // q = sin t over three periods, of which the last counts.
         for step in 0..(6.0 * std::f64::consts::PI / h) as usize {
             let t = step as f64 * h;
             let mut seen = [0.0; 11];
@@ -212,7 +212,7 @@ fn odd_effects_are_odd() {
     }
 }
 
-/// Value of what an effect answers, with one of its strengths or of what it sees moved.
+/// Returns the output of an effect after a change of one of its parameters or of one of its input quantities.
 fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 11], index: usize, by: f64) -> Vec<f64> {
     let (mut s, mut seen) = (s.to_vec(), *seen);
     if index < s.len() {
@@ -224,7 +224,7 @@ fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 11], index: usize, by: f64
 }
 
 #[test]
-fn tangents_are_those_of_differences() {
+fn tangents_agree_with_differences() {
     let mut even = Even(0.5);
     for effect in effects() {
         for _ in 0..30 {
@@ -240,7 +240,8 @@ fn tangents_are_those_of_differences() {
                     assert_eq!(exact.value, plain[k], "{}: tangents change no value", effect.name());
                     let difference = (up[k] - down[k]) / 2e-6;
                     let agree = (exact.tangent[0] - difference).abs() < 1e-5 * (1.0 + difference.abs());
-                    // A quantisation has steps; what rounds the value has no slope but that of the step.
+                    // The tangent of a quantised value with respect to the value is set to 1, which differences cannot
+                    // confirm.
                     let stairs = effect.name().ends_with("quantisation") && index == s.len();
                     assert!(agree || stairs, "{} {index} {} {difference} {s:?}", effect.name(), exact.tangent[0]);
                 }
@@ -285,7 +286,7 @@ fn play_keeps_its_output_until_the_gap_is_crossed() {
 }
 
 #[test]
-fn a_gust_pushes_as_long_and_as_hard_as_its_integral_says() {
+fn a_gust_has_the_impulse_of_its_integral() {
     let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").act(&[3.0, 0.7, 0.45]);
     let h = 1e-4;
     let push: f64 = (0..20_000).map(|k| gust.value(&At { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();

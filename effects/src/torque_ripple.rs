@@ -1,14 +1,14 @@
-//! A torque that depends on the position of the rotor.
+//! Torque ripple over the position of a rotor.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::{phase, waves};
 
-/// `torque-ripple`.
+/// Effect `torque-ripple`.
 pub struct TorqueRipple;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     n: S,
@@ -18,7 +18,7 @@ struct AtStrengths<S> {
 impl Definition for TorqueRipple {
     const NAME: &'static str = "torque-ripple";
     const ABOUT: &'static str =
-        "The command acts stronger and weaker along the position of a joint, as over a turn of a motor.";
+        "The gain of the command varies periodically with the position of a joint, for example over a motor turn.";
     const FORMULA: &'static str = "u (1 + a sin(n q + phase)), q the position of the companion joint";
     const SOURCE: &'static str =
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
@@ -26,7 +26,7 @@ impl Definition for TorqueRipple {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const COMPANION: Option<PortKind> = Some(PortKind::Joint);
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("a", "amplitude, as a share", Dimension::ONE).within(0.0, 1.0),
+        Strength::positive("a", "relative amplitude", Dimension::ONE).within(0.0, 1.0),
         waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 13.0])),
         phase(),
     ];

@@ -1,14 +1,14 @@
-//! A spring with a loop.
+//! Spring with hysteresis.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
 
-/// `torsional-hysteresis`.
+/// Effect `torsional-hysteresis`.
 pub struct TorsionalHysteresis;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     k: S,
     h: S,
@@ -18,23 +18,23 @@ struct AtStrengths<S> {
 impl Definition for TorsionalHysteresis {
     const NAME: &'static str = "torsional-hysteresis";
     const ABOUT: &'static str =
-        "A spring, such as a flexible gear, whose force depends on where the motion turned around.";
+        "A spring with hysteresis, such as a flexible gear: the force depends on the last points of reversal.";
     const FORMULA: &'static str = "-k (q + h y z), z' = (v/y) (1 - z sgn(v))";
     const SOURCE: &'static str = "P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14 (1976)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness along the loop", Dimension::OUTPUT.over(Dimension::POSITION)),
+        Strength::positive("k", "stiffness along the hysteresis loop", Dimension::OUTPUT.over(Dimension::POSITION)),
         Strength::shape(
             "h",
-            "stiffness behind a turn over that along the loop, less 1",
+            "stiffness after a reversal divided by that along the loop, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
             Trials::Plain(&[0.3, 2.0]),
         ),
         Strength::shape(
             "y",
-            "displacement over which a turn is forgotten",
+            "displacement over which the effect of a reversal decays",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
             Trials::Scaled(&[0.05, 0.3]),

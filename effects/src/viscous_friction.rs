@@ -1,20 +1,20 @@
-//! Friction in proportion to the speed.
+//! Viscous friction.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 
-/// `viscous-friction`.
+/// Effect `viscous-friction`.
 pub struct ViscousFriction;
 
-/// At given strengths.
+/// Effect at given parameters.
 pub struct Viscous<S> {
     factor: S,
 }
 
 impl Definition for ViscousFriction {
     const NAME: &'static str = "viscous-friction";
-    const ABOUT: &'static str = "A force against the motion in proportion to the speed.";
+    const ABOUT: &'static str = "A force against the motion, proportional to the speed.";
     const FORMULA: &'static str = "-d v";
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";

@@ -1,14 +1,14 @@
-//! A push that comes once.
+//! Single gust.
 
 use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
 
 use super::Definition;
 use super::terms::{Span, from, length};
 
-/// `wind-gust`.
+/// Effect `wind-gust`.
 pub struct WindGust;
 
-/// At given strengths.
+/// Effect at given parameters.
 struct AtStrengths<S> {
     a: S,
     span: Span<S>,
@@ -16,14 +16,14 @@ struct AtStrengths<S> {
 
 impl Definition for WindGust {
     const NAME: &'static str = "wind-gust";
-    const ABOUT: &'static str = "A force, torque or flow that swells and fades once.";
+    const ABOUT: &'static str = "A force, torque or flow that rises and decays once.";
     const FORMULA: &'static str = "a/2 (1 - cos(2 pi (t - from)/length)) for from < t < from + length";
     const SOURCE: &'static str =
         "Certification Specifications for Large Aeroplanes CS-25 (EASA), section 25.341 (discrete gust)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
     const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("a", "largest value", Dimension::OUTPUT),
+        Strength::signed("a", "peak value", Dimension::OUTPUT),
         from(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
         length(&[0.06, 0.15, 0.4]),
     ];

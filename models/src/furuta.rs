@@ -1,4 +1,4 @@
-//! The Furuta pendulum: an arm that turns about the vertical, a pendulum that swings at its end.
+//! Furuta pendulum: an arm that turns about the vertical axis, and a pendulum that swings at its end.
 
 use mops_core::{
     AnalysisKind, EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity,
@@ -10,21 +10,22 @@ use serde::Deserialize;
 use crate::kernel::friction::{Contact, contacts};
 use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, rests};
 
-/// The Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
+/// Furuta pendulum in its four lumped parameters, with viscous and Coulomb friction in both joints:
 ///
 /// ```text
 /// a theta'' + c cos(theta) phi''                    = a phi'^2 sin(theta) cos(theta) + d sin(theta) - bp theta' - tp
 /// c cos(theta) theta'' + (b + a sin(theta)^2) phi'' = c theta'^2 sin(theta) - 2 a theta' phi' sin(theta) cos(theta) + u - ba phi' - ta
 /// ```
 ///
-/// `phi` is the angle of the arm, `theta` that of the pendulum, 0 upright and pi hanging, both in rad; `u` is the torque
-/// on the arm in N m. `ta = ca sign(phi')` while the arm moves; at rest it is whatever holds the arm, up to `ca`. `tp`
-/// likewise with `cp`. A joint at rest is exactly at rest: it breaks away by the balance of torques.
+/// `phi` is the angle of the arm, `theta` that of the pendulum, 0 upright and pi hanging, both in rad. `u` is the
+/// torque on the arm in N m. While the arm moves, `ta = ca sign(phi')`; at rest, `ta` balances any torque up to `ca`.
+/// `tp` is defined likewise with `cp`. A joint at rest is exactly at rest, and breaks away according to the balance of
+/// torques.
 ///
-/// Parameters: `a` pendulum inertia about its joint, `b` inertia of arm and load, `c` coupling (all kg m2), `d` gravity
-/// torque (N m), `ba`, `bp` viscous friction (N m s/rad), `ca`, `cp` Coulomb friction (N m), and the start values `phi0`,
-/// `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`. Linearised, a
-/// joint at rest has no Coulomb friction, and one that moves slides.
+/// Parameters: `a` inertia of the pendulum about its joint, `b` inertia of arm and load, `c` coupling (all kg m2), `d`
+/// gravity torque (N m), `ba`, `bp` viscous friction (N m s/rad), `ca`, `cp` Coulomb friction (N m), and the initial
+/// states `phi0`, `dphi0`, `theta0`, `dtheta0`. The mass matrix must be positive definite: `a b > c^2`. When the model
+/// is linearised, a joint at rest has no Coulomb friction, and a moving joint slides.
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`.
 ///
@@ -32,7 +33,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, rests};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct FurutaOptions {
-    /// End of the simulation where no experiment gives one.
+    /// End of the simulation, unless an experiment gives it.
     horizon: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     tolerance: Tolerance,
@@ -49,14 +50,14 @@ impl ModelOptions for FurutaOptions {
     }
 }
 
-/// The model of the kind `furuta`.
+/// Model of the kind `furuta`.
 pub struct Furuta {
     interface: Interface,
     tolerance: Tolerance,
 }
 
 impl Furuta {
-    /// A Furuta pendulum that is simulated to `horizon` (s) where no experiment says otherwise.
+    /// Creates a Furuta pendulum that is simulated to `horizon` (s), unless an experiment gives the end.
     pub fn model(horizon: Option<f64>, tolerance: Tolerance) -> Simulated<Self> {
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
         let friction =
@@ -85,10 +86,10 @@ impl Furuta {
                 friction("bp", "N m s/rad", "viscous friction of the pendulum"),
                 friction("ca", "N m", "Coulomb friction of the arm"),
                 friction("cp", "N m", "Coulomb friction of the pendulum"),
-                start("phi0", "rad", "angle of the arm at the start"),
-                start("dphi0", "rad/s", "speed of the arm at the start"),
-                start("theta0", "rad", "angle of the pendulum at the start"),
-                start("dtheta0", "rad/s", "speed of the pendulum at the start"),
+                start("phi0", "rad", "initial angle of the arm"),
+                start("dphi0", "rad/s", "initial speed of the arm"),
+                start("theta0", "rad", "initial angle of the pendulum"),
+                start("dtheta0", "rad/s", "initial speed of the pendulum"),
             ],
             states: vec![
                 state("phi", "phi0", "phi", None),
@@ -116,7 +117,7 @@ impl PlantModel for Furuta {
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         let [a, b, c, d, ba, bp, ca, cp, start @ ..] =
-            *parameters.first_chunk::<12>().expect("it has twelve parameters");
+            *parameters.first_chunk::<12>().expect("the model has twelve parameters");
         let [ab, cc] = [(a * b).value(), (c * c).value()];
         if ab <= cc {
             let fact = format!("the mass matrix is not positive definite: a b = {ab} <= c^2 = {cc}");
@@ -127,7 +128,7 @@ impl PlantModel for Furuta {
     }
 }
 
-/// The pendulum with its present contacts; joints in the order pendulum, arm; states `phi, phi', theta, theta'`.
+/// Furuta pendulum with its current contacts; joints in the order pendulum, arm; states `phi, phi', theta, theta'`.
 pub struct FurutaPlant<S> {
     /// Inertia of the pendulum, kg m2.
     pub a: S,
@@ -141,14 +142,15 @@ pub struct FurutaPlant<S> {
     pub viscous: [S; 2],
     /// Coulomb friction of pendulum and arm, N m.
     pub coulomb: [S; 2],
-    /// The states at time 0.
+    /// Initial states.
     pub start: [S; 4],
-    /// How pendulum and arm move.
+    /// Contacts of pendulum and arm.
     pub contact: [Contact; 2],
 }
 
 impl<S: Scalar> FurutaPlant<S> {
-    /// Coupling and arm inertia at this angle (the pendulum's own is `a`), and the forces without Coulomb friction.
+    /// Returns the coupling and the arm inertia at this angle, and the torques without Coulomb friction. The inertia of
+    /// the pendulum is `a`.
     #[inline(always)]
     fn terms(&self, at: &Instant<'_, S>) -> (S, S, [S; 2]) {
         let [_, dphi, theta, dtheta] = *state(at.x);
@@ -177,7 +179,7 @@ impl<S: Scalar> FurutaPlant<S> {
         self.limits()[joint] > 0.0 && self.contact[joint] == Contact::Stuck
     }
 
-    /// The torque that holds a stuck joint: what its equation needs with no acceleration of its own.
+    /// Returns the friction torque of a stuck joint, for which its acceleration is 0.
     fn holding_torque(&self, at: &Instant<'_, S>, joint: usize) -> S {
         let (coupling, _, force) = self.terms(at);
         let mut dx = *state(at.x);
@@ -186,7 +188,7 @@ impl<S: Scalar> FurutaPlant<S> {
     }
 }
 
-/// Index of the speed of pendulum and arm in the state.
+/// Indices of the speeds of pendulum and arm in the state.
 const SPEED: [usize; 2] = [3, 1];
 
 #[inline(always)]
@@ -199,7 +201,7 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
         self.start.to_vec()
     }
 
-    // At each of the six stages of a step: as calls they would cost a fifth of a simulation.
+    // Called at each of the six stages of a step: function calls would cost a fifth of the simulation time.
     #[inline(always)]
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let (coupling, arm, [mut pendulum_force, mut arm_force]) = self.terms(at);
@@ -218,14 +220,14 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
             [true, true] => (S::from(0.0), S::from(0.0)),
         };
         let [_, dphi, _, dtheta] = *state(at.x);
-        *dx.first_chunk_mut().expect("it has as many rates") = [dphi, ddphi, dtheta, ddtheta];
+        *dx.first_chunk_mut().expect("the pendulum has four rates") = [dphi, ddphi, dtheta, ddtheta];
     }
 
     fn guards(&self) -> usize {
         if self.limits().iter().all(|&limit| limit == 0.0) { 0 } else { 2 }
     }
 
-    /// Sliding: the speed in its direction. Stuck: what is left of the limit.
+    /// Returns the speed in the direction of sliding, or the margin to the limit of a stuck joint.
     #[inline]
     fn guard(&self, joint: usize, at: &Instant<'_, S>) -> S {
         let limit = self.coulomb[joint];

@@ -1,4 +1,4 @@
-//! The Furuta pendulum as two rigid bodies and two bearings.
+//! Furuta pendulum as two rigid bodies with two bearings.
 
 use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, Variable};
 use schemars::JsonSchema;
@@ -8,7 +8,7 @@ use crate::kernel::elements::BearingFriction;
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
 use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
-/// The Furuta pendulum as two rigid bodies: an arm that turns by `phi` about the vertical, a pendulum that turns by `theta`
+/// Furuta pendulum as two rigid bodies. The arm turns by `phi` about the vertical axis; the pendulum turns by `theta`
 /// about the arm, 0 upright and pi hanging. With `K = J + m l^2`, `C = m r l`:
 ///
 /// ```text
@@ -16,15 +16,16 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 /// C cos theta phi'' + K theta'' - K sin theta cos theta phi'^2 - m g l sin theta = -t2
 /// ```
 ///
-/// The bearings have dry friction: arm `t1 = sign(phi') (tau11 + (tau12 - tau11) |phi'|)` while it turns, at rest whatever
-/// holds it up to `peak1 tau11`; the pendulum likewise with `tau21`, `tau22` (N m, at 0 and at 1 rad/s) and `peak2`. A
-/// friction that falls with speed is negative beyond some speed and drives the joint: an event says so. Linearised, a joint
-/// at rest has no dry friction, and one that moves slides.
+/// The bearings have dry friction. While the arm turns, `t1 = sign(phi') (tau11 + (tau12 - tau11) |phi'|)`; at rest,
+/// `t1` balances any torque up to `peak1 tau11`. The friction of the pendulum is defined likewise by `tau21`, `tau22`
+/// (N m, at 0 and at 1 rad/s) and `peak2`. Friction that decreases with speed becomes negative at some speed and drives
+/// the joint, which is reported as an event. When the model is linearised, a joint at rest has no dry friction, and a
+/// moving joint slides.
 ///
-/// Parameters: `J` inertia of the pendulum about its centre of mass, `Ja` of the arm about its axis (kg m2), `m` mass of
-/// pendulum and weight (kg), `l` its centre of mass from the arm (m), `r` length of the arm (m, default 0.245), `g`
-/// gravity (m/s2, default 9.81), the friction (default none, peaks 1), and the start values `phi0`, `dphi0`, `theta0`
-/// (default pi), `dtheta0`.
+/// Parameters: `J` inertia of the pendulum about its centre of mass, `Ja` of the arm about its axis (kg m2), `m` mass
+/// of pendulum and weight (kg), `l` distance of its centre of mass from the arm (m), `r` length of the arm (m, default
+/// 0.245), `g` gravity (m/s2, default 9.81), the friction (default none, peaks 1), and the initial states `phi0`,
+/// `dphi0`, `theta0` (default pi), `dtheta0`.
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`, the torque on the arm, N m.
 ///
@@ -33,7 +34,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Furuta2JointOptions {
-    /// End of the simulation where no experiment gives one.
+    /// End of the simulation, unless an experiment gives it.
     horizon: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     tolerance: Tolerance,
@@ -63,7 +64,7 @@ impl ModelOptions for Furuta2JointOptions {
     }
 }
 
-/// The model of the kind `furuta-2-joint`.
+/// Model of the kind `furuta-2-joint`.
 struct Furuta2Joint {
     interface: Interface,
     tolerance: Tolerance,
@@ -80,7 +81,7 @@ impl PlantModel for Furuta2Joint {
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         let [bodies @ .., tau11, tau12, peak1, tau21, tau22, peak2, _, _, _, _] =
-            *parameters.first_chunk::<16>().expect("it has sixteen parameters");
+            *parameters.first_chunk::<16>().expect("the model has sixteen parameters");
         let line = |at_rest: S, at_one: S| [[S::from(0.0), at_rest], [S::from(1.0), at_one]];
         let friction =
             [BearingFriction::new(&line(tau11, tau12), peak1)?, BearingFriction::new(&line(tau21, tau22), peak2)?];
@@ -89,7 +90,7 @@ impl PlantModel for Furuta2Joint {
     }
 }
 
-/// The lumped parameters of arm and pendulum.
+/// Lumped parameters of arm and pendulum.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lumped<S> {
     /// Inertia of the pendulum about its joint, `J + m l^2`, kg m2.
@@ -103,12 +104,12 @@ pub(crate) struct Lumped<S> {
 }
 
 impl<S: Scalar> Lumped<S> {
-    /// From values of [`body_parameters`].
+    /// Computes the lumped parameters from values of [`body_parameters`].
     pub fn of(&[inertia, arm_inertia, m, l, r, g]: &[S; 6]) -> Self {
         Self { a: inertia + m * l * l, b: arm_inertia + m * r * r, c: m * r * l, d: m * g * l }
     }
 
-    /// Mass matrix, and the torques of gravity and of the rotating frame, in the order arm, pendulum.
+    /// Returns the mass matrix, and the torques of gravity and of the rotating frame, in the order arm, pendulum.
     #[inline]
     pub fn mass_and_force(&self, theta: S, dphi: S, dtheta: S) -> ([[S; 2]; 2], [S; 2]) {
         let Self { a, b, c, d } = *self;
@@ -131,7 +132,7 @@ impl<S: Scalar> Bodies<S, 2> for TwoBodies<S> {
     }
 }
 
-/// The joint of the arm.
+/// Joint of the arm.
 pub(crate) const ARM: Joint = Joint {
     angle: "phi",
     about: "arm",
@@ -139,7 +140,7 @@ pub(crate) const ARM: Joint = Joint {
     events: ["arm sticks", "arm slides", "arm driven by negative friction", "arm braked by its friction again"],
 };
 
-/// The joint of the pendulum.
+/// Joint of the pendulum.
 pub(crate) const PENDULUM: Joint = Joint {
     angle: "theta",
     about: "pendulum, 0 upright, pi hanging",
@@ -152,7 +153,7 @@ pub(crate) const PENDULUM: Joint = Joint {
     ],
 };
 
-/// Inertias, mass, lengths and gravity.
+/// Returns the parameters of the bodies: inertias, mass, lengths and gravity.
 pub(crate) fn body_parameters() -> Vec<Parameter> {
     let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
     vec![
@@ -165,18 +166,18 @@ pub(crate) fn body_parameters() -> Vec<Parameter> {
     ]
 }
 
-/// A friction torque at some speed.
+/// Creates the parameter of a friction torque.
 pub(crate) fn torque(name: &str, about: &str) -> Parameter {
     Parameter::new(name, "N m", about).with_default(0.0)
 }
 
-/// Break-away torque over sliding torque at rest.
+/// Creates the parameter of the ratio of break-away torque to sliding torque at rest.
 pub(crate) fn peak(name: &str, joint: &str) -> Parameter {
-    let about = format!("torque that breaks the {joint} away over its friction at rest");
+    let about = format!("ratio of the break-away torque of the {joint} to its sliding friction at rest");
     Parameter::new(name, "1", about).within(1.0, f64::INFINITY).with_default(1.0)
 }
 
-/// The input of all models of the pendulum.
+/// Returns the input of all models of the pendulum.
 pub(crate) fn arm_torque() -> Variable {
     Variable::new("u", "N m", "torque on the arm")
 }

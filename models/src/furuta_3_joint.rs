@@ -1,4 +1,4 @@
-//! The Furuta pendulum whose pendulum can also tilt sideways, against a spring.
+//! Furuta pendulum whose pendulum can also tilt sideways against a spring.
 
 use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
 use schemars::JsonSchema;
@@ -9,10 +9,10 @@ use crate::kernel::elements::{BearingFriction, SpringDamper};
 use crate::kernel::mechanism::{self, Bodies, Joint, Mechanism};
 use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
-/// The Furuta pendulum of `furuta-2-joint` with a third joint: at its top the pendulum tilts by `psi` in the plane through
+/// Furuta pendulum of `furuta-2-joint` with a third joint. At its top the pendulum tilts by `psi`, in the plane through
 /// its swing axis, against a spring and a damper in parallel. The rod has no inertia about its own axis. With
-/// `K = J + m l^2`, `C = -m r l`, speeds `(f, w, u) = (phi', theta', psi')`, `st`, `ct`, `sp`, `cp` the sines and cosines of
-/// theta and psi, `M q'' + h = torques`:
+/// `K = J + m l^2`, `C = -m r l`, speeds `(f, w, u) = (phi', theta', psi')`, and `st`, `ct`, `sp`, `cp` the sines and
+/// cosines of theta and psi, `M q'' + h = torques`:
 ///
 /// ```text
 /// M11 = Ja + m r^2 + K (1 - cp^2 ct^2) - 2 C sp,  M12 = cp ct (K sp - C),  M13 = st (C sp - K),  M22 = K cp^2,  M23 = 0,  M33 = K
@@ -22,12 +22,13 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 /// ```
 ///
 /// The bearing of the arm has a table of friction torque over speed: `tau11` at rest, `tau01` at `point0`, `tau05` at
-/// `point1`, `tau12` at `point2`, straight between and beyond, break-away at `peak1 tau11`. The pendulum's has two entries
-/// as in `furuta-2-joint`. A friction that is negative at a speed drives the joint: an event says so.
-/// Linearised, a joint at rest has no dry friction, and one that moves slides.
+/// `point1`, `tau12` at `point2`. The table is linear between its points and extrapolated beyond the last; the
+/// break-away torque is `peak1 tau11`. The bearing of the pendulum has two entries as in `furuta-2-joint`. Negative
+/// friction drives the joint, which is reported as an event. When the model is linearised, a joint at rest has no dry
+/// friction, and a moving joint slides.
 ///
 /// Parameters: those of `furuta-2-joint`; `tau01`, `tau05` (N m), `point0`, `point1`, `point2` (rad/s, increasing); `c`
-/// (N m/rad), `d` (N m s/rad); start values `psi0`, `dpsi0` besides the others (0).
+/// (N m/rad), `d` (N m s/rad); and the additional initial states `psi0`, `dpsi0` (default 0).
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `psi`, `dpsi`, `u`. Input: `u`, the torque on the arm, N m.
 ///
@@ -36,7 +37,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Furuta3JointOptions {
-    /// End of the simulation where no experiment gives one.
+    /// End of the simulation, unless an experiment gives it.
     horizon: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     tolerance: Tolerance,
@@ -48,7 +49,7 @@ impl ModelOptions for Furuta3JointOptions {
     fn build(self) -> Result<Box<dyn Model>, Mistake> {
         self.tolerance.check()?;
         let at = |name: &str, default| {
-            let about = format!("speed of the arm at entry {} of its friction", &name[5..]);
+            let about = format!("speed of the arm at entry {} of its friction table", &name[5..]);
             Parameter::new(name, "rad/s", about).within(f64::MIN_POSITIVE, f64::INFINITY).with_default(default)
         };
         let positive =
@@ -81,7 +82,7 @@ impl ModelOptions for Furuta3JointOptions {
 
 const TILT: Joint = Joint { angle: "psi", about: "pendulum's tilt", start: 0.0, events: [""; 4] };
 
-/// The model of the kind `furuta-3-joint`.
+/// Model of the kind `furuta-3-joint`.
 struct Furuta3Joint {
     interface: Interface,
     tolerance: Tolerance,
@@ -99,7 +100,7 @@ impl PlantModel for Furuta3Joint {
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         let (parameters, start) = parameters.split_at(parameters.len() - 6);
         let [bodies @ .., tau11, tau01, tau05, tau12, point0, point1, point2, peak1, tau21, tau22, peak2, c, d] =
-            *parameters.first_chunk::<19>().expect("it has nineteen parameters besides the start values");
+            *parameters.first_chunk::<19>().expect("the model has nineteen parameters without the initial states");
         let [at_rest, at_one] = [S::from(0.0), S::from(1.0)];
         let friction = [
             BearingFriction::new(&[[at_rest, tau11], [point0, tau01], [point1, tau05], [point2, tau12]], peak1)?,

@@ -1,4 +1,4 @@
-//! The Furuta pendulum near its upright position, linearised.
+//! Furuta pendulum linearised about its upright position.
 
 use mops_core::{Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
 use schemars::JsonSchema;
@@ -9,16 +9,16 @@ use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::{self, Joint};
 use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 
-/// The Furuta pendulum linearised about the upright position, with a spring and a damper in parallel in each joint:
+/// Furuta pendulum linearised about the upright position, with a spring and a damper in parallel in each joint:
 ///
 /// ```text
 /// b phi'' + c theta'' = u - c1 phi - d1 phi'
 /// c phi'' + a theta'' = d theta - c2 theta - d2 theta'
 /// ```
 ///
-/// Parameters: `a` pendulum inertia about its joint, `b` inertia of the arm with the pendulum's mass at its end, `c`
-/// coupling (all kg m2), `d` gravity torque (N m), springs `c1`, `c2` (N m/rad) and dampers `d1`, `d2` (N m s/rad) of arm
-/// and pendulum (default 0), and the start values `phi0`, `dphi0`, `theta0`, `dtheta0` (default 0).
+/// Parameters: `a` inertia of the pendulum about its joint, `b` inertia of the arm with the pendulum's mass at its end,
+/// `c` coupling (all kg m2), `d` gravity torque (N m), springs `c1`, `c2` (N m/rad) and dampers `d1`, `d2` (N m s/rad)
+/// of arm and pendulum (default 0), and the initial states `phi0`, `dphi0`, `theta0`, `dtheta0` (default 0).
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta` (rad, rad/s), `u`. Input: `u`, the torque on the arm, N m.
 ///
@@ -26,7 +26,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct FurutaLinearOptions {
-    /// End of the simulation where no experiment gives one.
+    /// End of the simulation, unless an experiment gives it.
     horizon: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     tolerance: Tolerance,
@@ -44,7 +44,7 @@ impl ModelOptions for FurutaLinearOptions {
     }
 }
 
-/// The model of the kind `furuta-linear`.
+/// Model of the kind `furuta-linear`.
 struct FurutaLinear {
     interface: Interface,
     tolerance: Tolerance,
@@ -65,12 +65,12 @@ impl PlantModel for FurutaLinear {
     }
 }
 
-/// Joints of a pendulum that starts upright.
+/// Returns the joints of a pendulum that starts upright.
 pub(crate) fn upright_joints() -> [Joint; 2] {
     [ARM, Joint { start: 0.0, ..PENDULUM }]
 }
 
-/// Parameters of [`Upright`].
+/// Returns the parameters of [`Upright`].
 pub(crate) fn lumped_parameters() -> Vec<Parameter> {
     let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
     let element = |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY).with_default(0.0);
@@ -86,7 +86,8 @@ pub(crate) fn lumped_parameters() -> Vec<Parameter> {
     ]
 }
 
-/// The pendulum and the springs and dampers of its joints, near the upright position or, by the same parameters, anywhere.
+/// Pendulum with springs and dampers in its joints: linearised about the upright position, or nonlinear with the same
+/// parameters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Upright<S> {
     lumped: Lumped<S>,
@@ -94,7 +95,7 @@ pub(crate) struct Upright<S> {
 }
 
 impl<S: Scalar> Upright<S> {
-    /// From values of [`lumped_parameters`].
+    /// Creates the pendulum from values of [`lumped_parameters`].
     pub fn of([a, b, c, d, c1, d1, c2, d2]: [S; 8]) -> Result<Self, Failure> {
         let [ab, cc] = [(a * b).value(), (c * c).value()];
         if ab <= cc {
@@ -104,13 +105,13 @@ impl<S: Scalar> Upright<S> {
         Ok(Self { lumped: Lumped { a, b, c, d }, elements: [SpringDamper::new(c1, d1), SpringDamper::new(c2, d2)] })
     }
 
-    /// Accelerations of arm and pendulum by the linearised equations.
+    /// Returns the accelerations of arm and pendulum by the linearised equations.
     pub fn linear(&self, x: &[S; 4], u: S) -> [S; 2] {
         let Lumped { a, b, c, d } = self.lumped;
         self.accelerations([[b, c], [c, a]], [u, d * x[2]], x)
     }
 
-    /// Accelerations of arm and pendulum by the nonlinear equations.
+    /// Returns the accelerations of arm and pendulum by the nonlinear equations.
     pub fn nonlinear(&self, x: &[S; 4], u: S) -> [S; 2] {
         let (mass, [arm, pendulum]) = self.lumped.mass_and_force(x[2], x[1], x[3]);
         self.accelerations(mass, [arm + u, pendulum], x)
@@ -125,7 +126,7 @@ impl<S: Scalar> Upright<S> {
     }
 }
 
-/// The linearised pendulum; the input is the torque on the arm.
+/// Linearised pendulum; the input is the torque on the arm.
 struct LinearPlant<'a, S> {
     plant: Upright<S>,
     start: &'a [S],

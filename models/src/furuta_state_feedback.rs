@@ -1,4 +1,4 @@
-//! The Furuta pendulum held upright by state feedback, its arm led to an angle.
+//! Furuta pendulum balanced upright by state feedback, with a setpoint for the angle of the arm.
 
 use mops_core::{
     EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
@@ -10,20 +10,20 @@ use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
 use crate::kernel::elements::{Lag, Saturation};
 use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, seconds};
 
-/// The Furuta pendulum with a spring and a damper in each joint, upright, under state feedback with a filtered reference:
+/// Upright Furuta pendulum with a spring and a damper in each joint, under state feedback with a filtered reference:
 ///
 /// ```text
 /// ref = setpoint (1 - exp(-t/T))
 /// v = -(k1 (phi - ref) + k2 phi' + k3 theta + k4 theta'),   u = min(max(v, -limit), limit)
 /// ```
 ///
-/// The arm is led from 0 to `setpoint` by a reference that a first-order filter keeps from jumping, so that the pendulum
-/// does not fall; `u` is the torque on the arm. The plant is that of `furuta-linear`, or with `plant = "nonlinear"` (the
-/// default) the equations it is the linearisation of.
+/// The setpoint moves the arm from 0 to `setpoint`. A first-order filter keeps the reference from jumping, so that the
+/// pendulum does not fall. `u` is the torque on the arm. The plant is that of `furuta-linear`, or with
+/// `plant = "nonlinear"` (the default) its nonlinear equations.
 ///
-/// Parameters: `k1` (N m/rad), `k2` (N m s/rad), `k3`, `k4` gains; `setpoint` (rad), `T` time constant of the filter (s, default
-/// 0.05), `limit` of the torque (N m, default 0.05); those of the plant (`a`, `b`, `c`, `d`, `c1`, `d1`, `c2`, `d2`) and the
-/// start values as in `furuta-linear`.
+/// Parameters: gains `k1`, `k3` (N m/rad) and `k2`, `k4` (N m s/rad); `setpoint` (rad); `T` time constant of the filter
+/// (s, default 0.05); `limit` of the torque (N m, default 0.05); those of the plant (`a`, `b`, `c`, `d`, `c1`, `d1`,
+/// `c2`, `d2`) and the initial states as in `furuta-linear`.
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `ref` (rad, rad/s), `u` (N m).
 ///
@@ -33,7 +33,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, seconds};
 pub struct FurutaStateFeedbackOptions {
     /// End of the simulation.
     horizon: Quantity,
-    /// The equations of the pendulum.
+    /// Equations of the pendulum.
     #[serde(default)]
     plant: Plant,
     /// Accuracy and limits of the simulation.
@@ -45,10 +45,10 @@ pub struct FurutaStateFeedbackOptions {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Plant {
-    /// Those of two rigid bodies.
+    /// Nonlinear equations of two rigid bodies.
     #[default]
     Nonlinear,
-    /// Linearised about the upright position.
+    /// Equations linearised about the upright position.
     Linear,
 }
 
@@ -63,7 +63,7 @@ impl ModelOptions for FurutaStateFeedbackOptions {
             Parameter::new("k2", "N m s/rad", "gain of the arm's speed"),
             Parameter::new("k3", "N m/rad", "gain of the pendulum's angle"),
             Parameter::new("k4", "N m s/rad", "gain of the pendulum's speed"),
-            Parameter::new("setpoint", "rad", "angle to which the arm is led"),
+            Parameter::new("setpoint", "rad", "setpoint of the arm's angle"),
             positive("T", "s", "time constant of the filter of the reference").with_default(0.05),
             positive("limit", "N m", "largest torque").with_default(0.05),
         ];
@@ -76,7 +76,7 @@ impl ModelOptions for FurutaStateFeedbackOptions {
     }
 }
 
-/// The model of the kind `furuta-state-feedback`.
+/// Model of the kind `furuta-state-feedback`.
 struct FurutaStateFeedback {
     interface: Interface,
     plant: Plant,
@@ -88,7 +88,7 @@ impl PlantModel for FurutaStateFeedback {
         &self.interface
     }
 
-    /// The reference is a state besides those of the pendulum.
+    /// Returns the states of the pendulum, then the reference.
     fn states(&self) -> Vec<Variable> {
         self.interface.signals[..5].to_vec()
     }
@@ -112,7 +112,7 @@ impl PlantModel for FurutaStateFeedback {
     }
 }
 
-/// The loop; state: the plant's, then the reference.
+/// Closed loop; state: that of the plant, then the reference.
 struct Loop<S> {
     gains: [S; 4],
     setpoint: S,
@@ -124,13 +124,13 @@ struct Loop<S> {
 }
 
 impl<S: Scalar> Loop<S> {
-    /// What the feedback asks for, N m.
+    /// Returns the torque that the feedback requests, N m.
     fn demand(&self, x: &[S]) -> S {
         let [k1, k2, k3, k4] = self.gains;
         -(k1 * (x[0] - x[4]) + k2 * x[1] + k3 * x[2] + k4 * x[3])
     }
 
-    /// What the actuator gives, N m.
+    /// Returns the torque of the actuator, N m.
     fn torque(&self, x: &[S]) -> S {
         self.actuator.output(self.demand(x))
     }
@@ -151,7 +151,7 @@ impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
         dx.copy_from_slice(&[x[1], arm, x[3], pendulum, self.filter.derivative(self.setpoint, x[4])]);
     }
 
-    /// The states, then the torque.
+    /// Returns a state, or the torque as the last signal.
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
         at.x.get(signal).copied().unwrap_or_else(|| self.torque(at.x))
     }
@@ -173,7 +173,7 @@ impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
         self.actuator.settle(self.demand(at.x));
     }
 
-    /// Within the limit of the torque.
+    /// Linearises within the torque limit.
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
         Ok(Vec::new())
     }

@@ -1,4 +1,4 @@
-//! The simulation kernel of mops, and its models: one file each.
+//! Simulation kernel and models of mops, one file per model.
 
 pub mod equations;
 pub mod furuta;
@@ -18,7 +18,7 @@ mod with_effects;
 use mops_core::ModelKind;
 pub use with_effects::{Moment, WithEffects};
 
-/// Every kind of model. A new one is a file, and a line here.
+/// Returns all kinds of models. To add a model, write its file and add a line here.
 pub fn kinds() -> Vec<ModelKind> {
     vec![
         ModelKind::of::<pid_loop::PidLoopOptions>(),

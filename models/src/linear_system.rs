@@ -1,4 +1,5 @@
-//! What models share that are linear systems from the start: matrices over the scalar, their tangents, expressions in them.
+//! Common parts of models that are linear systems: matrices over the scalar, their tangents, and expressions as
+//! entries.
 
 use std::fmt;
 
@@ -12,10 +13,10 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-/// A matrix, row by row.
+/// Matrix, row by row.
 pub(crate) type Rows<S> = Vec<Vec<S>>;
 
-/// A linear system over the scalar.
+/// Linear system over the scalar.
 pub(crate) struct Matrices<S> {
     pub a: Rows<S>,
     pub b: Rows<S>,
@@ -26,16 +27,16 @@ pub(crate) struct Matrices<S> {
     pub states: Vec<String>,
 }
 
-/// A model that is a linear system.
+/// Model that is a linear system.
 pub(crate) trait LinearSystem {
-    /// The system for given parameters.
+    /// Returns the system for given parameters.
     fn matrices<S: Scalar>(&self, parameters: &[S]) -> Result<Matrices<S>, Failure>;
 
-    /// Names of the inputs and of the outputs.
+    /// Returns the names of the inputs and of the outputs.
     fn channels(&self) -> [Vec<String>; 2];
 }
 
-/// [`mops_core::Model::analyse`] of a linear system.
+/// Analyses a linear system; implements [`mops_core::Model::analyse`].
 pub(crate) fn analyse(model: &impl LinearSystem, job: &Job<'_>) -> Result<Analysis, Failure> {
     let matrices = model.matrices(job.parameters)?;
     let system = part(model, &matrices, |x: f64| x);
@@ -44,12 +45,12 @@ pub(crate) fn analyse(model: &impl LinearSystem, job: &Job<'_>) -> Result<Analys
         return Err(Failure::Undefined("an entry of the system is not finite".into()));
     }
     if !(system.delay >= 0.0 && system.delay.is_finite()) {
-        return Err(Failure::Undefined(format!("a delay must not be negative, but is {} s", system.delay)));
+        return Err(Failure::Undefined(format!("expected a delay of at least 0 s, found {} s", system.delay)));
     }
     Ok(Analysis::Linear(system))
 }
 
-/// [`mops_core::Model::tangents`] of a linear system.
+/// Computes the tangents of a linear system; implements [`mops_core::Model::tangents`].
 pub(crate) fn tangents(model: &impl LinearSystem, job: &Job<'_>, seeds: &[Vec<f64>]) -> Result<WithTangents, Failure> {
     let mut tangents = Vec::with_capacity(seeds.len());
     for seeds in seeds.chunks(DIRECTIONS) {
@@ -65,7 +66,7 @@ pub(crate) fn tangents(model: &impl LinearSystem, job: &Job<'_>, seeds: &[Vec<f6
     Ok((analyse(model, job)?, tangents))
 }
 
-/// The values of a system over the scalar, or its derivative along one direction.
+/// Returns the values of a system over the scalar, or its derivative in one direction.
 fn part<S: Scalar>(model: &impl LinearSystem, m: &Matrices<S>, take: impl Fn(S) -> f64) -> StateSpace {
     let [inputs, outputs] = model.channels();
     let n = m.states.len();
@@ -82,8 +83,8 @@ fn part<S: Scalar>(model: &impl LinearSystem, m: &Matrices<S>, take: impl Fn(S) 
     }
 }
 
-/// A transfer function in controllable canonical form: `A` by rows, `B`, `C`, `D`; coefficients of rising powers, those of
-/// the denominator without the leading 1, those of the numerator at most one more.
+/// Returns the controllable canonical form of a transfer function. Coefficients are in ascending powers. The
+/// denominator omits its leading 1; the numerator has at most one coefficient more.
 pub(crate) fn canonical<S: Scalar>(numerator: &[S], denominator: &[S], states: Vec<String>, delay: S) -> Matrices<S> {
     let (n, zero) = (denominator.len(), S::from(0.0));
     let above = |i: usize| numerator.get(i).copied().unwrap_or(zero);
@@ -100,7 +101,7 @@ pub(crate) fn canonical<S: Scalar>(numerator: &[S], denominator: &[S], states: V
     Matrices { a, b, c, d: vec![vec![direct]], delay, states }
 }
 
-/// A number, or an expression of parameters: `-4.0`, `"-k/m"`.
+/// Number, or expression of parameters: `-4.0`, `"-k/m"`.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry(pub Expression);
 
@@ -143,7 +144,7 @@ impl JsonSchema for Entry {
     }
 }
 
-/// An expression, bound to the places of its names among the parameters.
+/// Expression, with the indices of its names among the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Bound {
     expression: Expression,
@@ -151,7 +152,7 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    /// Binds an entry; names that are new are added to the parameters.
+    /// Binds an entry; new names are added to the parameters.
     pub fn new(entry: &Entry, names: &mut Vec<String>) -> Self {
         let place = |name: &String| {
             names.iter().position(|known| known == name).unwrap_or_else(|| {
@@ -162,19 +163,19 @@ impl Bound {
         Self { places: entry.0.names().iter().map(place).collect(), expression: entry.0.clone() }
     }
 
-    /// All entries of a list.
+    /// Binds all entries of a list.
     pub fn all(entries: &[Entry], names: &mut Vec<String>) -> Vec<Self> {
         entries.iter().map(|entry| Self::new(entry, names)).collect()
     }
 
-    /// The value for given parameters.
+    /// Returns the value for given parameters.
     pub fn value<S: Scalar>(&self, parameters: &[S]) -> S {
         let values: Vec<S> = self.places.iter().map(|&i| parameters[i]).collect();
         self.expression.evaluate(&values)
     }
 }
 
-/// The values of parameters in coherent units, in which expressions compute.
+/// Converts the values of parameters to coherent units, which expressions use.
 pub(crate) fn coherent<S: Scalar>(parameters: &[Parameter], values: &[S]) -> Vec<S> {
     let coherent = |(parameter, value): (&Parameter, &S)| {
         let unit = &parameter.variable.unit;
@@ -183,12 +184,12 @@ pub(crate) fn coherent<S: Scalar>(parameters: &[Parameter], values: &[S]) -> Vec
     parameters.iter().zip(values).map(coherent).collect()
 }
 
-/// Units by name: those that are not named are pure numbers.
+/// Units by name; all other names are pure numbers.
 pub(crate) struct Units<'a>(pub &'a [(String, String)]);
 
 impl Units<'_> {
-    /// Checks that every name is one of the `parameters` or `signals`, every unit a unit, and that every entry has a dimension.
-    /// Coefficients are in SI units, so that signals must be, too.
+    /// Checks that every name is one of the `parameters` or `signals`, that every unit is valid, and that all entries
+    /// have consistent dimensions. Coefficients are in SI units, so signals must be in SI units, too.
     pub fn check<'e>(
         &self,
         parameters: &[String],
@@ -201,14 +202,14 @@ impl Units<'_> {
             let wrong = |fact: String, help: String| Mistake::new(name, fact).with_help(help).within("units");
             if !known.contains(&name.as_str()) {
                 let help = mops_core::suggestion(name, known.iter().copied());
-                return Err(wrong(format!("there is no parameter, input or output `{name}`"), help));
+                return Err(wrong(format!("the system has no parameter, input or output `{name}`"), help));
             }
-            let unit =
-                Unit::parse(unit).map_err(|why| wrong(why, "as in units = { k = \"N/m\", m = \"kg\" }".to_owned()))?;
+            let unit = Unit::parse(unit)
+                .map_err(|why| wrong(why, "for example units = { k = \"N/m\", m = \"kg\" }".to_owned()))?;
             if signals.contains(name) && !unit.is_coherent() {
                 let si = if unit.is_angle() { "rad".to_owned() } else { unit.dimension().coherent() };
                 let help = format!("declare it in {si}: coefficients are in SI units");
-                return Err(wrong(format!("`{name}` of a linear system must be in an SI unit, found {unit}"), help));
+                return Err(wrong(format!("expected an SI unit for `{name}` of a linear system, found {unit}"), help));
             }
         }
         let mut dimensions = Dimensions::default();
@@ -225,15 +226,15 @@ impl Units<'_> {
         }
         let Some(delay) = delay else { return Ok(()) };
         let second = Measure::declared("delay", &Unit::known("s"));
-        dimensions.fits(&mut named, &second, delay.expression.root(), "a delay is a time").map_err(wrong)
+        dimensions.fits(&mut named, &second, delay.expression.root(), "a delay must be a time").map_err(wrong)
     }
 
-    /// The unit of a name, as text.
+    /// Returns the unit of a name, as text.
     pub fn of(&self, name: &str) -> &str {
         self.0.iter().find(|(known, _)| known == name).map_or("1", |(_, unit)| unit)
     }
 
-    /// Parameters of these names.
+    /// Returns the parameters of these names.
     pub fn parameters(&self, names: &[String]) -> Vec<Parameter> {
         names.iter().map(|name| Parameter::new(name, self.of(name), "parameter of the system")).collect()
     }

@@ -1,4 +1,4 @@
-//! Linearised models and linear systems against closed forms, differences and each other.
+//! Linearised models and linear systems, compared with closed forms, differences and each other.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ fn system(model: &dyn Model, parameters: &[f64]) -> StateSpace {
     }
 }
 
-/// Lumped parameters from table 4.5 of the thesis before its rounding, and the friction of both joints.
+/// Lumped parameters from table 4.5 of the thesis before rounding, and the friction of both joints.
 const FURUTA: [f64; 12] =
     [9.035_24e-4, 1.133_13e-3, 6.309_84e-4, 2.526_663e-2, 1e-4, 2.5287e-5, 1e-3, 1e-4, 0.0, 0.0, 0.0, 0.0];
 
@@ -37,7 +37,7 @@ fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
     let furuta: Arc<dyn Model> = Arc::new(Furuta::model(None, Tolerance::default()));
     let linearised = Linearised::new(furuta, &Linearise::default()).unwrap();
     let found = system(&linearised, &FURUTA);
-    // M q'' = f with M = [[a, c], [c, b]]: by hand.
+    // M q'' = f with M = [[a, c], [c, b]], in closed form.
     let [a, b, c, d, ba, bp, ..] = FURUTA;
     let determinant = a * b - c * c;
     let rows = [
@@ -53,7 +53,7 @@ fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
     }
     assert!((found.b[(1, 0)] - a / determinant).abs() < 1e-9 && (found.b[(3, 0)] + c / determinant).abs() < 1e-9);
     assert_eq!((found.states.join(" "), found.d[(4, 0)]), ("phi dphi theta dtheta".to_owned(), 1.0));
-    // The entries that the thesis prints (section 5.2), from the same parameters before rounding.
+    // Entries printed in the thesis (section 5.2), from the same parameters before rounding.
     assert!((found.a[(1, 2)] + 25.4814).abs() < 0.002 && (found.b[(1, 0)] - 1444.1).abs() < 0.5);
 }
 
@@ -74,7 +74,7 @@ fn bearings_rest_without_dry_friction_and_slide_where_they_move() {
         furuta.local(&at).unwrap().unwrap()
     };
     let (resting, forward, backward) = (look(0.0, false), look(2.0, false), look(-2.0, false));
-    // The pendulum's friction, without a jump at rest, stays; that of the arm at 2 rad/s is 0.05 N m.
+    // The pendulum's friction has no jump at rest and remains; that of the arm at 2 rad/s is 0.05 N m.
     assert_eq!((resting.rates[1].abs() < 1e-12, resting.slopes[(1, 1)]), (true, 0.0));
     assert!(resting.slopes[(3, 3)] < 0.0 && resting.frictionless == ["phi"]);
     assert!((forward.rates[1] + 0.05 * resting.slopes[(1, 4)]).abs() < 1e-9, "{:?}", forward.rates);
@@ -96,13 +96,13 @@ fn coulomb_friction_of_the_furuta_pendulum_has_its_sign_where_a_joint_moves() {
     };
     let (resting, sliding) = (look(0.0, false), look(1.0, false));
     assert_eq!((resting.rates.as_slice(), resting.frictionless.join(" ").as_str()), (&[0.0; 4][..], "phi theta"));
-    // Coulomb 1e-3 N m and viscous 1e-4 N m against the arm, as if the input gave them.
+    // Coulomb friction of 1e-3 N m and viscous friction of 1e-4 N m on the arm, equivalent to an input.
     assert!((sliding.rates[1] + 1.1e-3 * resting.slopes[(1, 4)]).abs() < 1e-9 && sliding.frictionless == ["theta"]);
     assert!((look(1.0, true).rates[1] + 1e-4 * resting.slopes[(1, 4)]).abs() < 1e-9);
 }
 
 #[test]
-fn slopes_at_any_state_agree_with_central_differences() {
+fn derivatives_at_any_state_agree_with_central_differences() {
     let furuta = Furuta::model(None, Tolerance::default());
     let (states, inputs) = ([0.3, -1.2, 2.1, 4.0], [0.01]);
     let local = |states: &[f64], inputs: &[f64]| {
@@ -165,7 +165,7 @@ fn the_linearised_loop_and_the_loop_transfer_function_belong_together() {
 }
 
 #[test]
-fn without_integral_or_derivative_no_state_is_left_over() {
+fn without_integral_or_derivative_there_is_no_state_for_it() {
     let open = model::<PidOpenLoopOptions>("plant = { poles = [-1.0, -1.0, -1.0] }");
     let system = system(open.as_ref(), &[4.0, f64::INFINITY, 0.0, 10.0, 0.0]);
     assert_eq!(system.order(), 3);
@@ -203,7 +203,7 @@ fn tangents_of_linear_systems_agree_with_central_differences() {
         let moved = |sign: f64| {
             let mut p = parameters;
             p[i] += sign * h;
-            // A delay is not negative, nor is it here.
+            // A delay must not be negative, also here.
             system(open.as_ref(), &p)
         };
         let (high, low, tangent) = (moved(1.0), moved(-1.0), tangent.linear().unwrap());
@@ -217,7 +217,7 @@ fn tangents_of_linear_systems_agree_with_central_differences() {
 }
 
 #[test]
-fn what_is_no_system_is_refused_with_a_way_out() {
+fn invalid_systems_are_an_error_with_a_remedy() {
     let refused = |options: &str| {
         let parsed = toml::from_str::<StateSpaceOptions>(options).expect("its shape is right");
         parsed.build().err().expect("it makes no sense").to_string()

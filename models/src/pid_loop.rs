@@ -1,4 +1,4 @@
-//! A PID controller in a loop with a linear plant.
+//! PID controller in a loop with a linear plant.
 
 use mops_core::{
     AnalysisKind, EventInstant, Failure, Input, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant,
@@ -10,21 +10,21 @@ use serde::Deserialize;
 use crate::kernel::{PlantModel, Simulated, Tolerance};
 use crate::rational::{PlantOptions, TransferFunction};
 
-/// A PID controller with filtered derivative in a loop with unity feedback and a linear plant `G`:
+/// PID controller with filtered derivative, in a unity feedback loop with a linear plant `G`:
 ///
 /// ```text
 /// y = G (sat(v) + d),   v = k (wp r - y + 1/(Ti s) (r - y) + Td s/(Td/Nd s + 1) (wd r - y))
 /// ```
 ///
-/// All states start at zero. `r` is the setpoint (a unit step at 0 s unless `setpoint` or a case says otherwise), `d` a
-/// load at the plant's input (0 unless `load` or a case says otherwise). With `limit` the actuator saturates and the
-/// integral is kept from winding up by back-calculation with the tracking time `Tt`. With `sample-time` the controller
-/// runs at that period (backward differences, integral updated after the output) and its output acts `delay` later.
+/// All initial states are zero. `r` is the setpoint, a unit step at 0 s unless `setpoint` or a case gives it. `d` is a
+/// load disturbance at the plant input, 0 unless `load` or a case gives it. With `limit` the actuator saturates, and
+/// back-calculation with the tracking time `Tt` prevents integrator windup. With `sample-time` the controller runs at
+/// that period (backward differences, integral updated after the output), and its output acts `delay` later.
 ///
-/// Parameters: `k` gain, `Ti`, `Td` times of integral and derivative (s; `Ti = inf` for no integral, `Td = 0` for no
+/// Parameters: `k` gain, `Ti` integral time and `Td` derivative time (s; `Ti = inf` for no integral, `Td = 0` for no
 /// derivative), `Nd` filter ratio of the derivative (default 10), `wp`, `wd` setpoint weights of proportional and
-/// derivative part (default 1), `Tt` tracking time (s; default sqrt(Ti Td), or Ti where Td = 0), and every name that stands in the
-/// plant for a number.
+/// derivative part (default 1), `Tt` tracking time (s; default sqrt(Ti Td), or Ti if Td = 0), and every name given in
+/// place of a number in the plant.
 ///
 /// Signals: `r`, `y`, `e = r - y`, `u = sat(v)`, `d`. Inputs: `r`, `d`.
 ///
@@ -33,33 +33,33 @@ use crate::rational::{PlantOptions, TransferFunction};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PidLoopOptions {
-    /// The plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
-    /// coefficients of falling powers of s. A name instead of a number makes a parameter of it.
+    /// Plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
+    /// coefficients of descending powers of s. A name instead of a number becomes a parameter.
     plant: PlantOptions,
     /// End of the simulation.
     horizon: Quantity,
-    /// The setpoint's step: `{ time = "0 s", size = 1.0 }`.
+    /// Step of the setpoint: `{ time = "0 s", size = 1.0 }`.
     setpoint: Option<StepOptions>,
-    /// A step of the load at the plant's input: `{ time = "20 s", size = 0.5 }`.
+    /// Step of the load disturbance at the plant input: `{ time = "20 s", size = 0.5 }`.
     load: Option<StepOptions>,
-    /// Smallest and largest output of the actuator.
+    /// Lower and upper limit of the actuator.
     limit: Option<[f64; 2]>,
-    /// Period of a sampled controller.
+    /// Sampling period of a sampled controller.
     sample_time: Option<Quantity>,
-    /// Time from taking a sample to its output, at most the period.
+    /// Delay from sampling to output, at most the sampling period.
     delay: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     #[serde(default)]
     tolerance: Tolerance,
 }
 
-/// A step of an input.
+/// Step of an input.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct StepOptions {
-    /// When; 0 s where absent.
+    /// Time of the step; default 0 s.
     time: Option<Quantity>,
-    /// Value from then on; 0 before.
+    /// Value after the step; 0 before.
     size: f64,
 }
 
@@ -71,7 +71,7 @@ impl ModelOptions for PidLoopOptions {
         let seconds = |key: &str, q: &Quantity| q.to(&Unit::known("s")).map_err(|e| Mistake::new(key, e));
         let horizon = seconds("horizon", &self.horizon)?;
         if !(horizon > 0.0 && horizon.is_finite()) {
-            return Err(Mistake::new("horizon", format!("a simulation must end after its start, not at {horizon} s")));
+            return Err(Mistake::new("horizon", format!("expected a positive and finite horizon, found {horizon} s")));
         }
         let step = |key: &str, options: &Option<StepOptions>| -> Result<Option<Input>, Mistake> {
             let Some(options) = options else { return Ok(None) };
@@ -83,25 +83,28 @@ impl ModelOptions for PidLoopOptions {
         let limit = match self.limit {
             Some([low, high]) if low < high => Some([low, high]),
             None => None,
-            Some([low, high]) => return Err(Mistake::new("limit", format!("the range is empty: {low} to {high}"))),
+            Some([low, high]) => {
+                return Err(Mistake::new(
+                    "limit",
+                    format!("expected a lower limit below the upper limit, found {low} and {high}"),
+                ));
+            }
         };
         let sampling = match (&self.sample_time, &self.delay) {
             (None, None) => None,
             (None, Some(_)) => {
-                return Err(
-                    Mistake::new("delay", "only a sampled controller has a delay").with_help("give `sample-time`")
-                );
+                return Err(Mistake::new("delay", "a delay needs a sampled controller").with_help("give `sample-time`"));
             }
             (Some(period), delay) => {
                 let period = seconds("sample-time", period)?;
                 let delay = delay.as_ref().map_or(Ok(0.0), |q| seconds("delay", q))?;
                 if !(period > 0.0 && period.is_finite()) {
-                    return Err(Mistake::new("sample-time", format!("a period must be positive, not {period} s")));
+                    return Err(Mistake::new("sample-time", format!("expected a positive period, found {period} s")));
                 }
                 if !(0.0..=period).contains(&delay) {
                     return Err(Mistake::new(
                         "delay",
-                        format!("the delay must lie between 0 and the period of {period} s"),
+                        format!("expected a delay between 0 and the period of {period} s, found {delay} s"),
                     ));
                 }
                 Some(Sampling { period, delay })
@@ -128,8 +131,8 @@ fn interface(named: &[String], horizon: f64) -> Interface {
     let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
     let mut parameters = vec![
         Parameter::new("k", "1", "gain of the controller"),
-        positive("Ti", "s", "time of the integral").or_infinite(),
-        Parameter::new("Td", "s", "time of the derivative").within(0.0, f64::INFINITY),
+        positive("Ti", "s", "integral time").or_infinite(),
+        Parameter::new("Td", "s", "derivative time").within(0.0, f64::INFINITY),
         positive("Nd", "1", "filter ratio of the derivative").with_default(10.0),
         Parameter::new("wp", "1", "setpoint weight of the proportional part").with_default(1.0),
         Parameter::new("wd", "1", "setpoint weight of the derivative part").with_default(1.0),
@@ -144,11 +147,14 @@ fn interface(named: &[String], horizon: f64) -> Interface {
             Variable::new("y", "1", "output of the plant"),
             Variable::new("e", "1", "control error r - y"),
             Variable::new("u", "1", "output of the actuator"),
-            Variable::new("d", "1", "load at the plant's input"),
+            Variable::new("d", "1", "load disturbance at the plant input"),
         ],
         parameters,
         states: Vec::new(),
-        inputs: vec![Variable::new("r", "1", "setpoint"), Variable::new("d", "1", "load at the plant's input")],
+        inputs: vec![
+            Variable::new("r", "1", "setpoint"),
+            Variable::new("d", "1", "load disturbance at the plant input"),
+        ],
         horizon: Some(horizon),
         ports: Vec::new(),
         analysis: AnalysisKind::Time,
@@ -161,7 +167,7 @@ struct Sampling {
     delay: f64,
 }
 
-/// The model of the kind `pid-loop`.
+/// Model of the kind `pid-loop`.
 struct PidLoop {
     interface: Interface,
     plant: TransferFunction,
@@ -206,7 +212,7 @@ impl PlantModel for PidLoop {
     }
 }
 
-/// The controller's parameters, in the order of [`CONTROLLER`].
+/// Parameters of the controller, in the order of [`CONTROLLER`].
 #[derive(Debug, Clone, Copy)]
 struct Controller<S> {
     k: S,
@@ -215,9 +221,9 @@ struct Controller<S> {
     wp: S,
     wd: S,
     tracking: S,
-    /// `k / Ti`.
+    /// Integral gain `k / Ti`.
     integral_gain: S,
-    /// `Nd / Td`; 0 without derivative.
+    /// Filter rate `Nd / Td`; 0 without derivative.
     filter_rate: S,
 }
 
@@ -245,17 +251,17 @@ impl<S: Scalar> Controller<S> {
     }
 }
 
-/// A sampled controller's memory.
+/// State of a sampled controller.
 #[derive(Debug, Clone)]
 struct Sampled<S> {
     sampling: Sampling,
-    /// Number of the next sample, and of the next output.
+    /// Index of the next sample, and of the next output.
     next_sample: f64,
     next_output: f64,
     integral: S,
     derivative: S,
     last: S,
-    /// Output computed but not yet acting, and output acting.
+    /// Output that is computed but not active yet, and active output.
     computed: S,
     acting: S,
 }
@@ -280,11 +286,11 @@ impl<S: Scalar> Sampled<S> {
         (self.next_sample * period).min(self.next_output * period + delay)
     }
 
-    /// Takes the sample and moves the output that are due at `t`.
+    /// Takes the sample and activates the output that are due at `t`.
     fn pass(&mut self, t: f64, controller: &Controller<S>, limit: [f64; 2], r: S, y: S) {
         let Sampling { period, delay } = self.sampling;
         let due = |time: f64| time <= t + 1e-12 * period;
-        // With a delay the output of an earlier sample is due before this one is taken.
+        // With a delay, the output of an earlier sample is due before the new sample.
         if delay > 0.0 && due(self.next_output * period + delay) {
             self.act();
         }
@@ -325,19 +331,19 @@ fn saturate<S: Scalar>(value: S, [low, high]: [f64; 2]) -> S {
     }
 }
 
-/// The closed loop: the plant in controllable canonical form, integral and derivative filter of the controller; the inputs are
+/// Closed loop: plant in controllable canonical form, integral and derivative filter of the controller. The inputs are
 /// setpoint and load.
 struct Loop<S> {
     numerator: Vec<S>,
     denominator: Vec<S>,
     controller: Controller<S>,
     limit: [f64; 2],
-    /// -1 at the lower limit, 1 at the upper, 0 between.
+    /// Active limit: -1 for the lower, 1 for the upper, 0 for none.
     saturated: f64,
     sampled: Option<Sampled<S>>,
 }
 
-/// The sum of products; of as many states as the coefficients are.
+/// Returns the sum of products of the coefficients and as many states.
 #[inline(always)]
 fn dot<S: Scalar>(coefficients: &[S], x: &[S]) -> S {
     match (coefficients, x) {
@@ -349,13 +355,13 @@ fn dot<S: Scalar>(coefficients: &[S], x: &[S]) -> S {
 }
 
 impl<S: Scalar> Loop<S> {
-    /// Output of the plant.
+    /// Returns the output of the plant.
     #[inline(always)]
     fn output(&self, x: &[S]) -> S {
         dot(&self.numerator, x)
     }
 
-    /// What the continuous controller asks for.
+    /// Returns the output that the continuous controller requests.
     #[inline(always)]
     fn wanted(&self, r: S, y: S, x: &[S]) -> S {
         let Controller { k, nd, wp, wd, .. } = self.controller;
@@ -367,7 +373,7 @@ impl<S: Scalar> Loop<S> {
         k * error + integral
     }
 
-    /// What the actuator gives.
+    /// Returns the output of the actuator.
     #[inline(always)]
     fn actuator(&self, r: S, y: S, x: &[S]) -> S {
         match &self.sampled {
@@ -384,7 +390,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         vec![S::from(0.0); self.denominator.len() + 2]
     }
 
-    // At each of the six stages of a step, with a number of states that is known there.
+    // Called at each of the six stages of a step, with a number of states known to the compiler.
     #[inline(always)]
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let n = at.x.len() - 2;
@@ -428,7 +434,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         if self.sampled.is_none() && limited { 2 } else { 0 }
     }
 
-    /// Guard 0 watches the lower limit, guard 1 the upper.
+    /// Returns the guard of the lower limit (0) or of the upper limit (1).
     fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
         let side = if index == 0 { -1.0 } else { 1.0 };
         let inside = (-self.wanted(at.u[0], self.output(at.x), at.x) + self.limit[index]) * side;
@@ -469,7 +475,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         };
     }
 
-    /// Within the limits of the actuator.
+    /// Linearises within the limits of the actuator.
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
         match self.sampled {
             Some(_) => Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into())),

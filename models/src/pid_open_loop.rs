@@ -1,4 +1,4 @@
-//! The loop transfer function of a PID controller and its plant.
+//! Loop transfer function of a PID controller and its plant.
 
 use mops_core::{
     Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Scalar, Variable,
@@ -10,16 +10,16 @@ use serde::Deserialize;
 use crate::linear_system::{self, LinearSystem, Matrices, canonical};
 use crate::rational::{PlantOptions, TransferFunction};
 
-/// The loop transfer function of `pid-loop`, for margins and peaks of sensitivities:
+/// Loop transfer function of `pid-loop`, for stability margins and sensitivity peaks:
 ///
 /// ```text
 /// L(s) = k (1 + 1/(Ti s) + Td s/(Td/Nd s + 1)) G(s) exp(-s delay)
 /// ```
 ///
-/// Parameters: `k` gain, `Ti`, `Td` times of integral and derivative (s; `Ti = inf` for no integral, `Td = 0` for no
-/// derivative), `Nd` filter ratio of the derivative (default 10), `delay` of the loop (s, default 0), and every name that
-/// stands in the plant for a number. They have the names of `pid-loop`, so that in a study with both models one set of
-/// tuners sets both.
+/// Parameters: `k` gain, `Ti` integral time and `Td` derivative time (s; `Ti = inf` for no integral, `Td = 0` for no
+/// derivative), `Nd` filter ratio of the derivative (default 10), `delay` of the loop (s, default 0), and every name
+/// given in place of a number in the plant. The names are those of `pid-loop`, so that one set of tuners sets both
+/// models of a study.
 ///
 /// Signal: `y`. Input: the control error `e`.
 ///
@@ -27,15 +27,16 @@ use crate::rational::{PlantOptions, TransferFunction};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PidOpenLoopOptions {
-    /// The plant, as in `pid-loop`: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator =
-    /// [...] }` with coefficients of falling powers of s. A name instead of a number makes a parameter of it.
+    /// Plant, as in `pid-loop`: `{ poles = [...], zeros = [...], gain = 1.0 }`, or
+    /// `{ numerator = [...], denominator = [...] }` with coefficients of descending powers of s. A name instead of a
+    /// number becomes a parameter.
     plant: PlantOptions,
 }
 
-/// The controller's parameters and the delay; those named in the plant come after them.
+/// Controller parameters and the delay; those named in the plant come after them.
 const OWN: [&str; 5] = ["k", "Ti", "Td", "Nd", "delay"];
 
-/// The model of the kind `pid-open-loop`.
+/// Model of the kind `pid-open-loop`.
 struct PidOpenLoop {
     interface: Interface,
     plant: TransferFunction,
@@ -51,8 +52,8 @@ impl ModelOptions for PidOpenLoopOptions {
         let from_zero = |name, unit, about| Parameter::new(name, unit, about).within(0.0, f64::INFINITY);
         let mut parameters = vec![
             Parameter::new("k", "1", "gain of the controller"),
-            positive("Ti", "s", "time of the integral").or_infinite(),
-            from_zero("Td", "s", "time of the derivative"),
+            positive("Ti", "s", "integral time").or_infinite(),
+            from_zero("Td", "s", "derivative time"),
             positive("Nd", "1", "filter ratio of the derivative").with_default(10.0),
             from_zero("delay", "s", "delay of the loop").with_default(0.0),
         ];
@@ -78,7 +79,7 @@ impl LinearSystem for PidOpenLoop {
         let n = denominator.len();
         let states = (1..=n).map(|i| format!("x{i}")).collect();
         let mut m = canonical(&numerator, &denominator, states, delay);
-        // What the controller does not have is no state either: it would be a mode that nothing moves.
+        // An absent integral or derivative has no state, which would be an uncontrollable mode.
         let mut through = k;
         let zero = S::from(0.0);
         let add = |m: &mut Matrices<S>, name: &str, rate: S, input: S, effect: S| {
@@ -118,7 +119,7 @@ impl Model for PidOpenLoop {
     }
 
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
-        // Without a derivative it has a state less: what a little of it would change is not to be seen here.
+        // Without a derivative the model has one state less, so the tangent with respect to `Td` is not available.
         let bare = job.parameters[2] == 0.0 && seeds.iter().any(|seed| seed[2] != 0.0);
         (!bare).then(|| linear_system::tangents(self, job, seeds))
     }

@@ -1,11 +1,11 @@
-//! A plant given by its transfer function, whose coefficients may be parameters of the model.
+//! Plant given by its transfer function, whose coefficients may be parameters of the model.
 
 use mops_core::{Failure, Mistake, Scalar};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-/// A transfer function, by poles and zeros or by coefficients.
+/// Transfer function, given by poles and zeros or by coefficients.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub(crate) struct PlantOptions {
@@ -13,15 +13,15 @@ pub(crate) struct PlantOptions {
     poles: Option<Vec<Coefficient>>,
     /// Real zeros, 1/s.
     zeros: Vec<Coefficient>,
-    /// `gain (s - z1)(s - z2)... / ((s - p1)(s - p2)...)`.
+    /// Factor `gain` of `gain (s - z1)(s - z2)... / ((s - p1)(s - p2)...)`.
     gain: Option<Coefficient>,
-    /// Coefficients of the numerator, falling powers of s.
+    /// Coefficients of the numerator, in descending powers of s.
     numerator: Option<Vec<Coefficient>>,
-    /// Coefficients of the denominator, falling powers of s.
+    /// Coefficients of the denominator, in descending powers of s.
     denominator: Option<Vec<Coefficient>>,
 }
 
-/// A number, or the name of a parameter.
+/// Number, or name of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Coefficient {
     Number(f64),
@@ -64,7 +64,7 @@ impl JsonSchema for Coefficient {
     }
 }
 
-/// A strictly proper transfer function whose coefficients may be parameters.
+/// Strictly proper transfer function whose coefficients may be parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct TransferFunction {
     form: Form,
@@ -76,7 +76,7 @@ enum Form {
     Coefficients { numerator: Vec<Slot>, denominator: Vec<Slot> },
 }
 
-/// A number, or an index into the parameters named in the plant.
+/// Number, or index into the parameters named in the plant.
 #[derive(Debug, Clone, Copy)]
 enum Slot {
     Number(f64),
@@ -93,7 +93,7 @@ impl Slot {
 }
 
 impl TransferFunction {
-    /// Checks the plant; `names` gets the parameters it names, which are none of the `taken` ones.
+    /// Checks the plant. Adds to `names` the parameters that the plant names, which must not be `taken`.
     pub fn new(plant: &PlantOptions, taken: &[&str], names: &mut Vec<String>) -> Result<Self, Mistake> {
         let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, Mistake> {
             list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
@@ -109,7 +109,7 @@ impl TransferFunction {
             }
             (None, Some(numerator), Some(denominator)) => {
                 if plant.gain.is_some() || !plant.zeros.is_empty() {
-                    return Err(Mistake::here("`gain` and `zeros` go with `poles`, not with coefficients"));
+                    return Err(Mistake::here("`gain` and `zeros` require `poles` instead of coefficients"));
                 }
                 Form::Coefficients {
                     numerator: slots("numerator", numerator)?,
@@ -117,8 +117,8 @@ impl TransferFunction {
                 }
             }
             _ => {
-                return Err(Mistake::here("the plant is given neither by its poles nor by numerator and denominator")
-                    .with_help("as in plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
+                return Err(Mistake::here("expected poles, or numerator and denominator, of the plant")
+                    .with_help("for example plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
             }
         };
         let (above, below) = match &form {
@@ -129,14 +129,14 @@ impl TransferFunction {
         };
         if above >= below {
             return Err(Mistake::here(format!(
-                "the plant must be strictly proper, but has order {above} over order {below}"
+                "expected a strictly proper plant, found order {above} over order {below}"
             ))
             .with_help("add the pole of the actuator or the sensor"));
         }
         Ok(Self { form })
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn order(&self) -> usize {
         match &self.form {
             Form::Roots { poles, .. } => poles.len(),
@@ -144,7 +144,8 @@ impl TransferFunction {
         }
     }
 
-    /// Coefficients of rising powers, the denominator's leading one being 1 and left out.
+    /// Returns the coefficients of numerator and denominator in ascending powers, normalised to a leading 1 of the
+    /// denominator, which is omitted.
     pub fn polynomials<S: Scalar>(&self, named: &[S]) -> Result<(Vec<S>, Vec<S>), Failure> {
         let values = |slots: &[Slot]| -> Vec<S> { slots.iter().map(|s| s.value(named)).collect() };
         let (mut numerator, mut denominator) = match &self.form {
@@ -184,7 +185,7 @@ fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> R
     }
 }
 
-/// Coefficients, rising powers, of `(s - r1)(s - r2)...`.
+/// Returns the coefficients, in ascending powers, of `(s - r1)(s - r2)...`.
 pub(crate) fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
     let mut polynomial = vec![S::from(1.0)];
     for &root in roots {

@@ -1,4 +1,4 @@
-//! A linear system given by its matrices.
+//! Linear system given by its matrices.
 
 use std::collections::BTreeMap;
 
@@ -10,41 +10,41 @@ use serde::Deserialize;
 
 use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Units, coherent};
 
-/// `dx/dt = A x + B u(t - delay)`, `y = C x + D u(t - delay)`: a linear system by its matrices, for criteria of linear
-/// systems.
+/// Linear system given by its matrices, for criteria of linear systems: `dx/dt = A x + B u(t - delay)`,
+/// `y = C x + D u(t - delay)`.
 ///
-/// An entry is a number, or an expression whose names are parameters: tuners, cases and the study can set them. As in
+/// An entry is a number, or an expression whose names are parameters that tuners, cases and the study can set. Example:
 /// `a = [[0, 1], ["-k/m", "-d/m"]]`, `b = [[0], ["1/m"]]`, `c = [[1, 0]]`.
 ///
-/// Signals are the outputs; inputs the inputs. Their units, and those of parameters, are pure numbers unless `units` says
-/// otherwise. Entries are in SI units: parameters are converted to them, and inputs and outputs are declared in them.
+/// Signals are the outputs. The units of inputs, outputs and parameters are pure numbers unless given in `units`.
+/// Entries are in SI units: parameters are converted to them, and the units of inputs and outputs must be SI units.
 ///
 /// Source: T. Kailath, Linear Systems (1980), chapter 2.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StateSpaceOptions {
-    /// `A`, a list of rows.
+    /// State matrix `A`, a list of rows.
     a: Rows<Entry>,
-    /// `B`, a list of rows.
+    /// Input matrix `B`, a list of rows.
     b: Rows<Entry>,
-    /// `C`, a list of rows.
+    /// Output matrix `C`, a list of rows.
     c: Rows<Entry>,
-    /// `D`, a list of rows; zero where absent.
+    /// Feedthrough matrix `D`, a list of rows; default zero.
     d: Option<Rows<Entry>>,
     /// Delay of all inputs, s; a number or an expression.
     delay: Option<Entry>,
-    /// Names of the states; `x1`, `x2`, ... where absent.
+    /// Names of the states; default `x1`, `x2`, ...
     states: Option<Vec<String>>,
-    /// Names of the inputs; `u`, or `u1`, `u2`, ... where absent.
+    /// Names of the inputs; default `u`, or `u1`, `u2`, ...
     inputs: Option<Vec<String>>,
-    /// Names of the outputs; `y`, or `y1`, `y2`, ... where absent.
+    /// Names of the outputs; default `y`, or `y1`, `y2`, ...
     outputs: Option<Vec<String>>,
-    /// Units of parameters, inputs and outputs, as in `{ k = "N/m" }`.
+    /// Units of parameters, inputs and outputs, such as `{ k = "N/m" }`.
     #[serde(default)]
     units: BTreeMap<String, String>,
 }
 
-/// The model of the kind `state-space`.
+/// Model of the kind `state-space`.
 struct Given {
     interface: Interface,
     matrices: [Rows<Bound>; 4],
@@ -69,9 +69,9 @@ impl ModelOptions for StateSpaceOptions {
             let fits = rows.len() == height && rows.iter().all(|row| row.len() == width);
             if !fits || height == 0 || width == 0 {
                 let widths: Vec<usize> = rows.iter().map(Vec::len).collect();
-                let fact = format!("`{key}` must have {height} rows of {width}, but has rows of {widths:?}");
+                let fact = format!("expected {height} rows of {width} entries in `{key}`, found rows of {widths:?}");
                 return Err(Mistake::new(key, fact).with_help(
-                    "a has as many rows and columns as there are states; b a column per input; c a row per output",
+                    "a has one row and one column per state, b one column per input, c one row per output",
                 ));
             }
         }
@@ -100,20 +100,19 @@ impl ModelOptions for StateSpaceOptions {
     }
 }
 
-/// The names given, of which there must be `count`, or numbered ones.
+/// Returns the given names, of which there must be `count`, or numbered names.
 fn named(key: &str, given: Option<Vec<String>>, letter: &str, count: usize) -> Result<Vec<String>, Mistake> {
     match given {
         Some(names) if names.len() != count => {
-            Err(Mistake::new(key, format!("{} names are given for {count} {key}", names.len()))
+            Err(Mistake::new(key, format!("expected {count} names in `{key}`, found {}", names.len()))
                 .with_help(format!("name all of them, or leave `{key}` out")))
         }
-        Some(names) => {
-            match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-                Some((_, twice)) => Err(Mistake::new(key, format!("two {key} are called `{twice}`"))
-                    .with_help("give each a name of its own")),
-                None => Ok(names),
+        Some(names) => match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+            Some((_, twice)) => {
+                Err(Mistake::new(key, format!("duplicate name `{twice}` in {key}")).with_help("choose another name"))
             }
-        }
+            None => Ok(names),
+        },
         None if count == 1 && letter != "x" => Ok(vec![letter.to_owned()]),
         None => Ok((1..=count).map(|i| format!("{letter}{i}")).collect()),
     }

@@ -1,4 +1,4 @@
-//! Models against closed forms, published values and an independent integration.
+//! Models, compared with closed forms, published values and an independent integration.
 
 mod effects_simulated;
 mod furuta_bodies;
@@ -29,13 +29,13 @@ fn simulate(model: &dyn Model, case: &Case, parameters: &[f64], horizon: f64) ->
     analysis.response().expect("a simulation").clone()
 }
 
-/// [`check_tangents_by`] a millionth.
+/// Calls [`check_tangents_by`] with a relative step of one millionth.
 fn check_tangents(model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
     check_tangents_by(1e-6, model, case, parameters, horizon);
 }
 
-/// Tangents along every parameter against central differences of simulations, at 200 times; parameters are moved by
-/// the part `step` of their value.
+/// Compares tangents with respect to every parameter with central differences of simulations, at 200 times. The
+/// difference step of a parameter is `step` times its value.
 pub(crate) fn check_tangents_by(step: f64, model: &dyn Model, case: &Case, parameters: &[(&str, f64)], horizon: f64) {
     let values = values(model, parameters);
     let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
@@ -114,7 +114,7 @@ fn pid(options: &str) -> Box<dyn Model> {
 
 const THESIS_PLANT: &str = "plant = { poles = ['a', 'b', 'c'], gain = 1.0 }\nhorizon = 60.0\n";
 
-/// Overshoot over 1 and the last time outside 1 +- 0.01, from the trace.
+/// Returns the overshoot over 1 and the last time outside 1 +- 0.01, from the trace.
 fn overshoot_and_settling(response: &Response) -> (f64, f64) {
     let y = response.trace("y").unwrap();
     let mut settled = 0.0;
@@ -129,7 +129,7 @@ fn overshoot_and_settling(response: &Response) -> (f64, f64) {
 #[test]
 fn pid_loop_agrees_with_the_published_design_tables() {
     let model = pid(THESIS_PLANT);
-    // (k, Ti, Td), (a, b, c), overshoot, settling: tables 5.1 to 5.3 of the thesis, with the digits of an independent
+    // (k, Ti, Td), (a, b, c), overshoot, settling time: tables 5.1 to 5.3 of the thesis. Digits from an independent
     // integration (SciPy DOP853, rtol 1e-12).
     let rows = [
         ((4.0, 2.0, 1.0), (0.0, -4.0, -1.0), 0.315_794_212_2, 17.609_910_4),
@@ -151,7 +151,7 @@ fn pid_loop_agrees_with_the_published_design_tables() {
 
 #[test]
 fn proportional_control_of_a_first_order_plant_is_its_closed_form() {
-    // G = 1/(s + 1), k = 4: y = 0.8 (1 - exp(-5 t)); a load of 1 adds 0.2 of the same shape.
+    // G = 1/(s + 1), k = 4: y = 0.8 (1 - exp(-5 t)); a load of 1 adds 0.2 times the same response.
     let model = pid("plant = { poles = [-1.0] }\nhorizon = 4.0\nload = { time = 2.0, size = 1.0 }");
     let values = [("k", 4.0), ("Ti", f64::INFINITY), ("Td", 0.0)];
     let response = respond(model.as_ref(), &Case::default(), &values, 4.0);
@@ -197,7 +197,7 @@ fn a_sampled_controller_tends_to_the_continuous_one_with_its_period() {
         let response = respond(sampled.as_ref(), &Case::default(), &values, 10.0);
         errors.push((response.trace("y").unwrap().at(1.0) - exact.trace("y").unwrap().at(1.0)).abs());
     }
-    // First order in the period: halving it halves the error.
+    // First order in the period: half the period halves the error.
     assert!(errors[0] < 0.05 && errors[1] / errors[0] < 0.6 && errors[2] / errors[1] < 0.6, "{errors:?}");
 }
 
@@ -207,7 +207,7 @@ fn a_sampled_controller_acts_after_its_delay() {
     let response = respond(model.as_ref(), &Case::default(), &[("k", 2.0), ("Ti", 1.0), ("Td", 0.0)], 1.0);
     let u = response.trace("u").unwrap();
     assert_eq!((u.at(0.03), u.at(0.05)), (0.0, 2.0));
-    // A whole period of delay: the first output acts from the second sample to the third.
+    // Delay of one period: the first output acts from the second sample to the third.
     let model = pid("plant = { poles = [-1.0] }\nhorizon = 1.0\nsample-time = 0.1\ndelay = 0.1");
     let response = respond(model.as_ref(), &Case::default(), &[("k", 2.0), ("Ti", 1.0), ("Td", 0.0)], 1.0);
     let u = response.trace("u").unwrap();
@@ -215,7 +215,7 @@ fn a_sampled_controller_acts_after_its_delay() {
     assert!(u.at(0.21) > 2.0, "the second sample's integral has grown");
 }
 
-/// Lumped parameters from table 4.5 of the thesis, before its rounding.
+/// Lumped parameters from table 4.5 of the thesis, before rounding.
 const FURUTA: [(&str, f64); 4] = [("a", 9.035_24e-4), ("b", 1.133_13e-3), ("c", 6.309_84e-4), ("d", 2.526_663e-2)];
 
 fn furuta(extra: &[(&'static str, f64)], case: &Case, horizon: f64) -> Response {
@@ -224,7 +224,7 @@ fn furuta(extra: &[(&'static str, f64)], case: &Case, horizon: f64) -> Response 
     respond(&Furuta::model(None, tolerance), case, &values, horizon)
 }
 
-/// Kinetic and potential energy, J, by the Lagrangian the equations follow from.
+/// Returns kinetic and potential energy, J, from the Lagrangian of the equations.
 fn energy(response: &Response, t: f64) -> f64 {
     let [phi_rate, theta, theta_rate] = ["dphi", "theta", "dtheta"].map(|s| response.trace(s).unwrap().at(t));
     let [a, b, c, d] = FURUTA.map(|(_, v)| v);
@@ -266,14 +266,15 @@ fn coulomb_friction_brings_the_pendulum_to_rest_and_it_stays_there_exactly() {
         assert_eq!(trace.at(last + 0.5), trace.at(20.0), "{signal} does not creep");
     }
     let theta = response.trace("theta").unwrap().at(20.0);
-    assert!(theta != std::f64::consts::PI, "it rests off centre, held by friction");
+    assert!(theta != std::f64::consts::PI, "the pendulum rests off centre because of friction");
 }
 
 #[test]
 fn a_stuck_arm_breaks_away_when_the_torque_exceeds_its_friction() {
     let ramp = Input::Sampled { times: vec![0.0, 1.0], values: vec![0.0, 4e-3], hold: mops_core::Hold::First };
     let case = Case { inputs: vec![("u".into(), ramp)], ..Case::default() };
-    // Hanging at rest nothing but the torque acts on the arm: it breaks away where the ramp reaches 1e-3, at 0.25 s.
+    // Hanging at rest, only the input torque acts on the arm: the arm breaks away when the ramp reaches 1e-3, at 0.25
+    // s.
     let response = furuta(&[("theta0", std::f64::consts::PI), ("ca", 1e-3)], &case, 1.0);
     let away = response.events.iter().find(|e| e.what == "arm slides").expect("it breaks away");
     assert!((away.time - 0.25).abs() < 1e-9, "{}", away.time);
@@ -282,8 +283,8 @@ fn a_stuck_arm_breaks_away_when_the_torque_exceeds_its_friction() {
 }
 
 #[test]
-fn a_sliding_mass_stops_where_coulomb_friction_says() {
-    // With c = 0 and no gravity the arm is alone: constant deceleration ca/b, stop after w^2 b/(2 ca).
+fn a_sliding_mass_stops_by_coulomb_friction_as_in_the_closed_form() {
+    // With c = 0 and no gravity the arm is decoupled: constant deceleration ca/b, stop after w^2 b/(2 ca).
     let tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::default() };
     let values = [("a", 1.0), ("b", 2.0), ("c", 0.0), ("d", 0.0), ("ca", 0.5), ("dphi0", 1.5)];
     let response = respond(&Furuta::model(None, tolerance), &Case::default(), &values, 10.0);
@@ -293,7 +294,7 @@ fn a_sliding_mass_stops_where_coulomb_friction_says() {
 
 #[test]
 fn a_joint_that_breaks_away_for_a_moment_only_sticks_again() {
-    // Torques that exceed the friction by 1 % for a moment: the arm moves a little and stops, each period.
+    // Torques that exceed the friction by 1 % briefly: in each period the arm moves a little and stops.
     let sine = Input::Sine { amplitude: 1.01e-3, frequency: 2.0, phase: 0.0, offset: 0.0 };
     let case = Case { inputs: vec![("u".into(), sine)], ..Case::default() };
     let response = furuta(&[("theta0", std::f64::consts::PI), ("ca", 1e-3)], &case, 5.0);
@@ -303,7 +304,7 @@ fn a_joint_that_breaks_away_for_a_moment_only_sticks_again() {
 
 #[test]
 fn swings_with_dry_friction_never_chatter() {
-    // Over a grid of frictions and starts every simulation ends, with a moderate number of events.
+    // Over a grid of frictions and initial states every simulation finishes, with a moderate number of events.
     for ca in [1e-4, 7.67e-4, 8.28e-4, 2e-3] {
         for cp in [0.0, 1.2e-4, 1.77e-4] {
             for theta0 in [-2.07, 0.4, 1.68, 3.0] {

@@ -1,4 +1,4 @@
-//! A linear system given by its transfer function.
+//! Linear system given by its transfer function.
 
 use std::collections::BTreeMap;
 
@@ -11,37 +11,38 @@ use serde::Deserialize;
 use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Units, canonical, coherent};
 use crate::rational::from_roots;
 
-/// `G(s) = numerator(s)/denominator(s) exp(-s delay)`, or `gain (s - z1)(s - z2).../((s - p1)(s - p2)...) exp(-s delay)`: a
-/// linear system by its transfer function, for criteria of linear systems.
+/// Linear system given by its transfer function, for criteria of linear systems:
+/// `G(s) = numerator(s)/denominator(s) exp(-s delay)`, or
+/// `gain (s - z1)(s - z2).../((s - p1)(s - p2)...) exp(-s delay)`.
 ///
-/// A coefficient is a number, or an expression whose names are parameters: tuners, cases and the study can set them. As in
-/// `numerator = ["K"]`, `denominator = ["T", 1]`, `delay = "L"`; coefficients belong to falling powers of s.
+/// A coefficient is a number, or an expression whose names are parameters that tuners, cases and the study can set.
+/// Example: `numerator = ["K"]`, `denominator = ["T", 1]`, `delay = "L"`. Coefficients are in descending powers of s.
 ///
-/// The signal is `y`, the input `u`, unless `output` and `input` name them. Their units, and those of parameters, are pure
-/// numbers unless `units` says otherwise. Coefficients are in SI units: parameters are converted to them, and input and output are
-/// declared in them.
+/// The signal is `y` and the input is `u`, unless `output` and `input` name them. Their units, and those of parameters,
+/// are pure numbers unless given in `units`. Coefficients are in SI units: parameters are converted to them, and the
+/// units of input and output must be SI units.
 ///
 /// Source: T. Kailath, Linear Systems (1980), section 2.1.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct TransferFunctionOptions {
-    /// Coefficients of the numerator, falling powers of s.
+    /// Coefficients of the numerator, in descending powers of s.
     numerator: Option<Vec<Entry>>,
-    /// Coefficients of the denominator, falling powers of s.
+    /// Coefficients of the denominator, in descending powers of s.
     denominator: Option<Vec<Entry>>,
-    /// Real zeros, 1/s; go with `poles`.
+    /// Real zeros, 1/s; require `poles`.
     zeros: Option<Vec<Entry>>,
     /// Real poles, 1/s, instead of a denominator.
     poles: Option<Vec<Entry>>,
-    /// Factor before zeros and poles; 1 where absent.
+    /// Factor of zeros and poles; default 1.
     gain: Option<Entry>,
     /// Delay, s; a number or an expression.
     delay: Option<Entry>,
-    /// Name of the input; `u` where absent.
+    /// Name of the input; default `u`.
     input: Option<String>,
-    /// Name of the output; `y` where absent.
+    /// Name of the output; default `y`.
     output: Option<String>,
-    /// Units of parameters, input and output, as in `{ T = "s" }`.
+    /// Units of parameters, input and output, such as `{ T = "s" }`.
     units: BTreeMap<String, String>,
 }
 
@@ -50,7 +51,7 @@ enum Form {
     Roots { zeros: Vec<Bound>, poles: Vec<Bound>, gain: Option<Bound> },
 }
 
-/// The model of the kind `transfer-function`.
+/// Model of the kind `transfer-function`.
 struct Given {
     interface: Interface,
     form: Form,
@@ -76,10 +77,10 @@ impl ModelOptions for TransferFunctionOptions {
             },
             _ => {
                 return Err(Mistake::here(
-                    "a transfer function is given by numerator and denominator, or by poles, zeros and gain",
+                    "expected numerator and denominator, or poles, zeros and gain",
                 )
                 .with_help(
-                    "as in { numerator = [\"K\"], denominator = [\"T\", 1] }, or { gain = \"K\", poles = [0, -4, -1] }",
+                    "for example { numerator = [\"K\"], denominator = [\"T\", 1] }, or { gain = \"K\", poles = [0, -4, -1] }",
                 ));
             }
         };
@@ -89,7 +90,7 @@ impl ModelOptions for TransferFunctionOptions {
         };
         if above == 0 || above > below {
             let fact = format!(
-                "the numerator has order {} and the denominator {}: no system",
+                "expected a proper transfer function, found order {} over order {}",
                 above.saturating_sub(1),
                 below.saturating_sub(1)
             );

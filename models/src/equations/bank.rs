@@ -1,33 +1,33 @@
-//! Registers: where numbers stand while a tape runs.
+//! Registers: storage of numbers while a tape runs.
 
 use mops_core::Scalar;
 
-/// Place of a number.
+/// Index of a register.
 pub type Register = u16;
 
-/// Numbers by register.
+/// Bank of registers.
 pub trait Bank<S> {
-    /// A bank with room for this many.
+    /// Creates a bank of `count` registers.
     fn with(count: usize) -> Self;
-    /// The number in a register.
+    /// Returns the number in a register.
     fn get(&self, register: Register) -> S;
-    /// Writes a register.
+    /// Writes a number to a register.
     fn set(&mut self, register: Register, value: S);
 }
 
-/// Registers whose number fits into a byte.
+/// Number of registers whose index fits into a byte.
 pub const FEW: usize = 256;
 
-/// Room for [`FEW`] registers: an index cannot be out of range, so none is checked.
+/// Bank of [`FEW`] registers: an index cannot be out of range, so it is not checked.
 pub struct Small<S>(Box<[S; FEW]>);
 
-/// Any number of registers.
+/// Bank with any number of registers.
 pub struct Large<S>(Vec<S>);
 
 #[allow(clippy::cast_possible_truncation)]
 impl<S: Scalar> Bank<S> for Small<S> {
     fn with(count: usize) -> Self {
-        assert!(count <= FEW, "the size was looked at");
+        assert!(count <= FEW, "the size was checked");
         Self(Box::new([S::from(0.0); FEW]))
     }
     #[inline(always)]

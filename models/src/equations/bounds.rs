@@ -1,4 +1,4 @@
-//! Tapes run on bounds: what a guard can be over a part of a step.
+//! Tapes evaluated on bounds: the range of a guard over a part of a step.
 
 use mops_core::Scalar;
 use mops_core::enclosure::{Enclosure, Interval};
@@ -48,7 +48,8 @@ impl Program {
     }
 }
 
-/// Elimination with the pivot of the largest certain size, in place; unknown where none is certain.
+/// Solves linear equations by elimination, in place. The pivot has the largest guaranteed magnitude; the result is
+/// unknown if none is certain to be nonzero.
 fn solve(r: &mut [Enclosure], start: usize, n: usize) {
     let cell = |i: usize, j: usize| start + i * n + j;
     let right = |i: usize| start + n * n + i;
@@ -81,7 +82,7 @@ fn solve(r: &mut [Enclosure], start: usize, n: usize) {
     }
 }
 
-/// Registers with bounds: those of parameters, of modes and of what is computed once are the numbers of a bank.
+/// Creates registers with bounds from a bank, whose numbers of parameters, modes and hoisted nodes are used.
 pub fn registers<S: Scalar>(bank: &impl Bank<S>, count: usize) -> Vec<Enclosure> {
     let number = |register: usize| {
         let register = Register::try_from(register).expect("registers were counted with this type");
@@ -90,12 +91,12 @@ pub fn registers<S: Scalar>(bank: &impl Bank<S>, count: usize) -> Vec<Enclosure>
     (0..count).map(number).collect()
 }
 
-/// `-x` where `negative`.
+/// Returns `-x` if `negative`, else `x`.
 pub fn signed(negative: bool, x: Enclosure) -> Enclosure {
     if negative { -x } else { x }
 }
 
-/// `x` with a number added.
+/// Returns `x` with a number added.
 pub fn moved(x: Enclosure, by: f64) -> Enclosure {
     Enclosure { value: x.value + Interval::point(by), rate: x.rate }
 }

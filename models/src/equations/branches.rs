@@ -1,4 +1,4 @@
-//! Functions of expressions in the graph; where they have a kink or a jump, a switch decides over the branch.
+//! Functions of expressions in the graph; at a kink or a jump, a switch selects the branch.
 
 use mops_core::Mistake;
 use mops_core::expression::{Comparison, Form, Function, Node};
@@ -76,22 +76,22 @@ impl Lowering<'_> {
         })
     }
 
-    /// Limits and the x of a table must rise: numbers and constants are refused where they do not; what parameters decide is
-    /// looked at when a simulation begins.
+    /// Checks that limits and the x values of a table increase. Numbers and constants out of order are an error. Those
+    /// that depend on parameters are checked at the start of a simulation.
     fn in_order(&mut self, text: &Text, function: Function, nodes: &[Node], values: &[Id]) -> Result<(), Mistake> {
         let (places, strict): (Vec<usize>, bool) = match function {
             Function::Clip | Function::Deadzone => (vec![1, 2], false),
             Function::Table => ((1..values.len()).step_by(2).collect(), true),
             _ => return Ok(()),
         };
-        let what = if strict { "the x of a `table`" } else { "the limits" };
+        let what = if strict { "the x values" } else { "the limits" };
         for pair in places.windows(2) {
             let (low, high) = (values[pair[0]], values[pair[1]]);
             let wrong = |low: f64, high: f64| low > high || strict && low == high;
             match (self.graph.constant(low), self.graph.constant(high)) {
                 (Some(a), Some(b)) if wrong(a, b) => {
-                    let fact = format!("{what} must rise, but {b} follows {a}");
-                    let mistake = Mistake::here(fact).with_help("write the smaller one first");
+                    let fact = format!("{what} of `{}` must increase, found {b} after {a}", function.name());
+                    let mistake = Mistake::here(fact).with_help("write the smaller value first");
                     return Err(under(&text.path, mistake.at(nodes[pair[1]].span.clone())));
                 }
                 (Some(_), Some(_)) => {}
@@ -106,7 +106,7 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    /// `table(x, x1, y1, ..)`: the line that holds is found from the left.
+    /// Adds `table(x, x1, y1, ..)`: segments are selected from the left.
     fn table(&mut self, x: Id, points: &[Id], kinks: Kinks) -> Id {
         let lines = points.len() / 2 - 1;
         let mut value = None;
@@ -125,16 +125,16 @@ impl Lowering<'_> {
                 }
             });
         }
-        value.expect("the reader asks for two points")
+        value.expect("the parser requires two points")
     }
 
-    /// `if(condition, a, .., otherwise)`.
+    /// Adds `if(condition, a, .., otherwise)`.
     fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
         let branch = |lowering: &mut Self, node: &Node| {
             let affine = lowering.node(text, node, kinks)?;
             lowering.without_rates(text, &node.span, affine, "in `if`")
         };
-        let (otherwise, pairs) = arguments.split_last().expect("the reader asks for three arguments");
+        let (otherwise, pairs) = arguments.split_last().expect("the parser requires three arguments");
         let mut value = branch(self, otherwise)?;
         for pair in pairs.chunks_exact(2).rev() {
             let here = branch(self, &pair[1])?;
@@ -143,7 +143,7 @@ impl Lowering<'_> {
         Ok(value)
     }
 
-    /// `a` where the condition holds, else `b`.
+    /// Adds a selection: `a` if the condition is true, else `b`.
     fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, Mistake> {
         match &condition.form {
             Form::Compare(comparison, left, right) => {
@@ -158,16 +158,17 @@ impl Lowering<'_> {
             Form::All(conditions) => conditions.iter().rev().try_fold(a, |a, of| self.decide(text, of, a, b)),
             Form::Any(conditions) => conditions.iter().rev().try_fold(b, |b, of| self.decide(text, of, a, b)),
             Form::Not(inner) => self.decide(text, inner, b, a),
-            _ => unreachable!("the reader asks for a condition"),
+            _ => unreachable!("the parser requires a condition"),
         }
     }
 
-    /// The kink where `a` and `b` meet: positive where `a >= b`.
+    /// Adds the kink at which `a` and `b` meet: positive if `a >= b`.
     fn at_least(&mut self, a: Id, b: Id, kinks: Kinks) -> Id {
         self.condition(Comparison::AtLeast, a, b, false, kinks)
     }
 
-    /// A node that is positive where the condition holds; a switch, unless only parameters decide.
+    /// Adds a node that is positive if the condition is true: the mode of a switch, unless the condition depends on
+    /// parameters only.
     fn condition(&mut self, comparison: Comparison, a: Id, b: Id, jumps: bool, kinks: Kinks) -> Id {
         if self.graph.level(a).max(self.graph.level(b)) < Level::Variable {
             return self.graph.holds(comparison, a, b);

@@ -1,4 +1,4 @@
-//! A model ready to run: one tape for the derivatives, and small ones for guards, resets and signals.
+//! Compiled model: one tape for the derivatives, and small tapes for guards, resets and signals.
 
 use mops_core::Mistake;
 
@@ -9,101 +9,102 @@ use super::system::{Contact, System};
 use super::tape::compile;
 use crate::kernel::groups;
 
-/// Where a signal comes from.
+/// Source of a signal.
 #[derive(Debug)]
 pub enum Signal {
-    /// It is a state.
+    /// A state.
     State(usize),
-    /// It is an input.
+    /// An input.
     Input(usize),
-    /// It is computed.
+    /// A computed signal.
     Tape(Program),
 }
 
-/// A condition that switches branches.
+/// Condition that switches branches.
 #[derive(Debug)]
 pub struct Switch {
-    /// Mode: 1 while it holds.
+    /// Mode: 1 while the condition is true.
     pub mode: usize,
-    /// Whether equality does not count.
+    /// True if equality does not satisfy the condition.
     pub strict: bool,
-    /// Whether the branches differ where they meet.
+    /// True if the branches differ where they meet.
     pub jumps: bool,
-    /// Gives the difference of the sides of the condition, and its right side.
+    /// Computes the difference of the sides of the condition, and its right side.
     pub sides: Program,
 }
 
-/// Dry friction.
+/// Joint with dry friction.
 #[derive(Debug)]
 pub struct Joint {
     /// States and modes.
     pub contact: Contact,
-    /// Gives the torque that holds it, what breaks it away, friction while it slides, and its acceleration.
+    /// Computes the torque that the stuck joint requires, its break-away torque, its sliding friction and its
+    /// acceleration.
     pub balance: Program,
-    /// What is reported where it comes to rest.
+    /// Event text when the joint comes to rest.
     pub sticks: String,
-    /// What is reported where it breaks away.
+    /// Event text when the joint breaks away.
     pub slides: String,
 }
 
-/// An event of the user's.
+/// Event defined by the user.
 #[derive(Debug)]
 pub struct Happening {
-    /// Its name.
+    /// Name of the event.
     pub name: String,
-    /// Gives its guard.
+    /// Computes the guard.
     pub guard: Program,
-    /// Gives the new values of these states.
+    /// States that the event resets; computes their new values.
     pub resets: (Vec<usize>, Program),
-    /// Gives the values of these states where its events accumulate; no states where nothing is known of a rest.
+    /// States with a rest value; computes the values at which accumulating events end. Empty if the study gives none.
     pub at_rest: (Vec<usize>, Program),
-    /// What is reported where it comes to rest.
+    /// Event text when the states come to rest.
     pub rests: String,
-    /// What is reported where it leaves its rest.
+    /// Event text when the states leave rest.
     pub leaves: String,
 }
 
-/// A compiled model.
+/// Compiled model.
 #[derive(Debug)]
 pub struct Compiled {
     /// Number of states.
     pub states: usize,
-    /// Their typical sizes, where they are declared.
+    /// Typical sizes of the states, if declared.
     pub scales: Vec<Option<f64>>,
-    /// Number of parameters of the equations, without those that only are start values.
+    /// Number of parameters of the equations, excluding those that are only initial values.
     pub parameters: usize,
-    /// Whether forces from outside enter its equations, as inputs after the others.
+    /// True if the equations contain external forces, as inputs after the others.
     pub takes_forces: bool,
-    /// Registers.
+    /// Assignment of registers.
     pub layout: Layout,
-    /// Runs once in a simulation, when parameters are known.
+    /// Tape that runs once per simulation, when the parameters are known.
     pub setup: Program,
-    /// Gives the derivatives.
+    /// Computes the derivatives.
     pub derivative: Program,
     /// Signals.
     pub signals: Vec<Signal>,
     /// Conditions.
     pub switches: Vec<Switch>,
-    /// What must rise for a message and whether strictly; gives pairs of low and high.
+    /// Arguments that must increase: description and whether strictly; computes pairs of low and high.
     pub orders: (Vec<(String, bool)>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,
     /// Events.
     pub happenings: Vec<Happening>,
-    /// Gives the start values that are expressions; their states.
+    /// States whose initial values are expressions; computes these values.
     pub starts: (Vec<usize>, Program),
-    /// Gives the entries of matrices; their sizes.
+    /// Computes the entries of the matrices of equations solved together.
     pub matrices: Vec<Program>,
-    /// Which state a derivative depends on: derivative, state.
+    /// Pairs of derivative and state in which the derivative depends on the state.
     pub pattern: Vec<(usize, usize)>,
-    /// Columns of the Jacobian in groups that share no row: column, its rows.
+    /// Groups of columns of the Jacobian that share no row.
     pub columns: Vec<Vec<Column>>,
 }
 
-/// A column of the Jacobian, and its rows.
+/// Column of the Jacobian, and its rows.
 pub type Column = (usize, Vec<usize>);
 
-/// Groups of columns of which no two meet in a row.
+/// Groups the columns of the Jacobian so that no two columns of a group share a row.
 fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
     let mut rows = vec![Vec::new(); states];
     for &(row, column) in pattern {
@@ -114,10 +115,10 @@ fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
 }
 
 impl Compiled {
-    /// Compiles a model whose states have these names, with a number of inputs, of forces from outside, and of parameters.
+    /// Compiles a model with these names of states and these numbers of inputs, external forces and parameters.
     ///
     /// # Errors
-    /// A model with more than 65536 numbers at a time.
+    /// The model needs more than 65536 registers.
     pub fn new(
         system: &System,
         names: &[&str],
@@ -146,13 +147,13 @@ impl Compiled {
         wanted.extend(system.signals.iter().map(|&id| vec![id]));
 
         let too_large = |_| {
-            Mistake::new("states", "the model needs more than 65536 numbers at a time")
-                .with_help("a model of this size is written in Rust")
+            Mistake::new("states", "the model needs more than 65536 registers")
+                .with_help("write a model of this size in Rust")
         };
         let mut layout = Layout::new(parameters, names.len(), inputs + forces, system.modes).map_err(too_large)?;
         let (setup, programs) = compile(&graph, &mut layout, &wanted).map_err(too_large)?;
         let mut programs = programs.into_iter();
-        let mut next = || programs.next().expect("there is a tape for everything wanted");
+        let mut next = || programs.next().expect("every request has a tape");
         let derivative = next();
         let switches =
             system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
@@ -172,7 +173,7 @@ impl Compiled {
             resets: (states(&h.resets), next()),
             at_rest: (states(&h.at_rest), next()),
             rests: format!("{}: at rest", h.name),
-            leaves: format!("{}: leaves its rest", h.name),
+            leaves: format!("{}: leaves rest", h.name),
         };
         let happenings = system.happenings.iter().map(happening).collect();
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());

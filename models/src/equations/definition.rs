@@ -1,4 +1,4 @@
-//! What the tables say, with every family unrolled and every expression read.
+//! Definition of a model: its tables, with every family expanded and every expression parsed.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -10,90 +10,90 @@ use mops_core::{Mistake, Quantity, Unit, suggestion};
 use super::key::{Index, Key, member};
 use super::options::{EquationsOptions, Formula};
 
-/// An expression or equation, with the way to its place in the study.
+/// Expression or equation, with its path in the study.
 #[derive(Debug, Clone)]
 pub struct Text {
-    /// Keys from the options down.
+    /// Keys from the options to the expression.
     pub path: Vec<String>,
-    /// What it says.
+    /// Parsed expression or equation.
     pub equation: Arc<Equation>,
-    /// Name and value of the index, in a family.
+    /// Name and value of the index, within a family.
     pub index: Option<(String, i64)>,
 }
 
-/// A state, an input or a signal.
+/// State, input or signal.
 #[derive(Debug, Clone)]
 pub struct Declared {
     /// Name.
     pub name: String,
     /// Unit.
     pub unit: Unit,
-    /// Whether no unit was declared: it is the coherent one of what the equations ask for.
+    /// True if no unit was declared: the unit is then the coherent one that the equations require.
     pub open: bool,
-    /// What it is.
+    /// Description.
     pub about: String,
-    /// Section and key under which it stands.
+    /// Section and key of the declaration.
     pub path: Vec<String>,
 }
 
-/// A parameter.
+/// Parameter of the model.
 #[derive(Debug, Clone)]
 pub struct Settable {
-    /// Name, unit, meaning.
+    /// Name, unit and description.
     pub quantity: Declared,
-    /// Value where the study gives none.
+    /// Default value.
     pub default: Option<f64>,
-    /// Smallest and largest value.
+    /// Lower and upper bound.
     pub range: [f64; 2],
 }
 
-/// A number that never changes.
+/// Constant of the model.
 #[derive(Debug, Clone)]
 pub struct Constant {
     /// Name.
     pub name: String,
     /// Value in the coherent unit.
     pub value: f64,
-    /// Unit, where one was declared.
+    /// Unit, if one was declared.
     pub unit: Option<Unit>,
-    /// Section and key under which it stands.
+    /// Section and key of the declaration.
     pub path: Vec<String>,
 }
 
 /// Friction of a joint.
 #[derive(Debug, Clone)]
 pub struct Friction {
-    /// Its position or its speed.
+    /// Position or speed of the joint.
     pub of: String,
-    /// Where it stands.
+    /// Path in the study.
     pub path: Vec<String>,
     /// Dry friction.
     pub coulomb: Option<Text>,
     /// Viscous friction.
     pub viscous: Option<Text>,
-    /// Break-away over sliding friction.
+    /// Ratio of break-away to sliding friction.
     pub peak: Option<Text>,
 }
 
-/// Something that happens when its guard becomes negative.
+/// Event that occurs when its guard becomes negative.
 #[derive(Debug, Clone)]
 pub struct When {
     /// Name.
     pub name: String,
-    /// Its guard.
+    /// Guard of the event.
     pub guard: Text,
     /// New values of states.
     pub resets: Vec<(String, Text)>,
-    /// Values of states at which its events end where they accumulate.
+    /// Values of states at which accumulating events end.
     pub at_rest: Vec<(String, Text)>,
 }
 
-/// A model as it is written, checked as far as one table at a time tells.
+/// Definition of a model, checked as far as each table allows on its own.
 #[derive(Debug, Clone, Default)]
 pub struct Definition {
     /// States, in order.
     pub states: Vec<Declared>,
-    /// Their typical sizes, where they are declared.
+    /// Typical sizes of the states, if declared.
     pub scales: Vec<Option<f64>>,
     /// Inputs, in order.
     pub inputs: Vec<Declared>,
@@ -103,23 +103,23 @@ pub struct Definition {
     pub constants: Vec<Constant>,
     /// Named expressions.
     pub lets: Vec<(String, Text)>,
-    /// Derivatives by state.
+    /// Equations of the derivatives, by state.
     pub der: BTreeMap<String, Text>,
-    /// Entries of the mass matrix: row, column.
+    /// Entries of the mass matrix: row, column, expression.
     pub mass: Vec<(String, String, Text)>,
     /// Further signals.
     pub outputs: Vec<(Declared, Text)>,
-    /// Values at the start, by state.
+    /// Initial values, by state.
     pub start: BTreeMap<String, Text>,
     /// Friction elements.
     pub friction: Vec<Friction>,
     /// Events.
     pub when: Vec<When>,
-    /// Names of joints: name, position, where it stands.
+    /// Names of joints: name, position, path in the study.
     pub ports: Vec<(String, String, Vec<String>)>,
 }
 
-/// Puts a mistake under these keys.
+/// Prepends keys to the path of a mistake.
 pub fn under(path: &[String], mistake: Mistake) -> Mistake {
     path.iter().rev().fold(mistake, |mistake, key| mistake.within(key))
 }
@@ -129,7 +129,7 @@ fn path(keys: &[&str]) -> Vec<String> {
 }
 
 impl Text {
-    /// Reads a formula that stands under these keys.
+    /// Parses a formula that has this path.
     pub(super) fn read(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
         let read = equation(&formula.0);
         let equation =
@@ -137,13 +137,13 @@ impl Text {
         Ok(Self { path, equation: Arc::new(equation), index })
     }
 
-    /// An expression that may not be an equation.
+    /// Parses an expression; an equation is an error.
     fn expression(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
         let text = Self::read(path, formula, index)?;
         match &text.equation.left {
             Some(left) => Err(under(
                 &text.path,
-                Mistake::here("an equation stands where an expression is expected")
+                Mistake::here("expected an expression, found an equation")
                     .with_help("only `der` takes equations; a comparison is written `>=` or `<=`")
                     .at(left.span.start..text.equation.right.span.end),
             )),
@@ -153,7 +153,7 @@ impl Text {
 }
 
 impl Text {
-    /// Whether it is made of numbers without units alone; pi is in rad.
+    /// Returns true if the text consists only of numbers without units; pi is in rad.
     pub(super) fn is_bare(&self) -> bool {
         let mut bare = self.equation.left.is_none();
         self.equation.right.walk(&mut |node| {
@@ -167,13 +167,13 @@ impl Text {
     }
 }
 
-const HELP: &str = "`mops describe equations` tells how expressions are written";
+const HELP: &str = "see `mops describe equations` for the syntax of expressions";
 
 impl Definition {
     /// Reads the tables.
     ///
     /// # Errors
-    /// The first key, unit or expression that is wrong, with its place.
+    /// The first wrong key, unit or expression, with its path.
     pub fn read(options: &EquationsOptions) -> Result<Self, Mistake> {
         let mut d = Self::default();
         for (key, state) in &options.states.0 {
@@ -188,14 +188,16 @@ impl Definition {
             d.states.extend(states);
         }
         if d.states.is_empty() {
-            return Err(Mistake::new("states", "the model has no state").with_help("as in states = { x = \"m\" }"));
+            return Err(
+                Mistake::new("states", "the model has no state").with_help("for example states = { x = \"m\" }")
+            );
         }
         for (key, input) in &options.inputs.0 {
             d.inputs.extend(declared("inputs", key, &input.0.unit, input.0.about.as_deref())?);
         }
         for (key, parameter) in &options.parameters.0 {
             let parameter = &parameter.0;
-            // Without a unit of its own it has that of its values, where they have one.
+            // A parameter without a declared unit has the unit of its values, if they have one.
             let given = [&parameter.default, &parameter.min, &parameter.max].into_iter().flatten();
             let given = given.filter_map(|quantity| quantity.unit.as_ref()).next().map(ToString::to_string);
             let unit = given.filter(|_| parameter.unit.trim().is_empty()).unwrap_or_else(|| parameter.unit.clone());
@@ -226,7 +228,7 @@ impl Definition {
         for (key, output) in &options.outputs.0 {
             let unit = output.0.unit.as_deref().unwrap_or_default();
             let [declared] = <[Declared; 1]>::try_from(declared("outputs", key, unit, output.0.about.as_deref())?)
-                .map_err(|_| under(&path(&["outputs", key]), Mistake::here("an output is one signal")))?;
+                .map_err(|_| under(&path(&["outputs", key]), Mistake::here("an output must be a single signal")))?;
             let text = Text::expression(declared.path.clone(), &output.0.value, None)?;
             d.outputs.push((declared, text));
         }
@@ -265,8 +267,8 @@ impl Definition {
             if !self.der.contains_key(&state.name) {
                 return Err(under(
                     &state.path,
-                    Mistake::here(format!("nothing gives the derivative of `{}`", state.name))
-                        .with_help(format!("add it to `der`, as in \"{}\" = \"...\"", state.name)),
+                    Mistake::here(format!("state `{}` has no equation", state.name))
+                        .with_help(format!("add it to `der`, for example \"{}\" = \"...\"", state.name)),
                 ));
             }
         }
@@ -278,8 +280,8 @@ impl Definition {
         for (key, formula) in &options.mass.0 {
             let place = path(&["mass", key]);
             let (row, column) = key.split_once(',').ok_or_else(|| {
-                under(&place, Mistake::here(format!("the key `{key}` does not name a row and a column")))
-                    .with_help("write two states with a comma between them: \"w,w\" = \"J\"")
+                under(&place, Mistake::here(format!("expected a row and a column, found `{key}`")))
+                    .with_help("write two states separated by a comma: \"w,w\" = \"J\"")
             })?;
             let (row, column) = (row.trim().to_owned(), column.trim().to_owned());
             for name in [&row, &column] {
@@ -331,7 +333,7 @@ impl Definition {
 }
 
 fn counts_in(unit: &Unit) -> String {
-    format!("a number without a unit counts in `{unit}`")
+    format!("a number without a unit is read in `{unit}`")
 }
 
 fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, Mistake> {
@@ -349,7 +351,8 @@ fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result
     Ok(names.into_iter().map(declare).collect())
 }
 
-/// Texts by state: those with a key of their own first, then what a key says of all that are left.
+/// Collects texts by state: first from keys that name states, then from keys that apply to all remaining members of a
+/// family.
 fn by_state(
     section: &str,
     entries: &[(String, Formula)],
@@ -381,7 +384,7 @@ fn by_state(
             let text = read(place.clone(), formula, index)?;
             if texts.insert(name.clone(), text).is_some() {
                 return Err(under(&place, Mistake::here(format!("`{name}` is defined twice")))
-                    .with_help("let the members of each key be different ones"));
+                    .with_help("the members given by different keys must not overlap"));
             }
         }
     }
@@ -393,7 +396,7 @@ fn by_state(
         let all: Vec<(&str, i64)> = all.collect();
         if all.is_empty() {
             return Err(under(&place, Mistake::here(format!("the model has no states `{family}[..]`")))
-                .with_help(format!("declare them, as in states = {{ \"{family}[1..100]\" = \"K\" }}")));
+                .with_help(format!("declare them, for example states = {{ \"{family}[1..100]\" = \"K\" }}")));
         }
         for (name, k) in all {
             if !texts.contains_key(name) {

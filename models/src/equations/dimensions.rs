@@ -1,4 +1,4 @@
-//! Dimensions of the whole model: every expression is measured, and what has no unit gets one.
+//! Dimensional analysis of the whole model: checks every expression and determines missing units.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -10,21 +10,21 @@ use mops_core::{Mistake, Unit};
 use super::definition::{Declared, Definition, Text, under};
 use super::key::member;
 
-/// What the equations say of units.
+/// Units determined from the equations.
 #[derive(Debug)]
 pub struct Measured {
     /// Units of the terms in the equations of the states.
     pub forces: Vec<Unit>,
-    /// How numbers and quantities without units were read.
+    /// Readings of numbers and quantities without units.
     pub notes: Vec<String>,
-    /// Units of states, inputs, parameters and constants that were declared without one.
+    /// Units of states, inputs, parameters and constants that were declared without a unit.
     names: HashMap<String, Unit>,
     /// Units of the outputs.
     outputs: Vec<Unit>,
 }
 
 impl Measured {
-    /// Gives their units to what was declared without.
+    /// Assigns units to the quantities that were declared without a unit.
     pub fn declare(&self, d: &mut Definition) {
         let parameters = d.parameters.iter_mut().map(|p| &mut p.quantity);
         for quantity in d.states.iter_mut().chain(&mut d.inputs).chain(parameters) {
@@ -38,10 +38,10 @@ impl Measured {
     }
 }
 
-/// Measures every expression of the model; `joints` are pairs of a position and its speed.
+/// Checks the dimensions of every expression of the model; `joints` are pairs of a position and its speed.
 ///
 /// # Errors
-/// The first part that does not fit, at its place.
+/// The first part with a wrong dimension, with its position.
 pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mistake> {
     let mut model = Model::new(d);
     for (_, text) in &d.lets {
@@ -51,13 +51,13 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
     let state = |name: &String| d.states.iter().position(|s| s.name == *name).expect("names of states were checked");
     for (row, column, text) in &d.mass {
         let mass = forces[state(row)].times(&model.rate(column), -1.0);
-        model.fits(&mass, text, "a mass times a derivative has the dimension of the equation")?;
+        model.fits(&mass, text, "a mass times a derivative must have the dimension of the equation")?;
     }
     for (k, (_, text)) in d.outputs.iter().enumerate() {
-        model.fits(&model.outputs[k].clone(), text, "an output has the dimension of its unit")?;
+        model.fits(&model.outputs[k].clone(), text, "an output must have the dimension of its unit")?;
     }
     for (state, text) in d.start.iter().filter(|(_, text)| !text.is_bare()) {
-        model.fits(&model.names[state].clone(), text, "a start value has the dimension of its state")?;
+        model.fits(&model.names[state].clone(), text, "an initial value must have the dimension of its state")?;
     }
     for friction in &d.friction {
         let of = state(&friction.of);
@@ -65,9 +65,13 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
         let force = &forces[velocity];
         let viscous = force.times(&model.names[&d.states[velocity].name], -1.0);
         let wanted = [
-            (&friction.coulomb, force, "dry friction has the dimension of the terms of the equation"),
-            (&friction.viscous, &viscous, "viscous friction times the speed is a term of the equation"),
-            (&friction.peak, &Measure::pure(), "a ratio is a pure number"),
+            (&friction.coulomb, force, "dry friction must have the dimension of the terms of the equation"),
+            (
+                &friction.viscous,
+                &viscous,
+                "viscous friction times the speed must have the dimension of the terms of the equation",
+            ),
+            (&friction.peak, &Measure::pure(), "a ratio must be a pure number"),
         ];
         for (text, measure, rule) in wanted {
             text.as_ref().map_or(Ok(()), |text| model.fits(measure, text, rule))?;
@@ -76,27 +80,31 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mist
     for when in &d.when {
         model.measure(&when.guard)?;
         for (state, text) in when.resets.iter().chain(&when.at_rest) {
-            model.fits(&model.names[state].clone(), text, "the new value of a state has its dimension")?;
+            model.fits(
+                &model.names[state].clone(),
+                text,
+                "the new value of a state must have the dimension of the state",
+            )?;
         }
     }
     Ok(model.measured(&forces))
 }
 
-/// The quantities of a model, and what they measure.
+/// Quantities of a model and their dimensions.
 struct Model<'d> {
     definition: &'d Definition,
     dimensions: Dimensions,
-    /// States, inputs, parameters, constants, and definitions once they were measured.
+    /// Dimensions of states, inputs, parameters, constants, and of definitions once determined.
     names: HashMap<String, Measure>,
     outputs: Vec<Measure>,
     lets: HashMap<&'d str, &'d Text>,
     constants: HashMap<&'d str, f64>,
     time: Measure,
-    /// Numbers that count in coherent units, by their places and what they are.
+    /// Numbers read in coherent units, by path, position and text.
     counted: BTreeMap<(String, usize, String), Open>,
 }
 
-/// Whether everything in the model is declared as a pure number: then time is one, too.
+/// Returns true if all quantities of the model are declared as pure numbers; time is then a pure number, too.
 fn is_dimensionless(d: &Definition) -> bool {
     let frictions = d.friction.iter().flat_map(|f| [&f.coulomb, &f.viscous, &f.peak]).flatten();
     let events = d
@@ -149,7 +157,8 @@ impl<'d> Model<'d> {
     }
 
     fn within<T>(&mut self, text: &Text, f: impl FnOnce(&mut Dimensions, &mut Within<'_, 'd>) -> T) -> T {
-        // What was found so far is taken along, as the quantities that an expression names may be measured on the way.
+        // The dimensions are moved into the closure, which may determine the dimensions of quantities that the
+        // expression names.
         let mut dimensions = std::mem::take(&mut self.dimensions);
         let found = f(&mut dimensions, &mut Within { model: self, text });
         self.dimensions = dimensions;
@@ -164,7 +173,7 @@ impl<'d> Model<'d> {
         self.within(text, |dimensions, within| dimensions.fits(within, what, &text.equation.right, rule))
     }
 
-    /// What the terms in the equation of a state measure.
+    /// Determines the dimension of the terms in the equation of a state.
     fn force(&mut self, state: &str) -> Result<Measure, Mistake> {
         let text = &self.definition.der[state];
         if let Some(left) = &text.equation.left {
@@ -172,7 +181,7 @@ impl<'d> Model<'d> {
         }
         let has_mass = self.definition.mass.iter().any(|(row, ..)| row == state);
         let force = if has_mass { self.dimensions.open(&format!("der.{state}")) } else { self.rate(state) };
-        self.fits(&force, text, "a derivative has the dimension of its state over time")?;
+        self.fits(&force, text, "a derivative must have the dimension of its state divided by time")?;
         Ok(force)
     }
 
@@ -199,7 +208,7 @@ impl<'d> Model<'d> {
         without.sort();
         let notes = [
             ("numbers without a unit, read in SI units", numbers.collect::<Vec<_>>()),
-            ("units found from the equations", without),
+            ("units derived from the equations", without),
         ];
         let notes = notes.into_iter().filter(|(_, list)| !list.is_empty());
         Measured {
@@ -211,7 +220,7 @@ impl<'d> Model<'d> {
     }
 }
 
-/// One expression of the model.
+/// Expression within the model.
 struct Within<'m, 'd> {
     model: &'m mut Model<'d>,
     text: &'m Text,
@@ -228,7 +237,7 @@ impl Quantities for Within<'_, '_> {
                 let state = self.measure(dimensions, of)?;
                 return Ok(state.rate(&self.model.time));
             }
-            _ => unreachable!("only what has a name is looked up"),
+            _ => unreachable!("only names are looked up"),
         };
         if self.text.index.as_ref().is_some_and(|(index, _)| *index == name) {
             return Ok(Measure::pure());
@@ -266,14 +275,14 @@ impl Quantities for Within<'_, '_> {
 }
 
 impl Within<'_, '_> {
-    /// The index of a member; it was checked when the expression was lowered.
+    /// Evaluates the index of a member, which was checked when the expression was lowered.
     #[allow(clippy::cast_possible_truncation)]
     fn index(&self, node: &Node) -> i64 {
         node.evaluate(&|name: &str| self.constant(name).unwrap_or(f64::NAN)) as i64
     }
 }
 
-/// Whether a number in it has a unit that is no pure number.
+/// Returns true if a number in the text has a unit other than that of a pure number.
 fn has_units(text: &Text) -> bool {
     let mut found = false;
     for side in text.equation.left.iter().chain(std::iter::once(&text.equation.right)) {

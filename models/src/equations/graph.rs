@@ -1,63 +1,63 @@
-//! Equations as a graph without repetition: constants folded, common subexpressions shared, products in one order.
+//! Expression graph without repetition: constants folded, common subexpressions shared, products in canonical order.
 
 use std::collections::HashMap;
 
 use mops_core::expression::{Comparison, Function, functions};
 use mops_core::math;
 
-/// A node of the graph; nodes come after those they are made of.
+/// Index of a node of the graph; nodes come after their operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Id(u32);
 
-/// What a node computes.
+/// Operation of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Op {
-    /// A number, by its bits.
+    /// Number, by its bits.
     Constant(u64),
-    /// A parameter of the model.
+    /// Parameter of the model.
     Parameter(usize),
-    /// A state.
+    /// State of the model.
     State(usize),
-    /// An input.
+    /// Input of the model.
     Input(usize),
     /// Time, s.
     Time,
-    /// A number that events change: 1 or 0 of a switch, the direction of a contact.
+    /// Number that events change: 1 or 0 of a switch, or the direction of a contact.
     Mode(usize),
-    /// `a + b`.
+    /// Sum `a + b`.
     Add(Id, Id),
-    /// `a - b`.
+    /// Difference `a - b`.
     Sub(Id, Id),
-    /// `a b`.
+    /// Product `a b`.
     Mul(Id, Id),
-    /// `a / b`.
+    /// Quotient `a / b`.
     Div(Id, Id),
-    /// `a^b`.
+    /// Power `a^b`.
     Power(Id, Id),
-    /// A smooth function of one argument.
+    /// Smooth function of one argument.
     Function(Function, Id),
     /// Angle of the point (second, first).
     Atan2(Id, Id),
-    /// 1 where the comparison holds, as it stands, else 0.
+    /// Comparison: 1 if it is true for the current values, else 0.
     Holds(Comparison, Id, Id),
-    /// The second where the first is positive, else the third.
+    /// Selection: the second operand if the first is positive, else the third.
     Choose(Id, Id, Id),
-    /// One unknown of a block of linear equations.
+    /// Unknown of a block of linear equations, by block and index.
     Solution(usize, usize),
 }
 
-/// On what a node depends.
+/// Dependence of a node on quantities that vary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// Nothing: it is a number.
+    /// Nothing: the node is a number.
     Constant,
-    /// Parameters: it is computed once in a simulation.
+    /// Parameters only: the node is evaluated once per simulation.
     Parameter,
     /// States, inputs, time or modes.
     Variable,
 }
 
-/// `matrix unknowns = right`, row by row.
+/// Block of linear equations, `matrix unknowns = right`.
 #[derive(Debug, Clone)]
 pub struct Block {
     /// Coefficients, row by row.
@@ -66,11 +66,12 @@ pub struct Block {
     pub right: Vec<Id>,
 }
 
-/// Factors up to which a product within a product is taken apart; one of more is a single factor. A definition that squares
-/// the one before has `2^n` of them, and no model that is written by hand comes near.
+/// Limit on the number of factors up to which a nested product is expanded; a larger product remains a single factor. A
+/// chain of `n` definitions that each square the previous one has `2^n` factors. Models written by hand do not reach
+/// the limit.
 const TAKEN_APART: usize = 1000;
 
-/// All nodes.
+/// Expression graph.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     nodes: Vec<(Op, Level)>,
@@ -80,17 +81,17 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// What a node computes.
+    /// Returns the operation of a node.
     pub fn op(&self, id: Id) -> Op {
         self.nodes[id.0 as usize].0
     }
 
-    /// On what it depends.
+    /// Returns the dependence of a node.
     pub fn level(&self, id: Id) -> Level {
         self.nodes[id.0 as usize].1
     }
 
-    /// The nodes that a node is made of.
+    /// Returns the operands of a node.
     pub fn operands(&self, id: Id) -> Vec<Id> {
         match self.op(id) {
             Op::Constant(_) | Op::Parameter(_) | Op::State(_) | Op::Input(_) | Op::Time | Op::Mode(_) => Vec::new(),
@@ -104,17 +105,17 @@ impl Graph {
         }
     }
 
-    /// The number, if it is one.
+    /// Returns the value of a node that is a number.
     pub fn constant(&self, id: Id) -> Option<f64> {
         if let Op::Constant(bits) = self.op(id) { Some(f64::from_bits(bits)) } else { None }
     }
 
-    /// Whether it is this number.
+    /// Returns true if the node is this number.
     pub fn is(&self, id: Id, number: f64) -> bool {
         self.constant(id) == Some(number)
     }
 
-    /// A node without rewriting.
+    /// Adds a node without simplification.
     pub fn add_op(&mut self, op: Op) -> Id {
         if let Some(&id) = self.known.get(&op) {
             return id;
@@ -133,9 +134,9 @@ impl Graph {
         id
     }
 
-    /// A number.
+    /// Adds a number.
     pub fn number(&mut self, value: f64) -> Id {
-        // -0.0 and 0.0 are one number here.
+        // -0.0 and 0.0 are the same number here.
         self.add_op(Op::Constant((value + 0.0).to_bits()))
     }
 
@@ -144,7 +145,7 @@ impl Graph {
         Some(self.number(value))
     }
 
-    /// `a + b`.
+    /// Adds the sum `a + b`.
     pub fn add(&mut self, a: Id, b: Id) -> Id {
         if self.is(a, 0.0) {
             return b;
@@ -159,7 +160,7 @@ impl Graph {
         }
     }
 
-    /// `a - b`.
+    /// Adds the difference `a - b`.
     pub fn sub(&mut self, a: Id, b: Id) -> Id {
         if self.is(b, 0.0) {
             return a;
@@ -170,7 +171,7 @@ impl Graph {
         if a == b {
             return self.number(0.0);
         }
-        // Zeros of temperature scales cancel, and round nothing.
+        // Offsets of temperature scales cancel exactly, without rounding.
         if let Op::Add(x, p) = self.op(a)
             && p == b
             && self.constant(p).is_some()
@@ -189,7 +190,7 @@ impl Graph {
         }
     }
 
-    /// `x` where the node is `-x`.
+    /// Returns `x` if the node is `-x`.
     fn negated(&mut self, id: Id) -> Option<Id> {
         match self.op(id) {
             Op::Mul(minus, x) if self.is(minus, -1.0) => Some(x),
@@ -197,7 +198,7 @@ impl Graph {
         }
     }
 
-    /// `-a`.
+    /// Adds the negative `-a`.
     pub fn negative(&mut self, a: Id) -> Id {
         if let Op::Sub(x, y) = self.op(a) {
             return self.sub(y, x);
@@ -206,13 +207,13 @@ impl Graph {
         self.mul(minus, a)
     }
 
-    /// `a b`, as [`Graph::product`] has it.
+    /// Adds the product `a b`, ordered by [`Graph::product`].
     pub fn mul(&mut self, a: Id, b: Id) -> Id {
         self.product(a, &[b])
     }
 
-    /// The product of all: factors that only depend on parameters are brought together, the others stand in one order,
-    /// those with most work in them first, so that products share what they have in common.
+    /// Adds the product of all factors. Factors that depend on parameters only are combined. The others are put in a
+    /// fixed order, the newest nodes first, so that products share common parts.
     pub fn product(&mut self, first: Id, rest: &[Id]) -> Id {
         let factors: Vec<Id> = std::iter::once(&first).chain(rest).flat_map(|&id| self.factors(id)).collect();
         let (mut variable, fixed): (Vec<Id>, Vec<Id>) =
@@ -233,12 +234,13 @@ impl Graph {
         product(self, fixed.into_iter().chain(variable).collect()).unwrap_or_else(|| self.number(1.0))
     }
 
-    /// `a b` as it stands: a factor that is computed anyway stays one.
+    /// Adds the product `a b` without expanding factors: a factor that is evaluated anyway is kept.
     pub fn times(&mut self, a: Id, b: Id) -> Id {
         if self.constant(a).or(self.constant(b)).is_some() { self.mul(a, b) } else { self.add_op(Op::Mul(a, b)) }
     }
 
-    /// The factors of a product, in their order; what is none, or has too many, is its only factor.
+    /// Returns the factors of a product, in order. A node that is no product, or has too many factors, is its only
+    /// factor.
     fn factors(&self, product: Id) -> Vec<Id> {
         let (mut found, mut stack) = (Vec::new(), vec![product]);
         while let Some(id) = stack.pop() {
@@ -251,17 +253,18 @@ impl Graph {
         found
     }
 
-    /// The node that computes this, if there is one.
+    /// Returns the node with this operation, if there is one.
     pub fn find(&self, op: Op) -> Option<Id> {
         self.known.get(&op).copied()
     }
 
-    /// `a / b`: by a number or a parameter it is a product with the inverse, which is computed once.
+    /// Adds the quotient `a / b`. Division by a number or a parameter becomes a product with the inverse, which is
+    /// evaluated once.
     pub fn div(&mut self, a: Id, b: Id) -> Id {
         if self.is(b, 1.0) {
             return a;
         }
-        // What was just brought to coherent units goes back as it was.
+        // A conversion to coherent units that is undone here cancels exactly.
         if let Op::Mul(factor, x) = self.op(a)
             && factor == b
             && self.constant(b).is_some_and(|b| b != 0.0)
@@ -277,7 +280,7 @@ impl Graph {
         self.fold(a, b, |a, b| a / b).unwrap_or_else(|| self.add_op(Op::Div(a, b)))
     }
 
-    /// `a^b`; small whole powers are products.
+    /// Adds the power `a^b`; small integer powers become products.
     pub fn power(&mut self, a: Id, b: Id) -> Id {
         let one = self.number(1.0);
         match self.constant(b) {
@@ -292,7 +295,7 @@ impl Graph {
         }
     }
 
-    /// A smooth function of one argument.
+    /// Adds a smooth function of one argument.
     pub fn function(&mut self, function: Function, a: Id) -> Id {
         match (function, self.constant(a)) {
             (_, Some(value)) => self.number(function.evaluate(&[value])),
@@ -304,18 +307,18 @@ impl Graph {
         }
     }
 
-    /// Angle of the point (second, first).
+    /// Adds the angle of the point (second, first).
     pub fn atan2(&mut self, a: Id, b: Id) -> Id {
         self.fold(a, b, math::atan2).unwrap_or_else(|| self.add_op(Op::Atan2(a, b)))
     }
 
-    /// 1 where the comparison holds, else 0.
+    /// Adds a comparison: 1 if it is true, else 0.
     pub fn holds(&mut self, comparison: Comparison, a: Id, b: Id) -> Id {
         let folded = self.fold(a, b, |a, b| f64::from(u8::from(comparison.holds(a, b))));
         folded.unwrap_or_else(|| self.add_op(Op::Holds(comparison, a, b)))
     }
 
-    /// `a` where `condition` is positive, else `b`.
+    /// Adds a selection: `a` if `condition` is positive, else `b`.
     pub fn choose(&mut self, condition: Id, a: Id, b: Id) -> Id {
         match self.constant(condition) {
             _ if a == b => a,
@@ -330,7 +333,7 @@ impl Graph {
         }
     }
 
-    /// The states that a node depends on, in order.
+    /// Returns the states that a node depends on, in order.
     pub fn states_of(&self, id: Id) -> Vec<usize> {
         let mut states = std::collections::BTreeSet::new();
         let mut seen = vec![false; self.nodes.len()];
@@ -353,7 +356,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_twice_is_one_node_in_whatever_order() {
+    fn repeated_subexpressions_share_a_node_in_any_order() {
         let mut g = Graph::default();
         let (x, y) = (g.add_op(Op::State(0)), g.add_op(Op::State(1)));
         let (a, two) = (g.add_op(Op::Parameter(0)), g.number(2.0));
@@ -366,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_folded_and_nothing_is_added_or_multiplied_in_vain() {
+    fn numbers_are_folded_and_neutral_operands_are_removed() {
         let mut g = Graph::default();
         let x = g.add_op(Op::State(0));
         let (zero, one, three) = (g.number(0.0), g.number(1.0), g.number(3.0));

@@ -1,4 +1,4 @@
-//! The events of a user's model: when they are armed, what they reset, where they come to rest.
+//! Events of a user's model: arming, resets, and rest states.
 
 use mops_core::enclosure::Enclosure;
 use mops_core::{Dual, EventInstant, Instant, Plant, Scalar};
@@ -7,23 +7,25 @@ use super::bank::{Bank, Large};
 use super::bounds::{moved, signed};
 use super::running::{Running, set_up};
 
-/// What an event waits for.
+/// Phase of an event: the condition that it waits for.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Phase {
-    /// Its guard falls below this value: 0, or where the guard was when a reset left it at or below 0 and not falling.
+    /// The event occurs when its guard falls below this value. The value is 0, or the guard after a reset that left it
+    /// at or below 0 and not falling.
     Armed(f64),
-    /// Its guard was passed: it is armed again where the guard is positive.
+    /// The guard became negative: the event is armed again when the guard is positive.
     Passed,
-    /// Its events have accumulated, and states are held: it waits until their rates, weighted, would make the guard rise.
+    /// The events have accumulated and states are fixed. The event waits until the weighted rates of these states would
+    /// increase the guard.
     AtRest(Vec<(usize, f64)>),
 }
 
-/// A state may be that far from where its events are said to end, relative to its size: a thousand times what accumulated
-/// events leave (see [`crate::kernel`]), so that a rest state that is elsewhere is found out.
+/// Permitted distance of a state from its `at-rest` value, relative to its size. A thousand times the distance that
+/// remains after accumulated events (see [`crate::kernel`]), so that a wrong rest state is detected.
 const NEAR: f64 = 1e-6;
 
 impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
-    /// The value that is not negative while an event waits.
+    /// Returns the guard of an event in its current phase: not negative while the event waits.
     pub(super) fn happening_guard(&self, k: usize, at: &Instant<'_, S>) -> S {
         let guard = |running: &Self| running.results::<1>(&running.model.happenings[k].guard, at)[0];
         match &self.phases[k] {
@@ -37,7 +39,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// Bounds of [`Running::happening_guard`] on registers in which time, states and inputs stand.
+    /// Returns bounds of [`Running::happening_guard`], from registers that contain time, states and inputs.
     pub(super) fn enclose_happening(&self, k: usize, registers: &mut [Enclosure]) -> Enclosure {
         let guard = &self.model.happenings[k].guard;
         let derivative = &self.model.derivative;
@@ -60,7 +62,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// An event happens, is armed, or leaves its rest. Returns what happened.
+    /// Handles an event: the event occurs, is armed again, or leaves its rest state. Returns a description.
     pub(super) fn happen(&mut self, k: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         let model = self.model;
         let happening = &model.happenings[k];
@@ -84,8 +86,8 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// Arms an event where its guard is positive, or will be: at a reset that turns the guard round, rounding may leave it
-    /// negative, and it is 0 where nothing moves any more.
+    /// Arms an event if its guard is positive or increases. After a reset that reverses the guard, rounding may leave
+    /// the guard negative; if nothing moves any more, the guard is 0.
     fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S]) {
         self.phases[k] = Phase::Armed(0.0);
         let at = Instant { x, ..event.at };
@@ -96,8 +98,10 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// Its events accumulate: takes the states to where they rest, if the study gives such a place, it is the place where they
-    /// accumulate, and nothing makes the guard rise there.
+    /// Moves the states to rest after the events of a guard accumulated.
+    ///
+    /// # Errors
+    /// The study gives no rest state, the events accumulate elsewhere, or the guard would not stay at rest there.
     pub(super) fn come_to_rest(
         &mut self,
         k: usize,
@@ -111,13 +115,13 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         let states = &happening.at_rest.0;
         if states.is_empty() {
             return Err(format!(
-                "`{name}` happens again and again; `at-rest` gives the values of the states at which that ends, as in \
+                "the events of `{name}` accumulate; give the values of the states at which they end, for example \
                  at-rest = {{ h = 0, v = 0 }}"
             ));
         }
         let before = event.at.x;
         self.assign(&happening.at_rest, event, x);
-        // A state that never moved has no size: it counts as what it becomes in the interval of the events.
+        // A state that never moved has no size: its size is its change over the interval between the events.
         let [rates, bends] = self.rates_and_bends(&event.at, event.du);
         let is_near = |&state: &usize| {
             let (x, was) = (x[state].value(), before[state].value());
@@ -125,23 +129,25 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
             (x - was).abs() <= size.max(close * rates[state].abs()).max(close * close * bends[state].abs())
         };
         if !states.iter().all(is_near) {
-            return Err(format!("`{name}` happens again and again, but not where its `at-rest` says that it ends"));
+            return Err(format!("the events of `{name}` accumulate, but not at its `at-rest` values"));
         }
         let at = Instant { x, ..event.at };
         let weights = self.lift(k, &at);
         if weights.iter().all(|(_, weight)| *weight == 0.0) {
-            return Err(format!("the states that `at-rest` of `{name}` names do not move its guard"));
+            return Err(format!("the `at-rest` states of `{name}` do not affect its guard"));
         }
         self.phases[k] = Phase::AtRest(weights);
         self.hold_states();
         self.settle_modes(&at);
         match self.happening_guard(k, &at).value() >= 0.0 {
             true => Ok(&happening.rests),
-            false => Err(format!("`{name}` happens again and again where nothing holds it at its `at-rest`")),
+            false => {
+                Err(format!("the events of `{name}` accumulate, but the states do not stay at its `at-rest` values"))
+            }
         }
     }
 
-    /// The states that are held, from the phases of all events.
+    /// Updates the list of fixed states from the phases of all events.
     fn hold_states(&mut self) {
         self.held.clear();
         for (happening, phase) in self.model.happenings.iter().zip(&self.phases) {
@@ -151,8 +157,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// How much the rate of each held state makes the guard rise: by the first derivative of the guard with respect to time
-    /// if it contains these rates, else by the second, as where the guard is a position and its speed is held too.
+    /// Returns the effect of the rate of each fixed state on the guard. The first time derivative of the guard is used
+    /// if it contains these rates, else the second. The second applies, for example, if the guard is a position whose
+    /// speed is fixed, too.
     fn lift(&self, k: usize, at: &Instant<'_, S>) -> Vec<(usize, f64)> {
         let model = self.model;
         let (held, n) = (&model.happenings[k].at_rest.0, at.x.len());
@@ -180,7 +187,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         held.iter().map(|&state| (state, second(state))).collect()
     }
 
-    /// First and second derivatives of all states with respect to time, none of them held.
+    /// Returns the first and second time derivatives of all states, with no state fixed.
     fn rates_and_bends(&self, at: &Instant<'_, S>, du: &[f64]) -> [Vec<f64>; 2] {
         let mut rates = at.x.to_vec();
         self.free_rates(at, &mut rates);
@@ -191,7 +198,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         [rates.iter().map(|rate| rate.value()).collect(), bends.collect()]
     }
 
-    /// The rate of a guard's tape along the solution.
+    /// Returns the rate of a guard along the solution, from the tape of the guard.
     pub(super) fn tape_rate(
         &self,
         tape: &super::program::Program,
@@ -208,7 +215,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         rate.tangent[0]
     }
 
-    /// A bank of numbers with one tangent, in the present modes.
+    /// Creates a bank of dual numbers with one tangent, in the current modes.
     fn dual_bank(&self) -> Large<Dual<1>> {
         let mut bank = Large::with(self.model.layout.registers);
         set_up(self.model, &mut bank, self.parameters.iter().map(|p| Dual::from(p.value())));
@@ -218,7 +225,8 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         bank
     }
 
-    /// States with these tangents; time with the tangent `time`, and inputs with theirs `du`.
+    /// Loads an instant: states with the tangents `tangent`, time with the tangent `time`, and inputs with the tangents
+    /// `du`.
     fn load_dual(
         &self,
         bank: &mut Large<Dual<1>>,

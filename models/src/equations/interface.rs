@@ -1,4 +1,4 @@
-//! What a model from text offers: parameters with start values, and places of effects.
+//! Interface of a model from text: parameters, initial states, and places of effects.
 
 use mops_core::{Mistake, Parameter, Port, Unit, Variable, suggestion};
 
@@ -6,16 +6,17 @@ use super::definition::{self, Definition, under};
 use super::graph::Op;
 use super::system::System;
 
-/// Where a state starts.
+/// Source of the initial value of a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Start {
-    /// At a parameter.
+    /// Value of a parameter.
     Parameter(usize),
-    /// At an expression, unless this parameter is given.
+    /// Value of an expression, unless this parameter is given.
     Expression(usize),
 }
 
-/// The parameters of the model: those declared, then start values; and where each state starts.
+/// Returns the parameters of the model, the declared ones before the initial values, and the source of each initial
+/// value.
 pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Parameter>, Vec<Start>), Mistake> {
     let declared = |p: &definition::Settable| Parameter {
         variable: Variable {
@@ -39,14 +40,15 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
             None => format!("{}0", state.name),
         };
         if let Some(taken) = d.parameters.iter().find(|p| p.quantity.name == name) {
-            let mistake = Mistake::here(format!("the start value of `{}` is a parameter of this name", state.name));
+            let mistake =
+                Mistake::here(format!("this parameter has the name of the initial value of `{}`", state.name));
             return Err(under(&taken.quantity.path, mistake).with_help(format!(
-                "say start = {{ {} = \"{name}\" }} if it is meant, or take another name",
+                "write start = {{ {} = \"{name}\" }} if this is intended, or choose another name",
                 state.name
             )));
         }
         let value = start.map_or(Some(0.0), |id| system.graph.constant(id));
-        let about = format!("{} at the start", state.name);
+        let about = format!("initial value of {}", state.name);
         starts.push(match value {
             Some(_) => Start::Parameter(parameters.len()),
             None => Start::Expression(parameters.len()),
@@ -61,8 +63,8 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
     Ok((parameters, starts))
 }
 
-/// Joints and the equations of all states but positions; inputs; states and outputs. `forces` are the units of the terms in the
-/// equations of the states.
+/// Returns the ports: joints, equations of all states but positions, inputs, states and outputs. `forces` are the units
+/// of the terms in the equations of the states.
 pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, Mistake> {
     let name = |s: usize| d.states[s].name.clone();
     let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);

@@ -2,78 +2,77 @@
 
 use mops_core::Mistake;
 
-/// A key of a table of declarations or definitions.
+/// Key of a table of declarations or definitions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// The name before the bracket.
+    /// Name before the bracket.
     pub name: String,
-    /// What stands in the bracket.
+    /// Index in the bracket.
     pub index: Index,
 }
 
-/// What stands in the bracket of a key.
+/// Index in the bracket of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Index {
-    /// There is no bracket.
+    /// No bracket.
     None,
-    /// One member.
+    /// A single member.
     One(i64),
-    /// Members from the first to the second, with the name of the index if it has one.
+    /// Members from the first to the second, with the name of the index if given.
     Range(Option<String>, i64, i64),
-    /// Every member that nothing else speaks of.
+    /// All members that no other key gives.
     Rest(String),
 }
 
-/// Largest number of members of a family.
+/// Limit on the number of members of a family.
 const LARGEST: i64 = 10_000;
 
 impl Key {
-    /// Reads a key.
+    /// Parses a key.
     ///
     /// # Errors
-    /// A name that an expression could not use, or a bracket that is none of the forms.
+    /// An invalid name, or a bracket of unknown form.
     pub fn parse(key: &str) -> Result<Self, Mistake> {
         let (name, bracket) = match key.split_once('[') {
             None => (key, None),
             Some((name, rest)) => (name, Some(rest.strip_suffix(']').ok_or_else(|| wrong_bracket(key))?)),
         };
         if !is_name(name) {
-            return Err(Mistake::here(format!("an expression cannot use the name `{name}`"))
-                .with_help("names are made of letters, digits and `_`, and begin with a letter"));
+            return Err(Mistake::here(format!("`{name}` is not a valid name"))
+                .with_help("names consist of letters, digits and `_`, and start with a letter"));
         }
         if RESERVED.contains(&name) {
-            return Err(Mistake::here(format!("`{name}` has a meaning of its own in expressions"))
-                .with_help("take another name"));
+            return Err(Mistake::here(format!("`{name}` is a reserved word")).with_help("choose another name"));
         }
         let index = match bracket {
             None => Index::None,
             Some(text) => index(text.trim()).ok_or_else(|| wrong_bracket(key))?,
         };
         match index {
-            Index::Range(_, from, to) if from > to || to.checked_sub(from).is_none_or(|n| n >= LARGEST) => Err(
-                Mistake::here(format!("a family has between 1 and {LARGEST} members, not those from {from} to {to}"))
-                    .with_help("as in \"T[1..100]\""),
-            ),
+            Index::Range(_, from, to) if from > to || to.checked_sub(from).is_none_or(|n| n >= LARGEST) => {
+                Err(Mistake::here(format!("expected 1 to {LARGEST} members, found the range {from}..{to}"))
+                    .with_help("for example \"T[1..100]\""))
+            }
             index => Ok(Self { name: name.to_owned(), index }),
         }
     }
 
-    /// The quantities that a declaration stands for.
+    /// Returns the names of the quantities that a key declares.
     pub fn declared(&self) -> Result<Vec<String>, Mistake> {
         match &self.index {
             Index::None => Ok(vec![self.name.clone()]),
             Index::One(k) => Ok(vec![member(&self.name, *k)]),
             Index::Range(_, from, to) => Ok((*from..=*to).map(|k| member(&self.name, k)).collect()),
-            Index::Rest(_) => Err(Mistake::here(format!("how many members `{}` has must be said here", self.name))
-                .with_help(format!("as in \"{}[1..100]\"", self.name))),
+            Index::Rest(_) => Err(Mistake::here(format!("expected the range of the members of `{}`", self.name))
+                .with_help(format!("for example \"{}[1..100]\"", self.name))),
         }
     }
 }
 
-/// Names that expressions understand otherwise.
+/// Reserved words of expressions.
 const RESERVED: [&str; 6] = ["time", "pi", "and", "or", "not", "der"];
 
-/// `T[3]`.
+/// Returns the name of a member, such as `T[3]`.
 pub fn member(name: &str, index: i64) -> String {
     format!("{name}[{index}]")
 }
@@ -84,8 +83,8 @@ fn is_name(text: &str) -> bool {
 }
 
 fn wrong_bracket(key: &str) -> Mistake {
-    Mistake::here(format!("the bracket in `{key}` is not understood")).with_help(
-        "declare a family as \"T[1..100]\"; define \"T[1]\", \"T[i=2..99]\", or \"T[i]\" for all that are left",
+    Mistake::here(format!("the bracket in `{key}` is invalid")).with_help(
+        "declare a family as \"T[1..100]\"; define \"T[1]\", \"T[i=2..99]\", or \"T[i]\" for all other members",
     )
 }
 

@@ -1,36 +1,36 @@
-//! Which register holds what, the same for all tapes of a model.
+//! Assignment of registers, the same for all tapes of a model.
 
 use std::collections::HashMap;
 
 use super::bank::Register;
 use super::graph::{Graph, Id, Level, Op};
 
-/// Where parameters, states, inputs, time, modes and hoisted numbers stand.
+/// Registers of parameters, states, inputs, time, modes and hoisted numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Layout {
     parameters: usize,
     states: usize,
     inputs: usize,
     modes: usize,
-    /// Nodes that are computed once in a simulation.
+    /// Nodes that are evaluated once per simulation.
     pub hoisted: Vec<Id>,
-    /// Their registers.
+    /// Registers of the hoisted nodes.
     pub places: HashMap<Id, Register>,
-    /// Registers in use by the largest tape.
+    /// Number of registers of the largest tape.
     pub registers: usize,
 }
 
-/// A model too large for the registers there are.
+/// Error of a model that needs more registers than available.
 #[derive(Debug)]
 pub struct TooLarge;
 
-/// The register at a place.
+/// Returns the register with this index.
 pub fn register(place: usize) -> Result<Register, TooLarge> {
     Register::try_from(place).map_err(|_| TooLarge)
 }
 
 impl Layout {
-    /// The layout of a model of this size.
+    /// Creates the layout of a model of this size.
     pub fn new(parameters: usize, states: usize, inputs: usize, modes: usize) -> Result<Self, TooLarge> {
         let registers = parameters + states + inputs + 1 + modes;
         register(registers)?;
@@ -42,35 +42,35 @@ impl Layout {
         place as Register
     }
 
-    /// The register of a parameter.
+    /// Returns the register of a parameter.
     pub fn parameter(&self, index: usize) -> Register {
         Self::place(index)
     }
 
-    /// The register of a state.
+    /// Returns the register of a state.
     #[inline]
     pub fn state(&self, index: usize) -> Register {
         Self::place(self.parameters + index)
     }
 
-    /// The register of an input.
+    /// Returns the register of an input.
     #[inline]
     pub fn input(&self, index: usize) -> Register {
         Self::place(self.parameters + self.states + index)
     }
 
-    /// The register of time.
+    /// Returns the register of time.
     #[inline]
     pub fn time(&self) -> Register {
         Self::place(self.parameters + self.states + self.inputs)
     }
 
-    /// The register of a mode.
+    /// Returns the register of a mode.
     pub fn mode(&self, index: usize) -> Register {
         Self::place(self.parameters + self.states + self.inputs + 1 + index)
     }
 
-    /// The register of a node that all tapes share: a leaf, or a number that is computed once in a simulation.
+    /// Returns the register of a node that all tapes share: a leaf, or a number that is evaluated once per simulation.
     pub fn shared(&mut self, graph: &Graph, id: Id) -> Result<Option<Register>, TooLarge> {
         Ok(Some(match graph.op(id) {
             Op::Parameter(index) => self.parameter(index),
@@ -91,7 +91,7 @@ impl Layout {
         }))
     }
 
-    /// The first register that tapes have to themselves.
+    /// Returns the first register that each tape uses for its own nodes.
     pub fn first_free(&self) -> usize {
         self.parameters + self.states + self.inputs + 1 + self.modes + self.hoisted.len()
     }

@@ -1,4 +1,4 @@
-//! From expressions to the graph: names looked up, derivatives kept apart, kinks and jumps made into switches.
+//! From expressions to the graph: resolves names, separates derivatives, and turns kinks and jumps into switches.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -10,12 +10,12 @@ use super::definition::{Declared, Definition, Text, under};
 use super::graph::{Graph, Id, Level, Op};
 use super::key::member;
 
-/// What an expression comes to: `rest + sum over states of rate * x'`.
+/// Value of an expression, affine in the derivatives: `rest + sum over states of rate * x'`.
 #[derive(Debug, Clone)]
 pub struct Affine {
-    /// What stands without a derivative.
+    /// Part without derivatives.
     pub rest: Id,
-    /// Factors of the derivatives.
+    /// Coefficients of the derivatives.
     pub rates: BTreeMap<usize, Id>,
 }
 
@@ -25,39 +25,39 @@ impl Affine {
     }
 }
 
-/// A condition that decides over a branch, and the mode in which it holds.
+/// Condition that selects a branch, and its mode.
 #[derive(Debug, Clone, Copy)]
 pub struct Switch {
-    /// The mode, 1 while the condition holds.
+    /// Mode, 1 while the condition is true.
     pub mode: usize,
-    /// The condition is `left > right`, or `left >= right`.
+    /// Left side of the condition `left > right` or `left >= right`.
     pub left: Id,
-    /// What it is compared with.
+    /// Right side of the condition.
     pub right: Id,
-    /// Whether equality does not count.
+    /// True if equality does not satisfy the condition.
     pub strict: bool,
-    /// Whether the branches differ where they meet.
+    /// True if the branches differ where they meet.
     pub jumps: bool,
 }
 
-/// Two arguments that parameters decide and that must rise.
+/// Pair of arguments that must increase and depend on parameters.
 #[derive(Debug, Clone)]
 pub struct Order {
-    /// The first of them.
+    /// Argument that must be smaller.
     pub low: Id,
-    /// The second.
+    /// Argument that must be larger.
     pub high: Id,
-    /// Whether they must differ.
+    /// True if the arguments must differ.
     pub strict: bool,
-    /// What they are, for a message.
+    /// Description of the arguments, for a message.
     pub what: String,
 }
 
-/// Definitions within definitions that one may lead to: each takes a part of the stack.
+/// Limit on the nesting depth of definitions: each level uses the call stack.
 const DEEPEST: usize = 200;
 
-/// Functions, powers and sums within each other, over all definitions on the way: each takes some 2 kB of the stack, of which a
-/// thread has 2 MB.
+/// Limit on the nesting depth of functions, powers and sums, over all definitions involved. Each level takes some 2 kB
+/// of the call stack; a thread has 2 MB.
 const DEEPEST_NODE: usize = 600;
 
 #[derive(Debug, Clone, Copy)]
@@ -69,8 +69,9 @@ enum Meaning {
     Let(usize),
 }
 
-/// How kinks are evaluated: by their mode, so that a step sees one smooth branch, or as they stand. The latter holds
-/// inside roots, logarithms, powers and divisors, whose branches do not go on beyond the kink: `sqrt(max(h, 0))`.
+/// Evaluation of kinks: by their mode, so that a step sees one smooth branch, or as they stand, by the current values.
+/// The second applies inside roots, logarithms, powers and divisors, whose branches do not extend beyond the kink:
+/// `sqrt(max(h, 0))`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Kinks {
     ByMode,
@@ -83,28 +84,28 @@ enum Visit {
     Done(Affine),
 }
 
-/// Builds the graph of a definition.
+/// Builder of the graph of a definition.
 pub struct Lowering<'d> {
     definition: &'d Definition,
     names: HashMap<&'d str, Meaning>,
     lets: HashMap<(usize, Kinks), Visit>,
-    /// The graph so far.
+    /// Graph so far.
     pub graph: Graph,
     /// Switches so far.
     pub switches: Vec<Switch>,
-    /// What must rise, so far.
+    /// Arguments that must increase, so far.
     pub orders: Vec<Order>,
     /// Number of modes so far.
     pub modes: usize,
-    /// Nodes of expressions within which the present one stands, over all definitions.
+    /// Nesting depth of the current node, over all definitions.
     depth: usize,
 }
 
 impl<'d> Lowering<'d> {
-    /// Gathers all names.
+    /// Collects all names.
     ///
     /// # Errors
-    /// A name that is given twice.
+    /// Duplicate names.
     pub fn new(definition: &'d Definition) -> Result<Self, Mistake> {
         let d = definition;
         let mut names: HashMap<&str, (Meaning, &str)> = HashMap::new();
@@ -118,8 +119,12 @@ impl<'d> Lowering<'d> {
             d.lets.iter().enumerate().map(|(i, (name, text))| (name, Meaning::Let(i), "a definition", &text.path));
         for (name, meaning, what, path) in states.chain(inputs).chain(parameters).chain(constants).chain(lets) {
             if let Some((_, first)) = names.insert(name, (meaning, what)) {
-                let fact = if first == what { format!("{what} twice") } else { format!("both {first} and {what}") };
-                return Err(under(path, Mistake::here(format!("`{name}` is {fact}")).with_help("take another name")));
+                let fact = if first == what {
+                    format!("declared twice as {what}")
+                } else {
+                    format!("both {first} and {what}")
+                };
+                return Err(under(path, Mistake::here(format!("`{name}` is {fact}")).with_help("choose another name")));
             }
         }
         for (output, _) in &d.outputs {
@@ -143,28 +148,28 @@ impl<'d> Lowering<'d> {
         })
     }
 
-    /// A quantity in its declared unit as one in the coherent unit.
+    /// Converts a quantity from its declared unit to the coherent unit.
     pub fn coherent(&mut self, declared: Id, unit: &Unit) -> Id {
         let (factor, zero) = (self.graph.number(unit.factor()), self.graph.number(unit.zero()));
         let scaled = self.graph.mul(declared, factor);
         self.graph.add(scaled, zero)
     }
 
-    /// A quantity in the coherent unit as one in its declared unit.
+    /// Converts a quantity from the coherent unit to its declared unit.
     pub fn declared(&mut self, coherent: Id, unit: &Unit) -> Id {
         let (factor, zero) = (self.graph.number(unit.factor()), self.graph.number(unit.zero()));
         let from_zero = self.graph.sub(coherent, zero);
         self.graph.div(from_zero, factor)
     }
 
-    /// A new mode.
+    /// Adds a mode.
     pub fn mode(&mut self) -> (usize, Id) {
         self.modes += 1;
         (self.modes - 1, self.graph.add_op(Op::Mode(self.modes - 1)))
     }
 
-    /// An expression, or the difference of the sides of an equation, oriented so that derivatives stand on the left:
-    /// `left - right`.
+    /// Lowers an expression, or the difference `left - right` of the sides of an equation, with the derivatives on the
+    /// left.
     pub fn text(&mut self, text: &Text) -> Result<Affine, Mistake> {
         let right = self.node(text, &text.equation.right, Kinks::ByMode)?;
         let Some(left) = &text.equation.left else { return Ok(right) };
@@ -173,13 +178,13 @@ impl<'d> Lowering<'d> {
         Ok(self.sum(a, b, -1.0))
     }
 
-    /// An expression without derivatives.
+    /// Lowers an expression without derivatives.
     pub fn value(&mut self, text: &Text) -> Result<Id, Mistake> {
         let affine = self.text(text)?;
         self.without_rates(text, &text.equation.right.span, affine, "here")
     }
 
-    /// An expression of parameters alone; `what` it gives, for the message.
+    /// Lowers an expression of parameters only; `what` describes its value in a message.
     pub fn fixed(&mut self, text: &Text, what: &str) -> Result<Id, Mistake> {
         let value = self.value(text)?;
         if self.graph.level(value) < Level::Variable {
@@ -217,8 +222,8 @@ impl<'d> Lowering<'d> {
         }
         Err(under(
             &text.path,
-            Mistake::here(format!("a derivative cannot stand {place}"))
-                .with_help("equations must be linear in the derivatives; write what is meant without them")
+            Mistake::here(format!("a derivative is not allowed {place}"))
+                .with_help("equations must be linear in the derivatives; rewrite the expression without them")
                 .at(span.clone()),
         ))
     }
@@ -241,8 +246,8 @@ impl<'d> Lowering<'d> {
 
     pub(super) fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
         if self.depth == DEEPEST_NODE {
-            let fact = format!("expressions are nested more than {DEEPEST_NODE} deep, counted over their definitions");
-            let mistake = Mistake::here(fact).with_help("take them in parts that nest less");
+            let fact = format!("expressions are nested more than {DEEPEST_NODE} deep, including their definitions");
+            let mistake = Mistake::here(fact).with_help("split them into parts with less nesting");
             return Err(under(&text.path, mistake.at(node.span.clone())));
         }
         self.depth += 1;
@@ -274,16 +279,16 @@ impl<'d> Lowering<'d> {
                 let name = match &of.form {
                     Form::Name(name) => name.clone(),
                     Form::Member(name, index) => member(name, self.index(text, index)?),
-                    _ => unreachable!("the reader takes derivatives of names only"),
+                    _ => unreachable!("the parser accepts derivatives of names only"),
                 };
                 let states = || self.definition.states.iter().map(|s| s.name.as_str());
                 let Some(state) = states().position(|state| state == name) else {
                     return wrong(
-                        format!("`{name}` is not a state, it has no derivative"),
+                        format!("`{name}` has no derivative because it is not a state"),
                         suggestion(&name, states()),
                     );
                 };
-                // The rate of a state in its declared unit, times this, is that in coherent units.
+                // This factor converts the rate of a state from its declared unit to coherent units.
                 let factor = self.definition.states[state].unit.factor();
                 Affine { rest: self.graph.number(0.0), rates: BTreeMap::from([(state, self.graph.number(factor))]) }
             }
@@ -295,13 +300,13 @@ impl<'d> Lowering<'d> {
             Form::Power(a, b) => self.power(text, [a, b], kinks)?,
             Form::Call(function, arguments) => Affine::of(self.call(text, *function, arguments, kinks)?),
             Form::Compare(..) | Form::All(_) | Form::Any(_) | Form::Not(_) => {
-                unreachable!("the reader lets conditions stand in `if` only")
+                unreachable!("the parser accepts conditions in `if` only")
             }
         })
     }
 
-    /// A sum, or a product, from left to right. Factors are gathered and multiplied at once, which takes one node of the
-    /// graph for each; one by one, every product would be sorted into the order of its factors anew.
+    /// Lowers a sum or a product, from left to right. Factors are collected and multiplied at once, with one node of
+    /// the graph for each. If multiplied one by one, the factors of every product would be sorted again.
     fn chain(&mut self, text: &Text, first: &Node, rest: &[(Operator, Node)], kinks: Kinks) -> Result<Affine, Mistake> {
         let mut result = self.node(text, first, kinks)?;
         let mut read = first.span.clone();
@@ -344,7 +349,7 @@ impl<'d> Lowering<'d> {
         if factors.is_empty() { of } else { self.scaled(of, |graph, x| graph.product(x, &factors)) }
     }
 
-    /// Whether it depends on more than parameters.
+    /// Returns true if the expression depends on more than parameters.
     fn varies(&self, affine: &Affine) -> bool {
         affine.rates.values().chain([&affine.rest]).any(|&id| self.graph.level(id) == Level::Variable)
     }
@@ -382,14 +387,14 @@ impl<'d> Lowering<'d> {
             None if value.fract() == 0.0 && value.abs() < 1e9 => Ok(value as i64),
             None => Err(under(
                 &text.path,
-                Mistake::here(format!("an index must be a whole number, not {value}"))
-                    .with_help("as in \"T[i]\" = \"T[i-1] - T[i]\"")
+                Mistake::here(format!("expected an integer index, found {value}"))
+                    .with_help("for example \"T[i]\" = \"T[i-1] - T[i]\"")
                     .at(node.span.clone()),
             )),
             Some(name) => Err(under(
                 &text.path,
-                Mistake::here(format!("an index is made of numbers and constants, `{name}` is neither"))
-                    .with_help("the index of a family stands in its key, as in \"T[i]\" = \"T[i-1] - T[i]\"")
+                Mistake::here(format!("expected an index of numbers and constants, found `{name}`"))
+                    .with_help("the index of a family is declared in its key, for example \"T[i]\" = \"T[i-1] - T[i]\"")
                     .at(node.span.clone()),
             )),
         }
@@ -405,15 +410,15 @@ impl<'d> Lowering<'d> {
             known.sort_unstable();
             let family = format!("{name}[");
             let (fact, help) = if self.names.keys().any(|known| known.starts_with(&family)) {
-                (format!("`{name}` is a family"), format!("name one of its members, as in `{name}[1]`"))
+                (format!("`{name}` is a family"), format!("name one of its members, for example `{name}[1]`"))
             } else if name.contains('[') {
                 let where_ = text.index.as_ref().map_or(String::new(), |(index, k)| format!(" (where {index} is {k})"));
                 (
                     format!("there is no `{name}`{where_}"),
-                    "give the members at the ends equations of their own, as in \"T[1]\" = \"...\"".to_owned(),
+                    "give the members at the ends their own equations, for example \"T[1]\" = \"...\"".to_owned(),
                 )
             } else {
-                (format!("there is no quantity `{name}` in the model"), suggestion(name, known.iter().copied()))
+                (format!("the model has no quantity `{name}`"), suggestion(name, known.iter().copied()))
             };
             return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
         };
@@ -432,8 +437,8 @@ impl<'d> Lowering<'d> {
                 Some(Visit::Open) => {
                     return Err(under(
                         &text.path,
-                        Mistake::here(format!("`{name}` is defined by itself"))
-                            .with_help("definitions may stand in any order, but not in a circle")
+                        Mistake::here(format!("circular definition of `{name}`"))
+                            .with_help("definitions may be in any order, but must not depend on themselves")
                             .at(node.span.clone()),
                     ));
                 }
@@ -441,7 +446,7 @@ impl<'d> Lowering<'d> {
                     let open = self.lets.values().filter(|visit| matches!(visit, Visit::Open)).count();
                     if open >= DEEPEST {
                         let fact = format!("definitions are nested more than {DEEPEST} deep");
-                        let help = "make the sum a family of states, or take it in parts";
+                        let help = "replace the sum by a family of states, or split it into parts";
                         return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
                     }
                     self.lets.insert((i, kinks), Visit::Open);

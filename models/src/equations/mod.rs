@@ -1,4 +1,5 @@
-//! Models written in the study file: their equations are read and compiled once, and run on a tape of their own.
+//! Models written in the study file: equations that are parsed and compiled once, and evaluated as a tape of
+//! instructions.
 
 mod bank;
 mod bounds;
@@ -44,24 +45,24 @@ impl ModelOptions for EquationsOptions {
     }
 }
 
-/// The model of the kind `equations`.
+/// Model of the kind `equations`.
 pub struct Equations {
     definition: Definition,
     interface: Interface,
     compiled: Compiled,
     starts: Vec<Start>,
     tolerance: Tolerance,
-    /// How numbers without units were read.
+    /// Readings of numbers without units.
     notes: Vec<String>,
-    /// The same with an input more in every equation that is a port; made at the first need.
+    /// Compiled equations with an additional input in every equation that is a port; created on first use.
     opened: OnceLock<Compiled>,
 }
 
 impl Equations {
-    /// Reads, checks and compiles the equations.
+    /// Parses, checks and compiles the equations.
     ///
     /// # Errors
-    /// The first mistake, with the key it is under and its place in the expression.
+    /// The first mistake, with its key and its position in the expression.
     pub fn new(options: &EquationsOptions) -> Result<Self, Mistake> {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
@@ -103,17 +104,17 @@ impl Equations {
         Ok(Self { definition, interface, compiled, starts, tolerance, notes, opened: OnceLock::new() })
     }
 
-    /// Which derivative depends on which state: pairs of derivative and state.
+    /// Returns the pairs of derivative and state in which the derivative depends on the state.
     pub fn jacobian_pattern(&self) -> &[(usize, usize)] {
         &self.compiled.pattern
     }
 
-    /// Number of instructions of the tape that gives the derivatives.
+    /// Returns the number of instructions of the tape that computes the derivatives.
     pub fn instructions(&self) -> usize {
         self.compiled.derivative.len()
     }
 
-    /// The equations with an input more in every equation that is a port.
+    /// Returns the compiled equations with an additional input in every equation that is a port.
     fn opened(&self) -> &Compiled {
         self.opened.get_or_init(|| {
             let d = &self.definition;
@@ -124,13 +125,13 @@ impl Equations {
             };
             let ports: Vec<usize> = self.interface.ports.iter().filter_map(process).collect();
             let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
-            let system = System::new(d, &ports).expect("it was read before");
+            let system = System::new(d, &ports).expect("it was compiled before");
             Compiled::new(&system, &names, [d.inputs.len(), ports.len()], d.parameters.len())
-                .expect("a few inputs more do not make it too large")
+                .expect("a few more inputs fit")
         })
     }
 
-    /// The plant; where its numbers fit into few registers, these need no check of their indices.
+    /// Returns the plant. With few registers, their indices need no bounds check.
     fn running<'a, S: Scalar>(&'a self, compiled: &'a Compiled, parameters: &'a [S]) -> Box<dyn Plant<S> + 'a> {
         if compiled.layout.registers <= FEW {
             Box::new(self.started::<S, Small<S>>(Running::new(compiled, parameters, self.tolerance), parameters))
@@ -139,8 +140,8 @@ impl Equations {
         }
     }
 
-    /// The plant at its start: states are those of parameters, or of expressions where the parameter is no number, as nobody
-    /// gives it.
+    /// Sets the initial states: those of parameters, or of expressions if the parameter is NaN because it was not
+    /// given.
     fn started<'a, S: Scalar, B: Bank<S>>(&self, plant: Running<'a, S, B>, parameters: &[S]) -> Running<'a, S, B> {
         let expressions: HashMap<usize, S> = plant.starts().into_iter().collect();
         let start = |(s, start): (usize, &Start)| match *start {

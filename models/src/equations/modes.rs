@@ -1,4 +1,4 @@
-//! The modes of a model from text: which branch holds, which joint is stuck.
+//! Modes of a model from text: the active branches and the stuck joints.
 
 use mops_core::{Failure, Instant, Plant, Scalar};
 
@@ -16,7 +16,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         self.modes[mode] > 0.0
     }
 
-    /// Puts every condition and contact into the mode that fits this moment.
+    /// Sets the modes of all conditions and contacts for this instant.
     pub(super) fn settle_modes(&mut self, at: &Instant<'_, S>) {
         self.settle_switches(at);
         self.find_contacts(at);
@@ -32,8 +32,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         }
     }
 
-    /// A kink is left behind it by a tenth of the tolerance, so that nothing comes and goes at it; a jump exactly. The size that
-    /// the tolerance is relative to is that of the sides of the condition, now or where it was looked at before.
+    /// Sets the tolerance of a switch. A kink is passed by a tenth of the error tolerance, which prevents chattering; a
+    /// jump is exact. The tolerance is relative to the magnitude of both sides of the condition, now or at an earlier
+    /// evaluation.
     pub(super) fn set_slack(&mut self, k: usize, [difference, right]: [f64; 2]) {
         let Tolerance { relative, absolute, .. } = self.tolerance;
         let size = &mut self.spans[k];
@@ -44,8 +45,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         };
     }
 
-    /// Joints that move slide the way they move. Of those at rest each is stuck if the torque it takes is within its
-    /// limit, else it slides the way it accelerates: the choice in which all agree, as in [`crate::kernel::friction`].
+    /// Finds the contacts of all joints. Moving joints slide in their direction of motion. A joint at rest is stuck if
+    /// the torque that this requires is within its limit, else it slides in the direction of its acceleration. The
+    /// choice must be consistent for all joints, see [`crate::kernel::friction`].
     pub(super) fn find_contacts(&mut self, at: &Instant<'_, S>) {
         let model = self.model;
         let mut resting = Vec::new();
@@ -68,7 +70,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
                 if direction == 0.0 {
                     torque.abs() / limit - 1.0
                 } else {
-                    // Rounding leaves an acceleration of about 0 with either sign.
+                    // Rounding leaves an acceleration near 0 with either sign.
                     -direction * acceleration / (acceleration.abs() + coulomb.abs() + f64::MIN_POSITIVE)
                 }
             });
@@ -96,8 +98,8 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         self.set_mode(contact.stuck, f64::from(u8::from(direction == 0.0)));
     }
 
-    /// Takes the modes of an operating point, for a look at the equations alone: joints slide the way they move, those at
-    /// rest have no dry friction. Gives the positions of joints whose friction is left out, as states.
+    /// Sets the modes for linearisation at an operating point: moving joints slide, joints at rest have no dry
+    /// friction. Returns the positions, as states, of joints whose friction is left out.
     pub(super) fn look(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Vec<usize> {
         self.settle_switches(at);
         let mut left_out = Vec::new();
@@ -115,14 +117,14 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         left_out
     }
 
-    /// Whether equations that are solved together have a solution here.
+    /// Checks that friction and tables are valid, and that equations solved together have a solution at the start.
     pub(super) fn check_start(&self, at: &Instant<'_, S>) -> Result<(), Failure> {
         for joint in &self.model.joints {
             let [_, limit, coulomb, _] = self.results::<4>(&joint.balance, at).map(Scalar::value);
             if coulomb < 0.0 || limit < coulomb {
                 return Err(Failure::Undefined(format!(
-                    "where it {}, its friction is {coulomb} and breaks away at {limit}: `coulomb` must not be negative, \
-                     and `peak` at least 1",
+                    "where {}, friction is {coulomb} and break-away friction {limit}; expected `coulomb` of at least 0 \
+                     and `peak` of at least 1",
                     joint.slides
                 )));
             }
@@ -133,7 +135,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         for ((what, strict), pair) in orders.iter().zip(tape.results.chunks(2)) {
             let [low, high] = [pair[0], pair[1]].map(|register| bank.get(register).value());
             if low > high || *strict && low == high {
-                return Err(Failure::Undefined(format!("{what} must rise, but {high} follows {low}")));
+                return Err(Failure::Undefined(format!("{what} must increase, found {high} after {low}")));
             }
         }
         drop(bank);
@@ -155,7 +157,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     }
 }
 
-/// Determinant of a square matrix, row by row.
+/// Returns the determinant of a square matrix, given row by row.
 fn determinant(mut m: Vec<f64>) -> f64 {
     let n = m.len().isqrt();
     let mut product = 1.0;

@@ -1,4 +1,4 @@
-//! What stands in a study file under `[models.NAME.equations]`.
+//! Options of `[models.NAME.equations]` in a study file.
 
 use mops_core::Quantity;
 use mops_core::file::{Entries, Short};
@@ -8,7 +8,7 @@ use serde::de::{self, Deserializer, Visitor};
 
 use crate::kernel::Tolerance;
 
-/// A plant written down as its equations, as short as on paper:
+/// Plant model given by its equations, almost as written on paper:
 ///
 /// ```text
 /// [models.rig.equations]
@@ -19,28 +19,31 @@ use crate::kernel::Tolerance;
 /// der        = { th = "w", w = "J*w' = u - m*g*l*sin(th) - b*w" }
 /// ```
 ///
-/// A derivative is an expression, or an equation with `=` in which `w'` (or `der(w)`) stands for the derivative of `w`;
-/// equations may contain several derivatives, each to the first power: they are solved together, as with a mass matrix.
+/// A derivative is an expression, or an equation with `=` that contains `w'` (or `der(w)`), the derivative of `w`.
+/// Equations may contain several derivatives, each to the first power; they are solved together, as with a mass matrix.
 ///
-/// Expressions: `+ - * / ^`, parentheses, `pi`, `time` (s); `sin cos tan asin acos atan atan2(y, x) sinh cosh tanh exp ln
-/// log10 sqrt`; `abs sign min max clip(x, low, high) deadzone(x, low, high)`; `table(x, x1, y1, x2, y2, ..)`, straight
-/// lines through points; `if(condition, a, b)`, with conditions of `> >= < <=`, `and`, `or`, `not`. Where one of the
-/// second row, a table or an `if` changes its branch, a step of the integrator ends: none crosses a kink or a jump.
+/// Expressions may contain `+ - * / ^`, parentheses, `pi` and `time` (s).
+/// Smooth functions: `sin cos tan asin acos atan atan2(y, x) sinh cosh tanh exp ln log10 sqrt`.
+/// Functions with kinks or jumps: `abs sign min max clip(x, low, high) deadzone(x, low, high)`.
+/// `table(x, x1, y1, x2, y2, ..)` is piecewise linear through points. `if(condition, a, b)` takes conditions of
+/// `> >= < <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an
+/// `if` changes its branch. So no step crosses a kink or a jump.
 ///
-/// Quantities enter an expression in their coherent SI units, whatever unit they are declared in, and the dimensions of all
-/// expressions are checked. A number in a product is a pure number. As a whole term it counts in the SI unit of its neighbours,
-/// unless one of these is declared in another unit: then it needs its own, `20 [degC]`. A quantity declared in `""` has the unit
-/// that the equations ask for, one in `"1"` is a pure number. Hz counts cycles: `sin(2*pi*f*time)`. Temperatures are in K.
+/// Expressions use coherent SI units for all quantities, whatever unit they are declared in, and their dimensions are
+/// checked. A number in a product is a pure number. A number that is a whole term has the SI unit of the other terms.
+/// If one of these is declared in another unit, the number needs its own unit: `20 [degC]`. A quantity declared in `""`
+/// has the unit that the equations require; one in `"1"` is a pure number. Hz counts cycles: `sin(2*pi*f*time)`.
+/// Temperatures are in K.
 ///
-/// A family of states is declared as `"T[1..100]" = "K"`; `"T[i]" = "k*(T[i-1] - 2*T[i] + T[i+1])"` gives the derivative
-/// of every member that has none of its own, `"T[i=2..99]"` of these. `let`, `start`, `inputs` and `parameters` have
-/// families too.
+/// A family of states is declared as `"T[1..100]" = "K"`. `"T[i]" = "k*(T[i-1] - 2*T[i] + T[i+1])"` gives the
+/// derivatives of all members without an equation of their own; `"T[i=2..99]"` gives those of members 2 to 99. `let`,
+/// `start`, `inputs` and `parameters` also accept families.
 ///
-/// Signals are the states, the outputs and the inputs. The start value of `th` is the parameter `th0`, 0 by default.
+/// Signals are the states, the outputs and the inputs. The initial value of `th` is the parameter `th0`, 0 by default.
 ///
-/// A state whose derivative is another state, as `th` above, is a joint: friction acts on it with `friction.th = {
-/// coulomb = "c" }`, exactly at rest while it is stuck. The places where an effect may be missing are its joints, the
-/// equations of its states, its inputs and its signals.
+/// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
+/// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
+/// the joints, the equations of the states, the inputs and the signals.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities).
@@ -49,55 +52,56 @@ use crate::kernel::Tolerance;
 pub struct EquationsOptions {
     /// States and their units: `th = "rad"`, `"T[1..100]" = "K"`; or a table with `unit`, `scale`, `about`.
     pub(super) states: Entries<Short<StateOptions>>,
-    /// Inputs and their units; 0 where no case or experiment drives them.
+    /// Inputs and their units. An input is 0 unless a case or an experiment gives it.
     #[serde(default)]
     pub(super) inputs: Entries<Short<Described>>,
-    /// Parameters and their units: `b = "N m s/rad"`, or a table with `unit`, `default`, `min`, `max`, `about`. The unit `""` is
-    /// the one that the equations ask for.
+    /// Parameters and their units: `b = "N m s/rad"`, or a table with `unit`, `default`, `min`, `max`, `about`. The
+    /// unit `""` means the unit that the equations require.
     #[serde(default)]
     pub(super) parameters: Entries<Short<Settable>>,
-    /// Numbers that never change: `g = "9.81 m/s^2"`. Without a unit they have that which the equations ask for.
+    /// Constants: `g = "9.81 m/s^2"`. A constant without a unit has the unit that the equations require.
     #[serde(default)]
     pub(super) constants: Entries<Quantity>,
-    /// Names for expressions, in any order: `s = "sin(th)"`.
+    /// Named expressions, in any order: `s = "sin(th)"`.
     #[serde(default, rename = "let")]
     pub(super) definitions: Entries<Formula>,
-    /// Derivatives: `th = "w"`, or an equation that contains them: `w = "J*w' = u - b*w"`.
+    /// Derivatives: an expression, `th = "w"`, or an equation that contains derivatives, `w = "J*w' = u - b*w"`.
     pub(super) der: Entries<Formula>,
-    /// Mass matrix, where `der` gives forces: `"w,w" = "J"` multiplies the derivative of `w` (second) in the equation of
-    /// `w` (first); rows that are not named are those of the unit matrix.
+    /// Mass matrix, if `der` gives forces. `"w,w" = "J"` is the factor of the derivative of `w` (second) in the
+    /// equation of `w` (first). Rows that are not given are those of the identity matrix.
     #[serde(default)]
     pub(super) mass: Entries<Formula>,
-    /// More signals: `height = "l*cos(th)"`, or a table with `value`, `unit`, `about`.
+    /// Further signals: `height = "l*cos(th)"`, or a table with `value`, `unit`, `about`.
     #[serde(default)]
     pub(super) outputs: Entries<Short<Output>>,
-    /// Values at the start: numbers, in the unit of the state unless they have their own; or expressions of parameters.
+    /// Initial values of states: numbers, in the unit of the state unless they have their own, or expressions of
+    /// parameters.
     #[serde(default)]
     pub(super) start: Entries<Formula>,
     /// Friction of joints, by their position or speed.
     #[serde(default)]
     pub(super) friction: Entries<Friction>,
-    /// Events: `bounce = { guard = "h", reset = { v = "-e*v" }, at-rest = { h = 0, v = 0 } }` happens when `h` becomes
+    /// Events: `bounce = { guard = "h", reset = { v = "-e*v" }, at-rest = { h = 0, v = 0 } }` occurs when `h` becomes
     /// negative.
     #[serde(default)]
     pub(super) when: Entries<When>,
-    /// Names for joints as places of effects: `arm = { joint = "phi" }`; the position's own where absent.
+    /// Names of joints as places of effects: `arm = { joint = "phi" }`. Default: the name of the position.
     #[serde(default)]
     pub(super) ports: Entries<PortName>,
-    /// End of the simulation where no experiment gives one.
+    /// End of the simulation, unless an experiment gives it.
     pub(super) horizon: Option<Quantity>,
     /// Accuracy and limits of the simulation.
     #[serde(default)]
     pub(super) tolerance: Tolerance,
 }
 
-/// A quantity's unit and meaning.
+/// Unit and description of a quantity.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Described {
     /// Unit.
     pub unit: String,
-    /// What it is, in one line.
+    /// Description, in one line.
     pub about: Option<String>,
 }
 
@@ -107,16 +111,16 @@ impl From<String> for Described {
     }
 }
 
-/// A state's unit, size and meaning.
+/// Unit, typical size and description of a state.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct StateOptions {
     /// Unit.
     pub unit: String,
-    /// Typical size, positive: errors of the simulation count relative to it where the state is near 0. Where it is absent
-    /// the largest absolute value that the state has had takes its place.
+    /// Typical size, positive: error tolerances are relative to it while the state is near 0. Default: the largest
+    /// absolute value that the state has reached.
     pub scale: Option<Quantity>,
-    /// What it is, in one line.
+    /// Description, in one line.
     pub about: Option<String>,
 }
 
@@ -126,19 +130,19 @@ impl From<String> for StateOptions {
     }
 }
 
-/// A parameter's unit, range and meaning.
+/// Unit, range and description of a parameter.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Settable {
     /// Unit.
     pub unit: String,
-    /// Value where the study gives none.
+    /// Default value.
     pub default: Option<Quantity>,
     /// Smallest meaningful value.
     pub min: Option<Quantity>,
     /// Largest meaningful value.
     pub max: Option<Quantity>,
-    /// What it is, in one line.
+    /// Description, in one line.
     pub about: Option<String>,
 }
 
@@ -148,15 +152,15 @@ impl From<String> for Settable {
     }
 }
 
-/// A signal that follows from others.
+/// Signal computed from other quantities.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Output {
-    /// Its expression.
+    /// Expression of the signal.
     pub value: Formula,
-    /// Unit; the SI unit of what its expression measures where absent.
+    /// Unit. Default: the coherent SI unit of the expression.
     pub unit: Option<String>,
-    /// What it is, in one line.
+    /// Description, in one line.
     pub about: Option<String>,
 }
 
@@ -166,34 +170,34 @@ impl From<String> for Output {
     }
 }
 
-/// Friction of a joint: `-viscous v - coulomb sign(v)` in the equation of its speed `v`, and a state of rest.
+/// Friction of a joint: `-viscous v - coulomb sign(v)` in the equation of its speed `v`, with exact sticking at rest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Friction {
-    /// Dry friction while it moves; at rest the joint is held by whatever it takes, up to `peak` times this.
+    /// Dry friction while the joint slides. At rest, friction balances any load up to `peak` times this value.
     pub coulomb: Option<Formula>,
-    /// Viscous friction.
+    /// Viscous friction coefficient.
     pub viscous: Option<Formula>,
-    /// Ratio of what breaks the joint away to the friction at the smallest speed; at least 1, and 1 where absent.
+    /// Ratio of the break-away friction to the sliding friction at the smallest speed; at least 1, default 1.
     pub peak: Option<Formula>,
 }
 
-/// Something that happens at once.
+/// Instantaneous event.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct When {
-    /// It happens when this becomes negative.
+    /// Guard: the event occurs when this expression becomes negative.
     pub guard: Formula,
-    /// New values of states, from the values just before; states that are not named stay.
+    /// New values of states, computed from the values just before the event. Other states keep their values.
     #[serde(default)]
     pub reset: Entries<Formula>,
-    /// Values of states where events that come closer and closer end. These states are held there until their rates would
-    /// make the guard rise. Without it events that accumulate are a failure of the simulation.
+    /// Values of states at which accumulating events end. These states are kept there until their rates would increase
+    /// the guard. Without `at-rest`, the simulation fails if the events accumulate.
     #[serde(default)]
     pub at_rest: Entries<Formula>,
 }
 
-/// A place that gets a name.
+/// Name of a place.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct PortName {
@@ -201,7 +205,7 @@ pub(super) struct PortName {
     pub joint: String,
 }
 
-/// An expression: a text, or a number.
+/// Expression: a string or a number.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Formula(pub String);
 

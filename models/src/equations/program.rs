@@ -1,16 +1,16 @@
-//! A tape: flat instructions on registers, run at every stage of every step.
+//! Tape: a flat list of instructions on registers, run at every stage of every step.
 
 use mops_core::Scalar;
 use mops_core::expression::{Comparison, Function, functions};
 
 use super::bank::{Bank, Register};
 
-/// One step of a tape. The first register is the one written; sums of products are one instruction, as most of the time
-/// goes into fetching instructions, not into arithmetic.
+/// Instruction of a tape; writes the first register. Sums of products are one instruction, because most of the time is
+/// spent fetching instructions.
 #[rustfmt::skip]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Instruction {
-    /// The number at this place of the tape's list.
+    /// Number at an index of the list of the tape.
     Set(Register, Register),
     Copy(Register, Register),
     Add(Register, Register, Register),
@@ -18,17 +18,17 @@ pub enum Instruction {
     Mul(Register, Register, Register),
     Div(Register, Register, Register),
     Neg(Register, Register),
-    /// `a b + c`.
+    /// Sum `a b + c`.
     MulAdd(Register, Register, Register, Register),
-    /// `a b - c`.
+    /// Difference `a b - c`.
     MulSub(Register, Register, Register, Register),
-    /// `c - a b`.
+    /// Difference `c - a b`.
     SubMul(Register, Register, Register, Register),
-    /// `a b + c d`.
+    /// Sum `a b + c d`.
     Dot(Register, Register, Register, Register, Register),
-    /// `a b - c d`.
+    /// Difference `a b - c d`.
     Cross(Register, Register, Register, Register, Register),
-    /// Sine and cosine of the third.
+    /// Sine (first) and cosine (second) of the third.
     SinCos(Register, Register, Register),
     Sin(Register, Register),
     Cos(Register, Register),
@@ -37,26 +37,26 @@ pub enum Instruction {
     Power(Register, Register, Register),
     Atan2(Register, Register, Register),
     Holds(Comparison, Register, Register, Register),
-    /// The third where the second is positive, else the fourth.
+    /// Selection: the third if the second is positive, else the fourth.
     Choose(Register, Register, Register, Register),
-    /// Linear equations of this many unknowns: the matrix from the register on, row by row, then the right-hand sides,
-    /// in whose place the solution is written.
+    /// Linear equations with this number of unknowns. The matrix starts at the register, row by row, followed by the
+    /// right-hand sides, which the solution overwrites.
     Solve(Register, u16),
 }
 
-/// A tape, and where its results stand after it ran.
+/// Tape, with the registers of its results.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
-    /// What is done, in order.
+    /// Instructions, in order.
     pub instructions: Vec<Instruction>,
-    /// Numbers that [`Instruction::Set`] takes.
+    /// Numbers that [`Instruction::Set`] reads.
     pub numbers: Vec<f64>,
-    /// Registers of the results, in the order they were asked for.
+    /// Registers of the results, in the order of the request.
     pub results: Vec<Register>,
 }
 
 impl Program {
-    /// Number of instructions.
+    /// Returns the number of instructions.
     pub fn len(&self) -> usize {
         self.instructions.len()
     }
@@ -87,7 +87,9 @@ impl Program {
                 I::Sin(o, a) => r.set(o, r.get(a).sin()),
                 I::Cos(o, a) => r.set(o, r.get(a).cos()),
                 I::Sqrt(o, a) => r.set(o, functions::sqrt(r.get(a))),
-                I::Function(f, o, a) => r.set(o, f.smooth(r.get(a)).expect("only smooth functions are compiled to it")),
+                I::Function(f, o, a) => {
+                    r.set(o, f.smooth(r.get(a)).expect("only smooth functions are compiled to this instruction"))
+                }
                 I::Power(o, a, b) => r.set(o, functions::power(r.get(a), r.get(b))),
                 I::Atan2(o, a, b) => r.set(o, functions::atan2(r.get(a), r.get(b))),
                 I::Holds(comparison, o, a, b) => {
@@ -101,7 +103,7 @@ impl Program {
     }
 }
 
-/// Elimination with row pivoting, in place.
+/// Solves linear equations by Gaussian elimination with row pivoting, in place.
 fn solve<S: Scalar, B: Bank<S>>(r: &mut B, start: Register, n: u16) {
     let at = |i: u16, j: u16| start + i * n + j;
     let right = |i: u16| start + n * n + i;

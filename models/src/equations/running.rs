@@ -1,4 +1,4 @@
-//! A compiled model as a plant: the present values and modes.
+//! Compiled model as a plant, with its current values and modes.
 
 use std::cell::RefCell;
 
@@ -13,43 +13,44 @@ use super::happenings::Phase;
 use super::program::Program;
 use crate::kernel::Tolerance;
 
-/// The plant of a compiled model; `B` are the registers.
+/// Plant of a compiled model; `B` is the bank of registers.
 pub struct Running<'a, S, B> {
     pub(super) model: &'a Compiled,
     pub(super) bank: RefCell<B>,
-    /// The states at time 0.
+    /// Initial states.
     start: Vec<S>,
     pub(super) parameters: &'a [S],
     pub(super) tolerance: Tolerance,
     started: bool,
-    /// Present values of the modes.
+    /// Current values of the modes.
     pub(super) modes: Vec<f64>,
-    /// What is added to the guard of a switch: a kink is only left when it is clear that it is.
+    /// Tolerance added to the guard of each switch, so that a kink is clearly passed before the branch changes.
     pub(super) slack: Vec<f64>,
-    /// The largest size of the sides of each switch where it was looked at.
+    /// Largest magnitude of the sides of each switch at its evaluations so far.
     pub(super) spans: Vec<f64>,
-    /// How often each switch has switched.
+    /// Number of changes of each switch.
     flips: Vec<usize>,
-    /// What each event waits for.
+    /// Phases of the events.
     pub(super) phases: Vec<Phase>,
-    /// States that are held where events have come to rest.
+    /// States fixed by events at rest.
     pub(super) held: Vec<usize>,
-    /// Largest absolute values of the states where the simulation begins and at events.
+    /// Largest absolute values of the states, at the start and at events.
     pub(super) sizes: Vec<f64>,
-    /// Registers with bounds, from their first use on.
+    /// Registers with bounds, created on first use.
     bounds: RefCell<Vec<Enclosure>>,
-    /// Registers in which the Jacobian is computed, from its first use on.
+    /// Registers for the Jacobian, created on first use.
     jacobian: RefCell<Option<Large<Along>>>,
 }
 
-/// A condition that has switched that often is blamed where a simulation runs out of steps: a thousandth of those there are.
+/// Number of changes from which a condition is reported as the cause of a reached step limit: a thousandth of the
+/// default limit.
 const FLIPS: usize = 100;
 
-/// What is said of conditions that never agree with themselves.
+/// Message for conditions that switch without end.
 const TO_AND_FRO: &str =
-    "a condition of `sign` or `if` switches to and fro without end; dry friction is written under `friction`";
+    "a condition of `sign` or `if` switches back and forth without end; use `friction` for dry friction";
 
-/// What a mode's guard is about.
+/// Object of a guard.
 enum Guard {
     Joint(usize),
     Switch(usize),
@@ -57,7 +58,7 @@ enum Guard {
 }
 
 impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
-    /// The plant with these parameters, the start values among them left aside.
+    /// Creates the plant with these parameters; initial states among them are ignored.
     pub fn new(model: &'a Compiled, parameters: &'a [S], tolerance: Tolerance) -> Self {
         let mut bank = B::with(model.layout.registers);
         set_up(model, &mut bank, parameters.iter().copied());
@@ -80,13 +81,13 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
-    /// The plant that starts at these states.
+    /// Sets the initial states.
     #[must_use]
     pub fn starting_at(self, start: Vec<S>) -> Self {
         Self { start, ..self }
     }
 
-    /// Start values that are expressions: state and value.
+    /// Returns the initial values given by expressions: state and value.
     pub fn starts(&self) -> Vec<(usize, S)> {
         let mut bank = self.bank.borrow_mut();
         let (states, tape) = &self.model.starts;
@@ -94,7 +95,8 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         states.iter().zip(&tape.results).map(|(&state, &register)| (state, bank.get(register))).collect()
     }
 
-    /// Writes an instant into the registers; forces are inputs after the others, where the model was compiled with them.
+    /// Loads an instant into the registers. External forces are inputs after the others, if the model was compiled with
+    /// them.
     #[inline(always)]
     pub(super) fn load(&self, bank: &mut B, at: &Instant<'_, S>) {
         let layout = &self.model.layout;
@@ -110,13 +112,13 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         bank.set(layout.time(), S::from(at.t));
     }
 
-    /// Forces from outside, as far as the equations take them in.
+    /// Returns the external forces, if the equations contain them.
     #[inline(always)]
     pub(super) fn forces<'w, T>(&self, w: &'w [T]) -> &'w [T] {
         if self.model.takes_forces { w } else { &[] }
     }
 
-    /// Results of a tape at an instant.
+    /// Returns the results of a tape at an instant.
     pub(super) fn results<const N: usize>(&self, tape: &Program, at: &Instant<'_, S>) -> [S; N] {
         let mut bank = self.bank.borrow_mut();
         self.load(&mut bank, at);
@@ -171,12 +173,12 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
-    /// The guard of an event.
+    /// Returns the guard index of an event.
     pub(super) fn guard_of(&self, happening: usize) -> usize {
         self.model.joints.len() + self.model.switches.len() + happening
     }
 
-    /// The derivatives, of states that are held too.
+    /// Computes the derivatives, with no state fixed.
     #[inline(always)]
     pub(super) fn free_rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let mut bank = self.bank.borrow_mut();
@@ -188,7 +190,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
-    /// Gives states new values, computed from those before the event.
+    /// Assigns new values to states, computed from the values before the event.
     pub(super) fn assign(&self, (states, tape): &(Vec<usize>, Program), event: &EventInstant<'_, S>, x: &mut [S]) {
         let mut bank = self.bank.borrow_mut();
         self.load(&mut bank, &event.at);
@@ -208,7 +210,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
     }
 }
 
-/// Writes the parameters into a bank, and all that follows from them alone.
+/// Loads the parameters into a bank, and computes all numbers that depend only on them.
 pub(super) fn set_up<S: Scalar>(model: &Compiled, bank: &mut impl Bank<S>, parameters: impl Iterator<Item = S>) {
     for (i, value) in parameters.take(model.parameters).enumerate() {
         bank.set(model.layout.parameter(i), value);
@@ -295,7 +297,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         match self.kind(index) {
             Guard::Happening(k) => self.come_to_rest(k, event, close, x),
             Guard::Joint(j) => Err(format!(
-                "a joint with dry friction does not settle: {}, again and again",
+                "a joint with dry friction does not come to rest: {} again and again",
                 self.model.joints[j].slides
             )),
             Guard::Switch(_) => Err(TO_AND_FRO.to_owned()),
@@ -314,7 +316,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
                 let joint = &self.model.joints[j];
                 let [torque, limit, ..] = self.results::<4>(&joint.balance, &at).map(Scalar::value);
                 if limit == 0.0 {
-                    // Without friction the joint passes through its rest; which way it moves counts where friction comes.
+                    // Without friction the joint passes through rest; its direction matters once there is friction.
                     self.set_contact(j, -self.modes[joint.contact.direction]);
                     return "";
                 }
@@ -346,7 +348,8 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         Some(self.model.pattern.clone())
     }
 
-    /// Columns that share no row are differentiated together, several such groups in one run of the tape.
+    /// Passes the entries of the Jacobian. Columns that share no row are differentiated together, several such groups
+    /// per run.
     fn jacobian(&self, at: &Instant<'_, S>, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         let model = self.model;
         let mut bank = self.jacobian.borrow_mut();
@@ -399,7 +402,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         Ok(self.look(at, at_rest))
     }
 
-    /// Where a simulation got nowhere as a condition switched to and fro, that is what is said.
+    /// Replaces a step limit by its cause, a condition that switched back and forth.
     fn explain(&self, failure: Failure) -> Failure {
         let mut jumping = self.model.switches.iter().zip(&self.flips);
         match failure {

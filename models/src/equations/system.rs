@@ -1,4 +1,4 @@
-//! The whole model as a graph: rows solved for the derivatives, friction, events, signals and start values.
+//! Model as a graph: equations solved for the derivatives, friction, events, signals and initial values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use super::definition::{Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
 use super::lower::{Affine, Lowering, Order, Switch};
 
-/// One equation: `sum of coefficients * derivatives = force`.
+/// Equation `sum of coefficients * derivatives = force`.
 #[derive(Debug, Clone)]
 struct Row {
     coefficients: BTreeMap<usize, Id>,
@@ -19,47 +19,47 @@ struct Row {
 /// Dry friction of a joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Contact {
-    /// The position, as a state.
+    /// Position, as a state.
     pub position: usize,
-    /// The speed, as a state.
+    /// Speed, as a state.
     pub velocity: usize,
     /// Mode: 1 forward, -1 backward, 0 stuck.
     pub direction: usize,
     /// Mode: 1 while stuck.
     pub stuck: usize,
-    /// Friction while it slides.
+    /// Sliding friction.
     pub coulomb: Id,
-    /// What breaks it away.
+    /// Break-away friction.
     pub limit: Id,
-    /// What holds it while it is stuck.
+    /// Friction torque while the joint is stuck.
     pub torque: Id,
 }
 
-/// Something that happens when the guard becomes negative.
+/// Event that occurs when its guard becomes negative.
 #[derive(Debug, Clone)]
 pub struct Happening {
-    /// Its name.
+    /// Name of the event.
     pub name: String,
-    /// Its guard.
+    /// Guard of the event.
     pub guard: Id,
     /// New values of states.
     pub resets: Vec<(usize, Id)>,
-    /// Values of states at which its events end where they accumulate.
+    /// Values of states at which accumulating events end.
     pub at_rest: Vec<(usize, Id)>,
 }
 
-/// A model as a graph.
+/// Model as a graph.
 #[derive(Debug)]
 pub struct System {
-    /// All nodes.
+    /// Expression graph.
     pub graph: Graph,
     /// Conditions that switch branches.
     pub switches: Vec<Switch>,
-    /// Arguments that must rise.
+    /// Arguments that must increase.
     pub orders: Vec<Order>,
     /// Number of modes.
     pub modes: usize,
-    /// Typical sizes of the states, where they are declared.
+    /// Typical sizes of the states, if declared.
     pub scales: Vec<Option<f64>>,
     /// Derivatives of the states.
     pub derivatives: Vec<Id>,
@@ -69,21 +69,20 @@ pub struct System {
     pub contacts: Vec<Contact>,
     /// Events.
     pub happenings: Vec<Happening>,
-    /// Start values, where the study gives an expression.
+    /// Initial values given in the study.
     pub starts: Vec<Option<Id>>,
-    /// Joints: position and speed.
+    /// Joints, as pairs of position and speed.
     pub joints: Vec<(usize, usize)>,
     /// Matrices of equations that are solved together, row by row.
     pub matrices: Vec<Vec<Id>>,
 }
 
 impl System {
-    /// Puts a definition together.
+    /// Builds the graph of a definition. `opened` states get an additional input, after the declared ones, on the
+    /// right-hand sides of their equations.
     ///
     /// # Errors
-    /// Names that are not there, definitions in a circle, equations that do not determine the derivatives.
-    ///
-    /// To the right-hand sides of the equations of the states `opened` further inputs are added, behind those declared.
+    /// Unknown names, circular definitions, or equations that do not determine the derivatives.
     pub fn new(definition: &Definition, opened: &[usize]) -> Result<Self, Mistake> {
         let d = definition;
         let mut l = Lowering::new(d)?;
@@ -94,10 +93,9 @@ impl System {
         for &row in &massive {
             let text = &d.der[&d.states[row].name];
             if text.equation.left.is_some() || rows[row].coefficients.len() > 1 {
-                let fact = "the equation contains derivatives and has a row in `mass` too";
-                return Err(
-                    under(&text.path, Mistake::here(fact)).with_help("write the derivatives in one place or the other")
-                );
+                let fact = "the equation contains derivatives and also has a row in `mass`";
+                return Err(under(&text.path, Mistake::here(fact))
+                    .with_help("give the derivatives either in the equation or in `mass`"));
             }
             rows[row].coefficients.clear();
         }
@@ -158,14 +156,14 @@ impl System {
                 {
                     return Ok(l.graph.number(number));
                 }
-                let value = l.fixed(text, &format!("the start value of `{name}`"))?;
-                // A number without a unit is in that of the state.
+                let value = l.fixed(text, &format!("the initial value of `{name}`"))?;
+                // A number without a unit is in the unit of the state.
                 Ok(if text.is_bare() { value } else { l.declared(value, unit) })
             });
             value.transpose()
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
-        // Definitions that nothing uses are checked too; what they would switch is forgotten.
+        // Unused definitions are checked too, but their switches are discarded.
         let (switches, orders, modes) = (l.switches.len(), l.orders.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
@@ -191,7 +189,7 @@ impl System {
     }
 }
 
-/// A value in which derivatives stand for themselves.
+/// Substitutes the derivatives in an affine expression.
 fn with_rates(graph: &mut Graph, affine: Affine, derivatives: &[Id]) -> Id {
     affine.rates.into_iter().fold(affine.rest, |sum, (state, rate)| {
         let part = graph.mul(rate, derivatives[state]);
@@ -213,13 +211,13 @@ fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Resul
     if affine.rates.is_empty() {
         let name = &d.states[state].name;
         return Err(under(&text.path, Mistake::here("the equation contains no derivative")).with_help(format!(
-            "`{name}'` stands for the derivative of `{name}`; without `=` it is what the text gives"
+            "write the derivative of `{name}` as `{name}'`; without `=` the expression is the derivative"
         )));
     }
     Ok(Row { coefficients: affine.rates, force: l.graph.negative(affine.rest) })
 }
 
-/// Pairs of states of which the first has the second as its derivative, each in its own unit.
+/// Returns the pairs of states in which the second is the derivative of the first, each in its own unit.
 fn joints(graph: &Graph, d: &Definition, rows: &[Row]) -> Vec<(usize, usize)> {
     let pair = |(position, row): (usize, &Row)| {
         let own = |state: usize, id: Id| graph.is(id, d.states[state].unit.factor());
@@ -237,7 +235,8 @@ fn joints(graph: &Graph, d: &Definition, rows: &[Row]) -> Vec<(usize, usize)> {
     rows.iter().enumerate().filter_map(pair).collect()
 }
 
-/// Joints with dry friction that one model can have: of every joint at rest three ways to go on are tried.
+/// Limit on the number of joints with dry friction: three contacts of every joint at rest are tried, in all
+/// combinations.
 const MOST_CONTACTS: usize = 8;
 
 fn friction(
@@ -257,10 +256,12 @@ fn friction(
         let Some(&(position, velocity)) = joint else {
             return Err(under(
                 &friction.path,
-                Mistake::here(format!("friction needs a joint, and `{}` is none", friction.of)),
+                Mistake::here(format!("friction needs a joint, `{}` is not a joint", friction.of)),
             )
             .with_help(match joints.is_empty() {
-                true => "a joint is a state whose derivative is another state, as in der = { q = \"v\" }".to_owned(),
+                true => {
+                    "a joint is a state whose derivative is another state, for example der = { q = \"v\" }".to_owned()
+                }
                 false => suggestion(&friction.of, joints.iter().map(|&(q, _)| names(q))),
             }));
         };
@@ -273,7 +274,7 @@ fn friction(
         }
         let Some(coulomb) = &friction.coulomb else { continue };
         if contacts.iter().any(|c| c.velocity == velocity) {
-            return Err(under(&friction.path, Mistake::here(format!("`{}` has dry friction twice", friction.of)))
+            return Err(under(&friction.path, Mistake::here(format!("duplicate dry friction of `{}`", friction.of)))
                 .with_help("position and speed name the same joint: keep one of them"));
         }
         let coulomb = l.value(coulomb)?;
@@ -286,10 +287,11 @@ fn friction(
         };
         let ((direction, _), (stuck, _)) = (l.mode(), l.mode());
         if contacts.len() == MOST_CONTACTS {
-            let fact =
-                format!("at most {MOST_CONTACTS} joints can have dry friction: all their ways to stick are tried");
+            let fact = format!(
+                "at most {MOST_CONTACTS} joints can have dry friction, as all combinations of contacts are tried"
+            );
             return Err(
-                under(&friction.path, Mistake::here(fact)).with_help("keep `coulomb` where joints come to rest")
+                under(&friction.path, Mistake::here(fact)).with_help("keep `coulomb` for joints that come to rest")
             );
         }
         contacts.push(Contact { position, velocity, direction, stuck, coulomb, limit, torque: coulomb });
@@ -297,7 +299,7 @@ fn friction(
     Ok(contacts)
 }
 
-/// The derivatives: rows that have derivatives in common are solved together.
+/// Solves for the derivatives; rows with common derivatives are solved together.
 fn solve(
     graph: &mut Graph,
     d: &Definition,
@@ -312,9 +314,9 @@ fn solve(
             let name = &d.states[lost].name;
             return Err(under(
                 &d.der[name].path,
-                Mistake::here(format!("nothing determines the derivative of `{name}`")),
+                Mistake::here(format!("the equations do not determine the derivative of `{name}`")),
             )
-            .with_help("let as many equations contain it as there are derivatives in them"));
+            .with_help("write as many independent equations as there are derivatives in them"));
         }
         let n = group.len();
         let mut matrix = vec![zero; n * n];
@@ -353,7 +355,7 @@ fn solve(
     Ok(derivatives)
 }
 
-/// Two equations, by their determinant.
+/// Solves two equations by their determinant.
 fn two(graph: &mut Graph, matrix: &[Id], right: &[Id]) -> [Id; 2] {
     let mut cross = |a, b, c, d| {
         let (ab, cd) = (graph.times(a, b), graph.times(c, d));
@@ -367,7 +369,7 @@ fn two(graph: &mut Graph, matrix: &[Id], right: &[Id]) -> [Id; 2] {
     [graph.times(first, inverse), graph.times(second, inverse)]
 }
 
-/// States whose rows share derivatives, in order.
+/// Groups the states whose rows share derivatives, in order.
 fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
     let mut group: Vec<usize> = (0..rows.len()).collect();
     fn root(group: &[usize], mut s: usize) -> usize {
@@ -389,7 +391,8 @@ fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
     groups.into_values().collect()
 }
 
-/// A state of the group for whose derivative no equation is left, whatever the numbers; by augmenting paths.
+/// Returns a state of the group whose derivative no equation determines, whatever the coefficients; uses augmenting
+/// paths.
 fn undetermined(rows: &[Row], group: &[usize]) -> Option<usize> {
     fn assign(
         rows: &[Row],

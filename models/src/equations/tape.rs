@@ -1,4 +1,4 @@
-//! From the graph to tapes: each node once, products in sums, sine with cosine, registers used again.
+//! From the graph to tapes: each node once, sums of products fused, sine with cosine, registers reused.
 
 use std::collections::HashMap;
 
@@ -9,9 +9,9 @@ use super::graph::{Graph, Id, Op};
 use super::layout::{Layout, TooLarge, register};
 use super::program::{Instruction, Program};
 
-/// Compiles tapes that share a layout: first all that run in the loop, then the one that runs before it.
+/// Compiles tapes that share a layout: first all that run during the simulation, then the one that runs before it.
 pub fn compile(graph: &Graph, layout: &mut Layout, wanted: &[Vec<Id>]) -> Result<(Program, Vec<Program>), TooLarge> {
-    // All places that tapes share must be known before the first temporary register is given away.
+    // All shared registers must be known before the first temporary register is assigned.
     for roots in wanted {
         Tape::new(graph, layout, roots, false).gather()?;
     }
@@ -30,12 +30,12 @@ pub fn compile(graph: &Graph, layout: &mut Layout, wanted: &[Vec<Id>]) -> Result
     Ok((setup.finish(), programs))
 }
 
-/// A tape in the making.
+/// Tape under construction.
 struct Tape<'g> {
     graph: &'g Graph,
     layout: &'g mut Layout,
     roots: &'g [Id],
-    /// Whether it is the tape that computes the hoisted numbers.
+    /// True for the tape that computes the hoisted numbers.
     setup: bool,
     uses: HashMap<Id, usize>,
     done: HashMap<Id, Register>,
@@ -62,7 +62,7 @@ impl<'g> Tape<'g> {
         }
     }
 
-    /// Finds the shared places that the tape needs.
+    /// Finds the shared registers that the tape needs.
     fn gather(mut self) -> Result<(), TooLarge> {
         let mut stack = self.roots.to_vec();
         while let Some(id) = stack.pop() {
@@ -78,7 +78,7 @@ impl<'g> Tape<'g> {
     fn compile(mut self) -> Result<Program, TooLarge> {
         for &root in self.roots {
             self.count(root);
-            // A result stays to the end.
+            // A result is used to the end.
             *self.uses.get_mut(&root).expect("just counted") += 1;
         }
         for &root in self.roots {
@@ -100,7 +100,7 @@ impl<'g> Tape<'g> {
         self.layout.shared(self.graph, id)
     }
 
-    /// Counts how often each node is used.
+    /// Counts the uses of each node.
     fn count(&mut self, root: Id) {
         let mut stack = vec![root];
         while let Some(id) = stack.pop() {
@@ -131,7 +131,7 @@ impl<'g> Tape<'g> {
         }
     }
 
-    /// One use less: after the last, the register is free again.
+    /// Removes one use of a node; after the last use its register is free.
     fn release(&mut self, id: Id) {
         let uses = self.uses.get_mut(&id).expect("every use was counted");
         *uses -= 1;
@@ -142,7 +142,7 @@ impl<'g> Tape<'g> {
         }
     }
 
-    /// The two factors of a product that nothing else uses: it needs no register of its own.
+    /// Returns the factors of a product that is used once only and needs no register of its own.
     fn product(&mut self, id: Id) -> Option<[Id; 2]> {
         match self.graph.op(id) {
             Op::Mul(a, b) => {
@@ -158,14 +158,14 @@ impl<'g> Tape<'g> {
         matches!(self.graph.op(id), Op::Mul(a, _) if self.graph.is(a, -1.0))
     }
 
-    /// The register of a node, where it has one by now.
+    /// Returns the register of a node, if already assigned.
     fn register(&mut self, id: Id) -> Result<Option<Register>, TooLarge> {
         Ok(self.home(id)?.or_else(|| self.done.get(&id).copied()))
     }
 
-    /// Computes a node; the register is released by whoever uses it.
+    /// Computes a node; each user of the register releases it.
     ///
-    /// What a node needs is computed before it from a stack of its own: a sum is as deep as it is long.
+    /// Operands are computed first, with an explicit stack: a sum is nested as deep as it is long.
     fn emit(&mut self, id: Id) -> Result<Register, TooLarge> {
         let mut stack = vec![(id, self.needs(id).into_iter())];
         while let Some((top, needs)) = stack.last_mut() {
@@ -188,8 +188,8 @@ impl<'g> Tape<'g> {
         Ok(self.register(id)?.expect("it had one before"))
     }
 
-    /// The nodes whose registers an instruction for this node reads, in the order in which they are computed; none for a node
-    /// that has its register, whose operands this tape knows nothing of.
+    /// Returns the nodes whose registers the instruction of a node reads, in order of computation. A node with a
+    /// register needs none, and the tape has no uses of its operands.
     fn needs(&mut self, id: Id) -> Vec<Id> {
         if matches!(self.register(id), Ok(Some(_)) | Err(_)) {
             return Vec::new();
@@ -206,7 +206,7 @@ impl<'g> Tape<'g> {
         }
     }
 
-    /// Computes a node from what it needs.
+    /// Computes a node from its operands.
     fn make(&mut self, id: Id) -> Result<Register, TooLarge> {
         use Instruction as I;
         let register = match self.graph.op(id) {
@@ -234,7 +234,7 @@ impl<'g> Tape<'g> {
                 (None, None) => self.instruction(&[a, b], |o, r| I::Sub(o, r[0], r[1]))?,
             },
             Op::Mul(_, b) if self.is_minus(id) => {
-                // The factor -1 was counted too; it needs no register.
+                // The factor -1 is counted as a use, but needs no register.
                 self.instruction(&[b], |o, r| I::Neg(o, r[0]))?
             }
             Op::Mul(a, b) => self.instruction(&[a, b], |o, r| I::Mul(o, r[0], r[1]))?,
@@ -253,7 +253,7 @@ impl<'g> Tape<'g> {
         Ok(register)
     }
 
-    /// Computes the operands, then the instruction.
+    /// Computes the operands, then adds the instruction.
     fn instruction(
         &mut self,
         operands: &[Id],
@@ -271,7 +271,7 @@ impl<'g> Tape<'g> {
         Ok(o)
     }
 
-    /// A function; sine and cosine of the same angle are computed at once.
+    /// Computes a function; sine and cosine of the same angle are computed together.
     fn function(&mut self, function: Function, a: Id) -> Result<Register, TooLarge> {
         use Instruction as I;
         let other = match function {
@@ -299,7 +299,7 @@ impl<'g> Tape<'g> {
         Ok(mine)
     }
 
-    /// An unknown of a block, which is solved at the first need; its registers are not used again.
+    /// Returns an unknown of a block, which is solved on first use; its registers are not reused.
     fn solution(&mut self, block: usize, unknown: usize) -> Result<Register, TooLarge> {
         let graph = self.graph;
         let block_of = &graph.blocks[block];

@@ -1,4 +1,4 @@
-//! Models from text against an independent integration, closed forms and compiled models.
+//! Models from text, compared with an independent integration, closed forms and compiled models.
 
 mod large;
 
@@ -60,7 +60,7 @@ fn sine(amplitude: f64, angular: f64, offset: f64) -> Input {
     Input::Sine { amplitude, frequency: angular / std::f64::consts::TAU, phase: 0.0, offset }
 }
 
-/// One plant of `tests/equations`: its text, what drives it, values of parameters, the end, the states there.
+/// Test plant of `tests/equations`: text, inputs, parameters, end of the simulation, final states.
 type Plant = (&'static str, Vec<(&'static str, Input)>, Vec<(&'static str, f64)>, f64, &'static [f64]);
 
 macro_rules! text {
@@ -69,7 +69,7 @@ macro_rules! text {
     };
 }
 
-/// The last states are those that `tests/equations/reference.py` prints.
+/// Returns the test plants. The final states are those printed by `tests/equations/reference.py`.
 #[rustfmt::skip]
 fn plants() -> Vec<Plant> {
     vec![
@@ -162,7 +162,7 @@ fn tangents_agree_with_central_differences() {
 }
 
 #[test]
-fn it_is_the_compiled_model_to_the_tolerance_dry_friction_included() {
+fn a_model_from_text_agrees_with_the_compiled_model_with_dry_friction() {
     use crate::furuta::Furuta;
     use crate::kernel::Tolerance;
     let friction = "\n[friction]\nth = { viscous = 'bp', coulomb = 'cp' }\nphd = { viscous = 'ba', coulomb = 'ca' }\n";
@@ -203,8 +203,9 @@ fn it_is_the_compiled_model_to_the_tolerance_dry_friction_included() {
 
 #[test]
 fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
-    // Position x, force of the spring k x, belt at speed w under the block; x is measured against the belt's start, so the
-    // speed relative to the belt is u = v - w. Stuck while k |x| <= peak c, then a sine about x = c/k until u is 0 again.
+    // Position x of the block, spring force k x, belt with speed w. Positions are relative to the start of the belt, so
+    // the speed relative to the belt is u = v - w. The block sticks while k |x| <= peak c, then follows a sine about x
+    // = c/k until u is 0 again.
     let (m, k, c, peak, w) = (1.0_f64, 4.0_f64, 2.0_f64, 1.5_f64, 0.3_f64);
     let text = "
         states = { x = 'm', s = 'm', u = 'm/s' }
@@ -215,11 +216,11 @@ fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
     let model = model(text);
     let response = respond(&model, &[], &[("m", m), ("k", k), ("c", c), ("w", w)], 20.0);
     let slides: Vec<f64> = response.events.iter().filter(|e| e.what == "s slides").map(|e| e.time).collect();
-    // The belt carries the block in +x until the spring pulls with peak c; then x = c/k + A cos(angular t - start).
+    // The belt carries the block in +x until the spring force is peak c; then x = c/k + A cos(angular t - start).
     let angular = (k / m).sqrt();
-    let above = (peak - 1.0) * c / k; // break-away above the centre of the sine, which is at x = c/k
+    let above = (peak - 1.0) * c / k; // break-away position relative to the centre of the sine at x = c/k
     let start = math::atan2(w / angular, above);
-    // Speed of x: -A angular sin(angular t - start); equal to w at t = 0 and at angular t = 2 start + pi.
+    // Speed of x: -A angular sin(angular t - start), equal to w at t = 0 and at angular t = 2 start + pi.
     let slip = (2.0 * start + std::f64::consts::PI) / angular;
     let stick = 2.0 * above / w;
     assert!(slides.len() > 3, "{:?}", response.events);
@@ -230,7 +231,7 @@ fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
 
 #[test]
 fn no_step_crosses_a_kink_and_a_kink_costs_one_event() {
-    // x' = max(sin t, 0): x = 1 - cos t up to pi, then 2 to 2 pi.
+    // x' = max(sin t, 0): x = 1 - cos t up to pi, then 2 up to 2 pi.
     let rectifier = model("states = { x = '1' }\nder = { x = 'max(sin(time), 0)' }");
     let response = respond(&rectifier, &[], &[], 20.0);
     for t in [1.0_f64, 3.0, 4.0, 6.0] {
@@ -238,10 +239,10 @@ fn no_step_crosses_a_kink_and_a_kink_costs_one_event() {
         assert!((at(&response, "x", t) - exact).abs() < 1e-9, "{t}");
     }
     assert!(response.work.steps < 400, "{:?}", response.work);
-    // Saturation and dead zone by the area under them.
+    // Saturation and dead zone, by the area under them.
     let clipped = model("states = { x = '1' }\nder = { x = 'clip(time - 1, -0.5, 0.5) + deadzone(time, -1, 2)' }");
     let response = respond(&clipped, &[], &[], 3.0);
-    // clip: -0.5 to 0.5 s, line to 1.5 s, 0.5 to 3 s; deadzone: (t - 2) from 2 s.
+    // clip: -0.5 up to 0.5 s, a ramp up to 1.5 s, 0.5 up to 3 s; deadzone: (t - 2) from 2 s on.
     let exact = -0.5 * 0.5 + 0.0 + 0.5 * 1.5 + 0.5;
     assert!((at(&response, "x", 3.0) - exact).abs() < 1e-10, "{} {exact}", at(&response, "x", 3.0));
 }
@@ -252,7 +253,7 @@ fn a_tank_runs_empty_stays_empty_and_fills_again() {
     let model = model(text!("tanks"));
     let given = [("kp", 19.5), ("a1", 1.12), ("a2", 0.468), ("h10", 8.9), ("h20", 0.0)];
     let response = respond(&model, &[("u", inflow)], &given, 100.0);
-    // sqrt(h) falls by a1/A1 sqrt(g/2) a second: empty after 95/1.12 sqrt(2 8.9/981) = 11.43 s.
+    // sqrt(h) decreases by a1/A1 sqrt(g/2) per second: empty after 95/1.12 sqrt(2 8.9/981) = 11.43 s.
     let empty = 95.0 / 1.12 * (2.0 * 8.9_f64 / 981.0).sqrt();
     let half = 8.9 * math::powi(1.0 - 5.0 / empty, 2);
     assert!((at(&response, "h1", 5.0) - half).abs() < 1e-8);
@@ -265,7 +266,7 @@ fn a_tank_runs_empty_stays_empty_and_fills_again() {
 
 #[test]
 fn a_noisy_input_at_a_kink_costs_steps_in_proportion_to_its_samples() {
-    // A tank held at empty by an inflow that comes and goes each second.
+    // A tank that stays nearly empty, with an inflow that changes every second.
     let times: Vec<f64> = (0..200).map(f64::from).collect();
     let levels: Vec<f64> = (0..200).map(|k| f64::from(k * 7919 % 13) * 0.02).collect();
     let inflow = Input::Sampled { times, values: levels, hold: mops_core::Hold::Zero };
@@ -296,7 +297,7 @@ fn a_ball_bounces_by_its_rule() {
 
 #[test]
 fn an_event_happens_once_until_its_guard_was_positive_again() {
-    // A thermostat: below 19 the heater goes on, above 21 off; the level of the heater is a state that events set.
+    // Thermostat: the heater switches on below 19 and off above 21; its power is a state that events set.
     let text = "
         states = { T = 'K', heat = 'K/s' }
         der = { T = '-0.1 [1/s]*(T - 10) + heat', heat = 0 }
@@ -313,7 +314,7 @@ fn an_event_happens_once_until_its_guard_was_positive_again() {
 }
 
 #[test]
-fn jumps_are_exact_and_dry_friction_as_a_sign_is_a_failure_that_says_so() {
+fn jumps_are_exact_and_dry_friction_as_a_sign_is_reported_as_a_failure() {
     let jump = model(
         "states = { x = '1' }\nparameters = { when_ = 's' }\nder = { x = 'if(time >= when_, 3, time < 0.5, 1, 0)' }",
     );
@@ -325,9 +326,9 @@ fn jumps_are_exact_and_dry_friction_as_a_sign_is_a_failure_that_says_so() {
 }
 
 #[test]
-fn a_mass_matrix_of_three_is_solved_and_a_singular_one_loses() {
-    // M x' = (1, 2, 3) with M = [[2, 1, 0], [1, p, 1], [0, 1, 4]]; for p = 3 the derivatives are (4, 1, 13)/18... solved here
-    // by Cramer's rule; for p = 0.75 the determinant 8 p - 6 is zero.
+fn a_mass_matrix_of_three_is_solved_and_a_singular_one_is_a_failure() {
+    // M x' = (1, 2, 3) with M = [[2, 1, 0], [1, p, 1], [0, 1, 4]]. For p = 3 the derivatives follow from Cramer's rule;
+    // for p = 0.75 the determinant 8 p - 6 is zero.
     let text = "
         states = { x = '1', y = '1', z = '1' }
         parameters = { p = '1' }
@@ -360,12 +361,12 @@ fn a_heat_rod_of_a_hundred_nodes_takes_few_lines() {
     let model = model(text);
     assert_eq!(model.interface().states[99].start, "T0[100]");
     let response = respond(&model, &[], &[("k", 10.0)], 2.0);
-    // The same by explicit Euler with tiny steps would be slow; in the middle nothing has happened yet, the end warms as
-    // a half-infinite rod does, and heat is only moved.
+    // Explicit Euler with tiny steps would be slow as a reference. Instead: the middle is still unaffected, the end
+    // warms like a half-infinite rod, and heat is conserved.
     assert!((at(&response, "T[10]", 2.0) - 20.0).abs() < 1e-9);
     let warm: Vec<f64> = (1..=100).map(|k| at(&response, &format!("T[{k}]"), 2.0)).collect();
     assert!(warm.windows(2).all(|w| w[1] >= w[0] - 1e-9), "monotone");
-    // In units of the spacing: u(d) = 30 erfc(d / sqrt(4 k t)), with d from the wall at node 101.
+    // In units of the spacing: u(d) = 30 erfc(d / sqrt(4 k t)), with the distance d from the wall at node 101.
     let erfc_of_half = 0.479_500_122_2;
     let d = 0.5 * (4.0_f64 * 10.0 * 2.0).sqrt();
     let node = 101.0 - d;
@@ -380,8 +381,8 @@ fn a_heat_rod_of_a_hundred_nodes_takes_few_lines() {
 }
 
 #[test]
-fn a_stiff_rod_by_the_stiff_method_takes_few_steps_and_comes_to_the_same() {
-    // A radiating rod, so that the Jacobian changes; with exact columns, eight of them at once.
+fn a_stiff_rod_by_the_stiff_method_takes_few_steps_to_the_same_result() {
+    // A radiating rod, so that the Jacobian changes; exact Jacobian, eight columns at once.
     let text = "
         states = { 'T[1..100]' = 'K' }
         parameters = { k = '1/s' }
@@ -404,7 +405,7 @@ fn a_stiff_rod_by_the_stiff_method_takes_few_steps_and_comes_to_the_same() {
 }
 
 #[test]
-fn the_slopes_at_an_operating_point_are_those_of_the_equations() {
+fn derivatives_at_an_operating_point_are_those_of_the_equations() {
     use mops_core::OperatingPoint;
     let model = model(&format!("{}friction.q = {{ coulomb = 0.3 }}", text!("servo")));
     let (j, b) = (2.0, 0.5);
@@ -416,7 +417,7 @@ fn the_slopes_at_an_operating_point_are_those_of_the_equations() {
 }
 
 #[test]
-fn dry_friction_is_left_out_of_an_equilibrium_and_its_slopes() {
+fn dry_friction_is_omitted_at_an_equilibrium_and_in_its_derivatives() {
     use mops_core::{Case, Linearise, Linearised, OperatingPoint, Quantity};
     let text = "
         states = { ph = 'rad', w = 'rad/s' }
@@ -427,7 +428,7 @@ fn dry_friction_is_left_out_of_an_equilibrium_and_its_slopes() {
     let at = vec![("ph".to_owned(), Quantity::parse("0.3").unwrap())];
     let options = Linearise { at, equilibrium: true, free: vec!["u".to_owned()], ..Linearise::default() };
     let trim = Linearised::new(std::sync::Arc::new(model(text)), &options).unwrap();
-    // From rest, and from a search that passes speeds of either sign.
+    // From rest, and from a search that passes through speeds of either sign.
     for w0 in [0.0, 1e-6, -3.0] {
         let found = trim.at(&Case::default(), &[0.0, w0]).unwrap();
         assert!((found.inputs[0] - 0.6 * math::sin(0.3)).abs() < 1e-12, "{}", found.inputs[0]);
@@ -439,7 +440,7 @@ fn dry_friction_is_left_out_of_an_equilibrium_and_its_slopes() {
         let local = model(text).local(&point).unwrap().unwrap();
         (local.rates[1], local.frictionless.len())
     };
-    // What moves slides; speeds of rounding are none.
+    // A moving joint slides; speeds within rounding count as rest.
     assert!((rate(2.0, false).0 + 5.4).abs() < 1e-12 && (rate(-2.0, false).0 - 5.4).abs() < 1e-12);
     assert!(rate(1e-12, false).0.abs() < 1e-9 && rate(2.0, false).1 == 0 && rate(1e-12, false).1 == 1);
     assert!((rate(2.0, true).0 + 0.4).abs() < 1e-12);
@@ -469,7 +470,7 @@ fn places_of_effects_have_the_names_of_joints_states_inputs_and_signals() {
 }
 
 #[test]
-fn an_output_of_time_is_exact_beside_a_state_that_rests() {
+fn an_output_of_time_is_exact_while_the_state_rests() {
     let model = model(
         "states = { x = '1' }\nder = { x = '0' }\noutputs = { y = 'sin(20*time)', z = '1/(1 + 25*(time - 4)^2)' }",
     );
@@ -482,7 +483,7 @@ fn an_output_of_time_is_exact_beside_a_state_that_rests() {
 }
 
 #[test]
-fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
+fn definitions_are_in_any_order_and_initial_values_may_be_expressions() {
     let text = "
         states = { x = 'm', v = 'm/s' }
         parameters = { w = 'rad/s', A = 'm', s = 'm' }
@@ -493,7 +494,10 @@ fn definitions_stand_in_any_order_and_start_values_may_be_expressions() {
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1)], 1.0);
     assert!((at(&response, "x", 1.0) - (0.1 * math::cos(3.0) + math::sin(3.0))).abs() < 1e-9);
     let response = respond(&model, &[], &[("w", 3.0), ("A", 0.5), ("s", 0.1), ("v0", 0.0)], 1.0);
-    assert!((at(&response, "x", 1.0) - 0.1 * math::cos(3.0)).abs() < 1e-9, "a start value that is given goes over it");
+    assert!(
+        (at(&response, "x", 1.0) - 0.1 * math::cos(3.0)).abs() < 1e-9,
+        "a given initial value overrides the expression"
+    );
     assert_eq!(model.start_values(&[3.0, 0.5, 0.1, f64::NAN]), Some(vec![0.1, 3.0]));
     assert_eq!(model.interface().states[0].start, "s");
     assert_eq!(model.interface().states[1].rate_of.as_deref(), Some("x"));
@@ -509,18 +513,18 @@ fn every_mistake_names_its_place() {
     type Wrong = (&'static str, &'static str, Option<(usize, usize)>, &'static str);
     let cases: [Wrong; 16] = [
         ("der = { x = 'v', v = '-q*x' }", "der.v", Some((1, 2)), "no quantity `q`"),
-        ("der = { x = 'v' }", "states.v", None, "nothing gives the derivative of `v`"),
+        ("der = { x = 'v' }", "states.v", None, "state `v` has no equation"),
         ("der = { x = 'v', y = '1', v = '0' }", "der.y", None, "no state `y`"),
         ("der = { x = 'v', v = '2*(x + 1' }", "der.v", Some((8, 8)), "`)`"),
-        ("der = { x = 'a', v = '0' }\nlet = { a = '2*b', b = 'a' }", "let.b", Some((0, 1)), "itself"),
+        ("der = { x = 'a', v = '0' }\nlet = { a = '2*b', b = 'a' }", "let.b", Some((0, 1)), "circular"),
         ("parameters = { x = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x", None, "both a state and a parameter"),
         ("parameters = { k = 'parsec' }\nder = { x = 'v', v = '0' }", "parameters.k", None, "not a known unit"),
-        ("der = { x = 'v', v = \"x'^2 = 1\" }", "der.v", Some((0, 2)), "derivative cannot stand"),
-        ("der = { x = \"v' = 1\", v = \"2*v' = x\" }", "der.x", None, "nothing determines the derivative of `x`"),
+        ("der = { x = 'v', v = \"x'^2 = 1\" }", "der.v", Some((0, 2)), "derivative is not allowed"),
+        ("der = { x = \"v' = 1\", v = \"2*v' = x\" }", "der.x", None, "do not determine the derivative of `x`"),
         ("der = { x = 'v', v = 'v = 1' }", "der.v", None, "contains no derivative"),
         ("der = { x = 'v', v = '0' }\nstart = { x = '2*v' }", "start.x", Some((2, 3)), "parameters and constants only"),
         ("der = { x = 'v', v = '0' }\nfriction.v2 = { coulomb = 1 }", "friction.v2", None, "friction needs a joint"),
-        ("parameters = { x0 = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x0", None, "start value"),
+        ("parameters = { x0 = 'm' }\nder = { x = 'v', v = '0' }", "parameters.x0", None, "initial value"),
         ("der = { x = 'v', v = '0' }\nlet = { unused = 'qq' }", "let.unused", Some((0, 2)), "no quantity `qq`"),
         ("der = { x = 'v', v = 'table(x, 1, 2, 0, 3)' }", "der.v", Some((15, 16)), "must rise, but 0 follows 1"),
         ("der = { x = 'v', v = '0' }\nmass = { v = '1' }", "mass.v", None, "a row and a column"),

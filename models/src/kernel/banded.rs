@@ -1,22 +1,22 @@
-//! Banded matrices, and their triangular factors with row pivoting; a full matrix is the widest band.
+//! Banded matrices and their LU factors with row pivoting; a full matrix is the widest band.
 //!
 //! Source: G. Golub, C. Van Loan, Matrix Computations, 4th edition (2013), section 4.3.5.
 
-/// An `n` x `n` matrix with `lower` diagonals below the main one and `upper` above it.
+/// Matrix of size `n` x `n` with `lower` diagonals below the main diagonal and `upper` above it.
 #[derive(Debug, Clone)]
 pub(super) struct Banded {
     n: usize,
     lower: usize,
-    /// Diagonals above the main one that a row keeps: `upper`, and those that exchanges of rows fill in.
+    /// Stored diagonals above the main diagonal: `upper`, plus the fill-in from row exchanges.
     reach: usize,
-    /// Row by row, from the lowest diagonal to the highest.
+    /// Entries row by row, from the lowest diagonal to the highest.
     rows: Vec<f64>,
-    /// After factorisation: the row that was exchanged with each.
+    /// Pivot row of each row, after factorisation.
     exchanged: Vec<usize>,
 }
 
 impl Banded {
-    /// A matrix of zeros.
+    /// Creates a matrix of zeros.
     pub(super) fn zeros(n: usize, lower: usize, upper: usize) -> Self {
         let reach = (upper + lower).min(n.saturating_sub(1));
         Self { n, lower, reach, rows: vec![0.0; n * (lower + reach + 1)], exchanged: (0..n).collect() }
@@ -41,7 +41,7 @@ impl Banded {
         self.rows[index] = value;
     }
 
-    /// Becomes `I - factor matrix`, for a matrix of the same band.
+    /// Sets the matrix to `I - factor matrix`, for a matrix of the same band.
     pub(super) fn set_shifted(&mut self, matrix: &Self, factor: f64) {
         for (own, other) in self.rows.iter_mut().zip(&matrix.rows) {
             *own = -factor * other;
@@ -52,7 +52,7 @@ impl Banded {
         }
     }
 
-    /// Replaces the matrix by its triangular factors; `false` if it is singular.
+    /// Replaces the matrix by its LU factors; returns false if it is singular.
     pub(super) fn factorise(&mut self) -> bool {
         let width = self.width();
         for k in 0..self.n {
@@ -87,7 +87,7 @@ impl Banded {
         true
     }
 
-    /// Solves with the factors, in place.
+    /// Solves with the LU factors, in place.
     pub(super) fn solve(&self, b: &mut [f64]) {
         let width = self.width();
         for k in 0..self.n {
@@ -112,7 +112,7 @@ impl Banded {
 mod tests {
     use super::*;
 
-    /// Solves with a matrix of the band, with entries from a recurrence, and checks the residual.
+    /// Solves with a matrix of this band, with entries from a recurrence, and checks the residual.
     fn check(n: usize, lower: usize, upper: usize) {
         let mut seed = 0.3;
         let mut random = || {
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_singular_matrix_is_told() {
+    fn a_singular_matrix_is_reported() {
         let mut matrix = Banded::zeros(3, 1, 1);
         matrix.set(0, 0, 1.0);
         assert!(!matrix.factorise());

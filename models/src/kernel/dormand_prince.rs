@@ -1,4 +1,4 @@
-//! The explicit Runge-Kutta method of Dormand and Prince: order 5(4), dense output of order 4.
+//! Explicit Runge-Kutta method of Dormand and Prince: order 5(4), dense output of order 4.
 //!
 //! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), table
 //! II.5.2 (coefficients), section II.6 (dense output).
@@ -9,7 +9,7 @@ use super::Dynamics;
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
-/// The stages of a step.
+/// Stages of a step.
 pub struct DormandPrince<S> {
     k: [Vec<S>; 7],
     stage: Vec<S>,
@@ -49,8 +49,8 @@ impl<S: Scalar> Method<S> for DormandPrince<S> {
 }
 
 impl<S: Scalar> DormandPrince<S> {
-    /// An attempt with `N` states; 0 stands for any number.
-    #[inline(never)] // Within the loop over steps the stages run out of registers: a quarter of their time.
+    /// Attempts a step with `N` states; `N = 0` means any number.
+    #[inline(never)] // Inlined into the loop over steps, the stages lack registers, which costs a quarter of their time.
     pub(super) fn attempt_of<D: Dynamics<S> + ?Sized, const N: usize>(
         &mut self,
         f: &D,
@@ -65,20 +65,20 @@ impl<S: Scalar> DormandPrince<S> {
     }
 }
 
-/// Slices of a length that is known to the compiler where `n` is.
+/// Returns slices of length `n`, known to the compiler if `n` is.
 #[inline(always)]
 fn cut<S>([k0, k1, k2, k3, k4, k5, k6]: &[Vec<S>; 7], n: usize) -> [&[S]; 7] {
     [&k0[..n], &k1[..n], &k2[..n], &k3[..n], &k4[..n], &k5[..n], &k6[..n]]
 }
 
-/// The six new stages; `k[0]` is given, `k[6]` is the derivative at the new state.
+/// Computes the six new stages; `k[0]` is given, `k[6]` is the derivative at the new state.
 #[rustfmt::skip]
 #[inline(always)]
 fn stages<S: Scalar, D: Dynamics<S> + ?Sized>(
     f: &D, (t, h): (f64, f64), x: &[S], k: &mut [Vec<S>; 7], stage: &mut [S], next: &mut [S],
 ) {
     let n = x.len();
-    // Terms in the order of the stages, so that the newest derivative, which is waited for, comes in last.
+    // Terms in the order of the stages, so that the newest derivative, the last to be available, is added last.
     macro_rules! combine {
         ($target:expr, $($i:literal * $c:expr),+) => {{
             let k = cut(k, n);
@@ -101,7 +101,7 @@ fn stages<S: Scalar, D: Dynamics<S> + ?Sized>(
     f.derivative(t + h, next, &mut k[6]);
 }
 
-/// Norm of the embedded error estimate.
+/// Returns the norm of the embedded error estimate.
 #[inline(always)]
 fn error_norm<S: Scalar>(h: f64, x: &[S], next: &[S], k: &[Vec<S>; 7], weights: &Weights) -> f64 {
     let k = cut(k, x.len());

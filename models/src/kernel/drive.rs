@@ -1,39 +1,40 @@
-//! An input as a simulation meets it: smooth within a step, with its jumps at breaks.
+//! Inputs during a simulation: smooth within a step, with jumps at breaks.
 
 use mops_core::band_limited::{piece, polynomial};
 use mops_core::enclosure::Enclosure;
 use mops_core::math;
 use mops_core::{Hold, Input, Scalar};
 
-/// An input with its present value and slope.
+/// Input with its current value and rate.
 ///
-/// A step of the integrator ends where the input jumps and evaluates it there from the left; only
-/// [`Drive::pass_break`] moves on to the value from the right. Inputs of a case are numbers; over a scalar with tangents
-/// a drive can be held at a value with tangents, to differentiate by the input.
+/// A step of the integrator ends where the input jumps, and evaluates the input there from the left. Only
+/// [`Drive::pass_break`] changes to the value from the right. Inputs of a case are numbers. With a scalar that has
+/// tangents, a drive can be fixed at a value with tangents, to differentiate with respect to the input.
 #[derive(Debug, Clone)]
 pub struct Drive<'a, S = f64> {
     input: Option<&'a Input>,
     since: f64,
     value: S,
     slope: f64,
-    /// The first of the samples after `since`.
+    /// Index of the first sample after `since`.
     after: usize,
-    /// The first of those that are held and differ from the one before.
+    /// Index of the first sample under zero-order hold that differs from the one before.
     change: usize,
-    /// What goes on top of the value in place of a straight line.
+    /// Curve added to the value instead of a straight line.
     curve: Option<Curve>,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Curve {
-    /// `amplitude sin(angular t + phase)`; the angular frequency in rad/s.
+    /// Sine `amplitude sin(angular t + phase)`; the angular frequency in rad/s.
     Sine { amplitude: f64, angular: f64, phase: f64 },
-    /// A polynomial of `(t - since)/step`.
+    /// Polynomial in `(t - since)/step`.
     Piece { since: f64, step: f64, coefficients: [f64; 6] },
 }
 
 impl Curve {
-    // Inlined, it would be evaluated for every input: to the compiler a sine is harmless enough to be taken in advance.
+    // If inlined, the sine would be evaluated for every input: the compiler considers it cheap enough to compute
+    // speculatively.
     #[inline(never)]
     fn at(&self, t: f64) -> f64 {
         match self {
@@ -65,21 +66,21 @@ impl Curve {
 }
 
 impl<S: Scalar> Drive<'_, S> {
-    /// A drive that stays at a value.
+    /// Creates a drive with a constant value.
     pub fn held(value: S) -> Self {
         Self { input: None, since: 0.0, value, slope: 0.0, after: 0, change: 0, curve: None }
     }
 }
 
 impl<'a, S: Scalar> Drive<'a, S> {
-    /// A drive at time 0; nothing drives where `input` is absent.
+    /// Creates a drive at time 0; without an `input` it is zero.
     pub fn new(input: Option<&'a Input>) -> Self {
         let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, change: 0, curve: None };
         drive.pass_break(0.0);
         drive
     }
 
-    /// The value at `t`.
+    /// Returns the value at `t`.
     #[inline]
     pub fn at(&self, t: f64) -> S {
         match &self.curve {
@@ -88,12 +89,12 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
-    /// Whether it has the same value up to the next break.
+    /// Returns true if the value is constant up to the next break.
     pub fn is_constant(&self) -> bool {
         self.curve.is_none() && self.slope == 0.0
     }
 
-    /// Bounds over a time between two breaks.
+    /// Returns bounds over a time span between two breaks.
     pub fn enclose(&self, time: Enclosure) -> Enclosure {
         let value = Enclosure::from(self.value.value());
         match &self.curve {
@@ -103,12 +104,13 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
-    /// How fast it moves at `t`, per s.
+    /// Returns the rate at `t`, per s.
     pub fn slope(&self, t: f64) -> f64 {
         self.curve.as_ref().map_or(self.slope, |curve| curve.slope(t))
     }
 
-    /// The next time after `t` at which the value or its slope jumps; samples that are held and repeat themselves do not.
+    /// Returns the next time after `t` at which the value or its rate jumps. Under zero-order hold, samples equal to
+    /// the previous one are skipped.
     pub fn next_break(&self, t: f64) -> f64 {
         let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
         let after = self.first_after(times, t);
@@ -117,7 +119,8 @@ impl<'a, S: Scalar> Drive<'a, S> {
         times.get(change).copied().unwrap_or(f64::INFINITY)
     }
 
-    /// The same with all samples.
+    /// Returns the next time after `t` at which the value or its rate jumps; every sample counts, also if equal to the
+    /// previous one.
     pub fn next_sample(&self, t: f64) -> f64 {
         match self.input {
             Some(Input::Sampled { times, .. }) => {
@@ -128,7 +131,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
-    /// The first sample after `t`, looked for near where the drive is.
+    /// Returns the index of the first sample after `t`, searched first near the current position of the drive.
     fn first_after(&self, times: &[f64], t: f64) -> usize {
         const NEAR: usize = 3;
         let near = self.after..times.len().min(self.after + NEAR);
@@ -136,7 +139,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
         near.into_iter().find(|&k| behind && times[k] > t).unwrap_or_else(|| times.partition_point(|&time| time <= t))
     }
 
-    /// A sixteenth of the period of a sine, s; infinity for inputs that are straight between their breaks.
+    /// Returns one sixteenth of the period of a sine, s; infinity for all other inputs.
     pub fn longest_step(&self) -> f64 {
         match self.input {
             Some(Input::Sine { frequency, .. }) => 1.0 / (16.0 * frequency.abs()),
@@ -144,7 +147,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
-    /// Takes the value and slope that hold from `t` on.
+    /// Moves on to the value and rate that are valid from `t` on.
     pub fn pass_break(&mut self, t: f64) {
         let Some(input) = self.input else { return };
         self.since = t;
@@ -182,7 +185,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
     }
 }
 
-/// The first of the values from `after` on that differs from the one before.
+/// Returns the index of the first value, at `after` or later, that differs from the value before it.
 fn first_change(values: &[f64], after: usize) -> usize {
     let same = |k: &usize| *k > 0 && values[*k] == values[*k - 1];
     (after..values.len()).find(|k| !same(k)).unwrap_or(values.len())
@@ -208,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_those_of_the_curve() {
+    fn rates_are_the_derivatives_of_the_curve() {
         let times: Vec<f64> = (0..100).map(|i| 0.1 * f64::from(i)).collect();
         let values = times.iter().map(|t| math::sin(3.0 * t)).collect();
         let sine = Input::Sine { amplitude: 1.0, frequency: 3.0 / std::f64::consts::TAU, phase: 0.0, offset: 0.0 };

@@ -1,4 +1,4 @@
-//! A plant together with what drives its inputs.
+//! Plant together with its inputs.
 
 use std::cell::RefCell;
 
@@ -8,28 +8,29 @@ use mops_core::{EventInstant, Failure, Instant, Plant, Scalar, Span};
 use super::Dynamics;
 use super::drive::Drive;
 
-/// A plant whose inputs are driven, without forces from outside: what a simulation integrates.
+/// Plant with given inputs and without external forces: the system that a simulation integrates.
 pub struct Driven<'a, S, P> {
-    /// The plant.
+    /// Plant.
     pub plant: P,
     drives: Vec<Drive<'a, S>>,
-    /// The inputs since the last break, where none of them varies up to the next.
+    /// Inputs since the last break, if all of them are constant up to the next.
     constant: Option<Vec<S>>,
-    /// The inputs where they were last asked for.
+    /// Inputs at the time of the last evaluation.
     inputs: RefCell<Vec<S>>,
-    /// Bounds of inputs and forces, to look at guards with.
+    /// Bounds of inputs and forces, to enclose guards.
     bounds: RefCell<Vec<Enclosure>>,
-    /// Forces from outside: all 0.
+    /// External forces: all 0.
     forces: Vec<S>,
-    /// For each signal the state that it shows as it is.
+    /// Index of the state that each signal equals, if any.
     shows: &'a [Option<usize>],
-    /// By how much the events of the moment come later: tangents without a value.
+    /// Delay of the current events: tangents with zero value.
     delay: S,
 }
 
 impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
-    /// The plant with its inputs in the order of [`mops_core::Interface::inputs`], a number of forces that may act from outside,
-    /// and for each signal the state that it shows as it is; signals beyond these are computed.
+    /// Combines the plant with its inputs, in the order of [`mops_core::Interface::inputs`]. `forces` is the number of
+    /// external forces; `shows` gives for each signal the state that it equals. Signals beyond the length of `shows`
+    /// are computed.
     pub fn new(plant: P, drives: Vec<Drive<'a, S>>, forces: usize, shows: &'a [Option<usize>]) -> Self {
         let zero = S::from(0.0);
         let inputs = RefCell::new(vec![zero; drives.len()]);
@@ -37,7 +38,7 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         Self { plant, drives, constant: None, inputs, bounds, forces: vec![zero; forces], shows, delay: zero }
     }
 
-    /// Looks at the plant at a time and a state.
+    /// Evaluates a function of the plant at a time and a state.
     #[inline(always)]
     fn look<R>(&self, t: f64, x: &[S], at: impl FnOnce(&P, &Instant<'_, S>) -> R) -> R {
         if let Some(u) = &self.constant {
@@ -55,10 +56,10 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         }
     }
 
-    /// Whether a simulation can begin at these states, at time 0.
+    /// Checks that a simulation can start from these states at time 0.
     ///
     /// # Errors
-    /// Why it cannot.
+    /// The reason why it cannot.
     pub fn can_start(&self, x: &[S]) -> Result<(), Failure> {
         self.look(0.0, x, |plant, at| plant.can_start(at))
     }
@@ -67,7 +68,7 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         self.drives.iter().map(|drive| drive.slope(t)).collect()
     }
 
-    /// Changes the plant at an event.
+    /// Applies a change to the plant at an event.
     fn at_event<'p, R>(&'p mut self, t: f64, x: &[S], change: impl FnOnce(&'p mut P, &EventInstant<'_, S>) -> R) -> R {
         let du = self.rates_of_inputs(t);
         let moved = |(drive, rate): (&Drive<'_, S>, &f64)| match S::DIRECTIONS {
@@ -81,7 +82,7 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
 }
 
 impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
-    // Written out, as closures are not compiled into the stages.
+    // Written out because closures are not inlined into the stages.
     #[inline(always)]
     fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
         if let Some(u) = &self.constant {

@@ -1,11 +1,11 @@
-//! The implicit Runge-Kutta method ARK4(3)6L\[2\]SA-ESDIRK: order 4(3), L-stable, stiffly accurate.
+//! Implicit Runge-Kutta method ARK4(3)6L\[2\]SA-ESDIRK: order 4(3), L-stable, stiffly accurate.
 //!
-//! The first stage is explicit and the last one is the new state, so that its derivative begins the next step. Each of
-//! the other five solves `z - h/4 f(z) = r` by Newton's method with one matrix `I - h/4 J` for all, which is kept as long
-//! as it serves. Dense output is the cubic Hermite polynomial of both ends.
+//! The first stage is explicit. The last stage is the new state, so that its derivative is the first stage of the next
+//! step. Each of the other five stages solves `z - h/4 f(z) = r` by Newton's method. All use one matrix `I - h/4 J`,
+//! which is kept while the iteration converges. Dense output is the cubic Hermite polynomial through both ends.
 //!
-//! Tangents go through the same equations: once the value of a stage has converged it is frozen, and its tangents, which
-//! obey linear equations with the same matrix, are iterated to the end. So they change no value.
+//! Tangents are computed from the same equations. Once the value of a stage has converged it is frozen. The tangents
+//! obey linear equations with the same matrix and are iterated to convergence, so they do not change any value.
 //!
 //! Source: C. Kennedy, M. Carpenter, Applied Numerical Mathematics 44 (2003) 139-181, appendix C (coefficients); E. Hairer,
 //! G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996), section IV.8 (Newton's method, error).
@@ -18,13 +18,13 @@ use super::banded::Banded;
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
-/// The diagonal of every implicit stage.
+/// Diagonal coefficient of every implicit stage.
 const GAMMA: f64 = 0.25;
 
-/// Times of the stages.
+/// Times of the stages, as fractions of the step.
 const C: [f64; 6] = [0.0, 1.0 / 2.0, 83.0 / 250.0, 31.0 / 50.0, 17.0 / 20.0, 1.0];
 
-/// What a stage takes of the ones before it.
+/// Coefficients of the preceding stages in each stage.
 const A: [[f64; 5]; 6] = [
     [0.0; 5],
     [1.0 / 4.0, 0.0, 0.0, 0.0, 0.0],
@@ -40,7 +40,7 @@ const A: [[f64; 5]; 6] = [
     [82_889.0 / 524_892.0, 0.0, 15_625.0 / 83_664.0, 69_875.0 / 102_672.0, -2260.0 / 8211.0],
 ];
 
-/// Weights of the method of order 3, for the error.
+/// Weights of the embedded method of order 3, for the error estimate.
 const EMBEDDED: [f64; 6] = [
     4_586_570_599.0 / 29_645_900_160.0,
     0.0,
@@ -50,28 +50,28 @@ const EMBEDDED: [f64; 6] = [
     61_727.0 / 225_920.0,
 ];
 
-/// Newton's method stops where the error left is this part of the tolerance.
+/// Termination threshold of Newton's method: its remaining error as a fraction of the tolerance.
 const NEWTON: f64 = 0.02;
 
-/// Iterations of Newton's method for a stage.
+/// Maximum number of Newton iterations per stage.
 const ITERATIONS: usize = 8;
 
-/// The stages of a step, and the matrix they are solved with.
+/// Stages of a step, and the matrix of their linear systems.
 pub(super) struct Esdirk<S> {
     k: [Vec<S>; 6],
     base: Vec<S>,
     update: Vec<S>,
     jacobian: Banded,
-    /// Columns that can be moved at once to take differences: no two of them meet in a row.
+    /// Columns that can be perturbed together for finite differences: no two of them share a row.
     groups: Vec<Vec<usize>>,
-    /// The rows of every column.
+    /// Rows of the nonzero entries of every column.
     rows: Vec<Vec<usize>>,
     factors: Banded,
-    /// Step for which the factors are; 0 if there are none.
+    /// Step size for which the factors were computed; 0 if there are none.
     factors_for: f64,
-    /// Whether the Jacobian is that of the present start of the step.
+    /// True if the Jacobian was evaluated at the start of the current step.
     fresh: bool,
-    /// How much of the error Newton's method leaves per iteration, as `rate / (1 - rate)`.
+    /// Convergence of Newton's method per iteration, as `rate / (1 - rate)`.
     contraction: f64,
     column: Vec<f64>,
 }
@@ -121,7 +121,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
     }
 
     fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64 {
-        // Close to the step of the factors they still serve: Newton's method makes up for the difference.
+        // Factors for a similar step size are reused: Newton's method corrects the difference.
         if self.factors_for == 0.0 || !(0.8..=1.25).contains(&(at.h / self.factors_for)) {
             self.factorise(f, &at, work);
         }
@@ -129,7 +129,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
             if (1..6).all(|stage| self.stage(f, &at, stage, next, work)) {
                 return self.error(&at, next);
             }
-            // Once more with a Jacobian of this place; a fresh one that does not serve asks for a smaller step.
+            // Retries with a Jacobian evaluated here; if a fresh one does not converge, the step size must be reduced.
             if self.fresh && self.factors_for == at.h {
                 self.factors_for = 0.0;
                 return f64::NAN;
@@ -159,14 +159,14 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
 }
 
 impl<S: Scalar> Esdirk<S> {
-    /// Makes the factors for a step, with a new Jacobian where the last one did not serve.
+    /// Computes the factors for a step, with a new Jacobian unless it was evaluated in the current step.
     fn factorise<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: &Attempt<'_, S>, work: &mut Work) {
         if !self.fresh {
             self.take_jacobian(f, at, work);
             self.fresh = true;
         }
         self.factors.set_shifted(&self.jacobian, GAMMA * at.h);
-        // A singular matrix makes a solution that is not finite, and so a smaller step.
+        // A singular matrix gives a solution that is not finite, and so a smaller step.
         self.factors.factorise();
         self.factors_for = at.h;
         self.contraction = 1.0;
@@ -181,14 +181,14 @@ impl<S: Scalar> Esdirk<S> {
             return;
         }
         let (moved, slopes) = (&mut self.base, &mut self.update);
-        // The derivative kept in `k` is right to the tolerance only, which differences would magnify.
+        // The derivative stored in `k` is accurate to the tolerance only, an error that differences would magnify.
         f.derivative(t, x, slopes);
         work.derivatives += 1;
         self.column.iter_mut().zip(slopes.iter()).for_each(|(c, s)| *c = s.value());
         for group in &self.groups {
             moved.copy_from_slice(x);
-            // Steps of the square root of the rounding, relative to the state or to where it begins to count; a state that has
-            // always been 0 counts as what it becomes in the step.
+            // Steps of the square root of the machine precision, relative to the state or to the size at which its
+            // relative error counts. A state that has always been 0 has the size that it reaches in the step.
             let step = |j: usize| {
                 let size = x[j].value().abs().max(weights.small(j)).max(h * self.column[j].abs());
                 f64::EPSILON.sqrt() * if size > 1e-300 { size } else { 1.0 }
@@ -205,7 +205,7 @@ impl<S: Scalar> Esdirk<S> {
         }
     }
 
-    /// Solves one stage, which becomes `z`; `false` where Newton's method does not converge.
+    /// Solves one stage and writes it to `z`; returns false if Newton's method does not converge.
     fn stage<D: Dynamics<S> + ?Sized>(
         &mut self,
         f: &D,
@@ -222,21 +222,21 @@ impl<S: Scalar> Esdirk<S> {
                 sum += k[j] * (h * a);
             }
             self.base[j] = sum;
-            // The first guess: the derivative stays that of the stage before in time.
+            // Initial guess: the derivative of the preceding stage in time.
             z[j] = sum + self.k[if stage == 2 { 0 } else { stage - 1 }][j] * (h * GAMMA);
         }
         let time = t + C[stage] * h;
         let mut last = f64::NAN;
         let mut converged = false;
-        // How much an iteration leaves of the error is known from the steps before; factors of another step length leave up to
-        // the relative difference of the lengths.
+        // The contraction is estimated from earlier steps. Factors of another step size limit it to the relative
+        // difference of the step sizes.
         let mismatch = (h / self.factors_for - 1.0).abs();
         self.contraction = math::powf(self.contraction.max(1e-16), 0.8).max(mismatch);
         for iteration in 0..ITERATIONS {
             self.newton_step(f, time, h, z, work);
             let mut norm = weights.norm(h, n);
             for j in 0..n {
-                // A state that leaves 0 counts as what the iteration makes of it.
+                // A state that leaves 0 has the size that the iteration gives it.
                 let (update, z) = (self.update[j].value(), z[j].value());
                 norm.add(j, update, [x[j].value(), z.abs().max((z + update).abs()), 0.0]);
             }
@@ -250,7 +250,7 @@ impl<S: Scalar> Esdirk<S> {
                     return false;
                 }
                 self.contraction = rate / (1.0 - rate);
-                // Too slow to arrive in the iterations that are left.
+                // Too slow to converge in the remaining iterations.
                 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
                 let left = math::powi(rate, (ITERATIONS - 1 - iteration) as i32);
                 if left * self.contraction * size > NEWTON {
@@ -276,7 +276,7 @@ impl<S: Scalar> Esdirk<S> {
         converged
     }
 
-    /// The step of Newton's method from `z`, value and tangents, into `update`.
+    /// Computes the Newton step from `z`, value and tangents, into `update`.
     fn newton_step<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, h: f64, z: &[S], work: &mut Work) {
         f.derivative(t, z, &mut self.update);
         work.derivatives += 1;
@@ -286,7 +286,7 @@ impl<S: Scalar> Esdirk<S> {
         solve(&self.factors, &mut self.update, &mut self.column);
     }
 
-    /// Iterates the tangents of a stage whose value stays.
+    /// Iterates the tangents of a stage whose value is frozen.
     fn finish_tangents<D: Dynamics<S> + ?Sized>(
         &mut self,
         f: &D,
@@ -308,13 +308,13 @@ impl<S: Scalar> Esdirk<S> {
                 return;
             }
         }
-        // Slopes that did not converge are none: whoever asked falls back on differences.
+        // Tangents that did not converge are set to NaN; the caller falls back on finite differences.
         for z in z {
             (0..S::DIRECTIONS).for_each(|direction| z.set_tangent(direction, f64::NAN));
         }
     }
 
-    /// The error over the tolerance, with what a stiff motion adds to it damped away by the matrix.
+    /// Returns the error norm divided by the tolerance; the matrix damps the contribution of stiff components.
     fn error(&mut self, at: &Attempt<'_, S>, next: &[S]) -> f64 {
         let Attempt { h, x, weights, .. } = *at;
         for (j, error) in self.column.iter_mut().enumerate() {
@@ -342,7 +342,7 @@ fn solve<S: Scalar>(factors: &Banded, b: &mut [S], column: &mut [f64]) {
     b.iter_mut().zip(column.iter()).for_each(|(b, &c)| *b = b.chain(c, 1.0));
 }
 
-/// Columns in groups of which no two meet in a row, the first that fits taken for each.
+/// Partitions columns into groups in which no two share a row; each column joins the first group that fits.
 ///
 /// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974) 117-119.
 pub(crate) fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
@@ -373,7 +373,7 @@ mod tests {
         Tolerance { relative, method: IntegrationMethod::Stiff, ..Tolerance::DEFAULT }
     }
 
-    /// `x'' = mu (1 - x^2) x' - x`.
+    /// Van der Pol oscillator `x'' = mu (1 - x^2) x' - x`.
     struct VanDerPol<S>(S);
     impl<S: Scalar> Dynamics<S> for VanDerPol<S> {
         fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn van_der_pol_meets_its_published_value() {
+    fn van_der_pol_agrees_with_its_published_value() {
         // Reference at t = 2000 for mu = 1000 from (2, 0): 1.706167732170483 (test set for IVP solvers, Bari, vdpolm).
         let (x, work) = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, &[2.0, 0.0], &stiff(1e-8), &mut ()).unwrap();
         assert!((x[0] - 1.706_167_732_170_483).abs() < 1e-6, "{x:?} {work:?}");
@@ -393,7 +393,7 @@ mod tests {
 
     #[test]
     fn the_error_falls_with_the_fourth_power_of_the_step() {
-        // `x' = -cos(t) x^2`, `x(0) = 1`, has the solution `1/(1 + sin t)`.
+        // The solution of `x' = -cos(t) x^2`, `x(0) = 1` is `1/(1 + sin t)`.
         struct Rational;
         impl Dynamics<f64> for Rational {
             fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {
@@ -434,8 +434,8 @@ mod tests {
     }
 
     #[test]
-    fn what_rests_at_zero_is_pushed() {
-        /// `x1' = x2`, ..., `xn' = push(t)`, all 0 at the start.
+    fn a_chain_that_rests_at_zero_is_driven() {
+        /// Chain of integrators `x1' = x2`, ..., `xn' = push(t)`, with all states 0 at the start.
         struct Chain<const N: usize>(fn(f64) -> f64);
         impl<const N: usize> Dynamics<f64> for Chain<N> {
             fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {
@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_meet_in_no_row_share_a_group() {
+    fn columns_that_share_no_row_are_grouped() {
         let tridiagonal: Vec<Vec<usize>> =
             (0..9_usize).map(|j| (j.saturating_sub(1)..=(j + 1).min(8)).collect()).collect();
         assert_eq!(groups(&tridiagonal).len(), 3);

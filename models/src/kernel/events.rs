@@ -1,29 +1,33 @@
-//! Events: when they happen, in which order, how often.
+//! Events: when they occur, in which order, and how often.
 //!
-//! **The guard.** A mode holds while its guards are not negative. An event is the first instant at which a guard is negative;
-//! [`Dynamics::switch`] then changes the mode, and the state where it jumps. An event does not depend on where steps end.
+//! **Guards.** A mode is active while its guards are not negative. An event is the first instant at which a guard is
+//! negative. [`Dynamics::switch`] then changes the mode, and the state where it jumps. Events do not depend on where
+//! steps end.
 //!
-//! **Locating.** Within a step the state is a polynomial of time, so that every guard is a function of time. Where the dynamics
-//! give bounds of a guard over a part of the step, and of its rate ([`Dynamics::enclose_guard`]), the first place where it is
-//! negative is found by branch and bound: a part whose bounds exclude negative values is done, one over which the guard is
-//! monotone is decided by its ends, any other is halved, the earlier half first. A guard that is negative for a moment only is
-//! found this way however long the step is, be it a guard on states, on inputs or on time. Where there are no bounds at all (models
-//! written in Rust, whose guards vary as smoothly as their states), the guard is looked at in four places of a step and where
-//! the quartic through these looks has a minimum below 0.
+//! **Location.** Within a step the state is a polynomial in time, so that every guard is a function of time.
+//! [`Dynamics::enclose_guard`] may give bounds of a guard and of its rate over a part of the step. The first zero
+//! crossing is then found by branch and bound. A part whose bounds exclude negative values is discarded. A part over
+//! which the guard is monotone is decided by its ends. Any other part is halved, the earlier half first. This finds a
+//! guard that is negative only briefly, however long the step is. The guard may depend on states, on inputs or on time.
+//! Models written in Rust have no bounds; their guards vary as smoothly as their states. Their guards are evaluated at
+//! four nodes of a step and at a minimum below 0 of the quartic through these values.
 //!
-//! **The instant.** A zero is located to the resolution of the clock, and the event happens at the end of the bracket where the
-//! guard *is* negative. So no rounding can leave it positive, and the same crossing is never met again: a guard that was passed
-//! is negative at the start of the next step, and what waits for it to be positive again starts from there.
+//! **Event time.** A zero is located to the resolution of the clock. The event occurs at the end of the bracket where
+//! the guard *is* negative. So rounding cannot leave the guard positive, and one crossing is never found twice. A guard
+//! that has crossed zero is negative at the start of the next step. A mode that waits for it to become positive starts
+//! from there.
 //!
-//! **Simultaneous events.** Instants closer than the resolution are one. At an instant inputs and clocks take their new values
-//! first ([`Dynamics::pass_break`]); then of the guards that are negative the one with the lowest number switches, until none
-//! is negative. An event therefore sees the inputs as they are from its instant on, at all rates of samples and events.
+//! **Simultaneous events.** Instants closer than the resolution count as one. At an instant inputs and clocks first
+//! take their new values ([`Dynamics::pass_break`]). Then the negative guard with the lowest index switches, until no
+//! guard is negative. An event therefore sees the inputs that are valid from its instant on, at all rates of samples
+//! and events.
 //!
-//! **Arming.** Whether a guard is armed again after its event is part of its mode, and up to the dynamics.
+//! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the dynamics.
 //!
-//! **Accumulation.** A guard accumulates that switches [`REPEATS`] times in a row in intervals that become shorter, all below
-//! [`CLOSE`] of the simulated time, or with no time between them ([`NONE`]). [`Dynamics::rest`] may then take the state to where
-//! it rests; else the simulation is a failure, as it cannot go beyond that instant.
+//! **Accumulation (Zeno behaviour).** The events of a guard accumulate if it switches [`REPEATS`] times in succession
+//! at decreasing intervals below [`CLOSE`] of the simulated time. Intervals below [`NONE`] of the simulated time count
+//! as zero. [`Dynamics::rest`] may then move the state to its rest state; otherwise the simulation fails, as it cannot
+//! proceed beyond that instant.
 //!
 //! Source: T. Park, P. Barton, State event location in differential-algebraic models, ACM TOMACS 6 (1996) 137-165; J. Esposito,
 //! V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang, K. Johansson,
@@ -36,58 +40,59 @@ use mops_core::{Failure, Scalar};
 use super::step::Step;
 use super::{Dynamics, Sink};
 
-/// How often a guard switches in a row, each time sooner, before its events are taken to accumulate: far more than a sequence
-/// that does not accumulate comes closer by chance, and few enough to stay above rounding.
+/// Number of successive switches of a guard at decreasing intervals from which its events count as accumulating. A
+/// sequence that does not accumulate reaches this number very rarely by chance, and intervals still exceed rounding.
 const REPEATS: u32 = 20;
 
-/// Share of the simulated time below which intervals between events are close: 1e5 to 1e6 times the resolution of the clock.
+/// Fraction of the simulated time below which intervals between events are close: 1e5 to 1e6 times the resolution of
+/// the clock.
 const CLOSE: f64 = 1e-10;
 
-/// Share of the simulated time below which an interval between events of one guard is none: rounding of the states decides
-/// over it.
+/// Fraction of the simulated time below which an interval between events of one guard counts as zero: rounding of the
+/// states determines it.
 const NONE: f64 = 1e-13;
 
-/// An interval counts as shorter than the last one when it is less than this part of it: events of a fixed rate never are.
+/// Ratio to the last interval below which an interval counts as shorter; events at a fixed rate never do.
 const SHORTER: f64 = 0.999;
 
-/// Instants that differ by this part of the time are one: what a few additions of times may be off.
+/// Relative time difference up to which instants count as one: the rounding error of a few additions.
 const RESOLUTION: f64 = 16.0 * f64::EPSILON;
 
-/// Width of the bracket in which an event is located, as a part of the resolution, so that an event stays one with the instant
-/// that it meets.
+/// Width of the bracket in which an event is located, as a fraction of the resolution. An event therefore coincides
+/// with an instant closer than the resolution.
 const BRACKET: f64 = 0.25;
 
-/// Bounds that are computed for one guard in one step at most; what is undecided then is decided by the ends of its parts. A
-/// guard that crosses zero is found with some 20 bounds, one that touches it with some 100; each place before its first zero
-/// where it has no bounds, such as a jump of `atan2` or a pole of `tan`, takes some 60.
+/// Limit on the number of bounds computed for one guard in one step; parts then undecided are decided by their ends. A
+/// guard that crosses zero takes some 20 bounds, one that touches zero some 100. Each place without bounds before the
+/// first zero, such as a jump of `atan2` or a pole of `tan`, takes some 60.
 const MOST_BOUNDS: usize = 2000;
 
-/// Halvings of a step at most: a part of 1e-9 of it.
+/// Limit on the number of halvings of a step: a part of 1e-9 of its length.
 const HALVINGS: u32 = 30;
 
-/// The events of a simulation.
+/// Event location and handling of a simulation.
 pub(super) struct Events<S> {
     /// Simulated time, s.
     span: f64,
     /// Values of the guards at the present instant.
     values: Vec<f64>,
-    /// Of every guard when it switched.
+    /// Switching history of every guard.
     past: Vec<Past>,
-    /// Bounds of the state over the step, and over a part of it.
+    /// Bounds of the state over the step, and over a part of the step.
     whole: Vec<Enclosure>,
     bounds: Vec<Enclosure>,
-    /// States at the inner ones of [`PLACES`].
+    /// States at the inner nodes [`INNER`].
     inner: [Vec<S>; 3],
 }
 
-/// When a guard switched.
+/// Switching history of a guard.
 #[derive(Debug, Clone, Copy)]
 struct Past {
-    /// Last time, s.
+    /// Time of the last switch, s.
     last: f64,
-    /// Interval before that, s.
+    /// Interval before the last switch, s.
     interval: f64,
-    /// Intervals in a row that were close and shorter than the one before.
+    /// Number of successive intervals that were close and shorter than the one before.
     closer: u32,
 }
 
@@ -97,18 +102,17 @@ impl<S: Scalar> Events<S> {
         Self { span, values: Vec::new(), past: Vec::new(), whole: Vec::new(), bounds: Vec::new(), inner }
     }
 
-    /// Times that differ by less are one instant, s.
+    /// Returns the time difference below which two times count as one instant, s.
     pub(super) fn resolution(&self, t: f64) -> f64 {
         RESOLUTION * t.abs().max(1e-3 * self.span)
     }
 
-    /// Whether the present mode has guards.
+    /// Returns true if the current mode has guards.
     pub(super) fn are_watched(&self) -> bool {
         !self.values.is_empty()
     }
 
-    /// Lets all events of an instant happen: guards that are negative switch, the one with the lowest number first, until
-    /// none is negative.
+    /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative.
     pub(super) fn settle<D: Dynamics<S> + ?Sized>(
         &mut self,
         dynamics: &mut D,
@@ -140,7 +144,7 @@ impl<S: Scalar> Events<S> {
         Ok(())
     }
 
-    /// Notes that a guard switches; whether its events accumulate.
+    /// Records a switch of a guard; returns true if its events accumulate.
     fn accumulates(&mut self, index: usize, t: f64) -> bool {
         let never = Past { last: f64::NEG_INFINITY, interval: f64::INFINITY, closer: 0 };
         if self.past.len() <= index {
@@ -154,7 +158,8 @@ impl<S: Scalar> Events<S> {
         past.closer >= REPEATS
     }
 
-    /// The guard that is negative first within the step, which ends there; `arrival` is the time and state at its end.
+    /// Returns the guard that is the first to become negative within the step, and ends the step there. `arrival` is
+    /// the time and state at the end of the step.
     pub(super) fn first<D: Dynamics<S> + ?Sized>(
         &mut self,
         dynamics: &D,
@@ -212,12 +217,12 @@ impl<S: Scalar> Events<S> {
                 let inner = dynamics.guard_at(index, &INNER.map(|place| step.time(place)), &self.inner);
                 looks(&mut value, ends, inner.map(Scalar::value))
             };
-            // Most steps end without an event; the values at their end are those at the start of the next.
+            // Most steps end without an event; the values at their end are those at the start of the next step.
             if first.is_none() {
                 self.values[index] = last;
             }
             if let Some(bracket) = bracket {
-                // The bracket may be far shorter than the step: its own time counts.
+                // The bracket may be far shorter than the step, so the resolution is taken at its own time.
                 let width = BRACKET * self.resolution(step.time(bracket[1].0)) / step.length;
                 let place = zero_between(bracket, width, &mut value);
                 if first.is_none() || place < end {
@@ -232,31 +237,33 @@ impl<S: Scalar> Events<S> {
     }
 }
 
-/// Whether a guard without bounds over the whole step has some over parts of it: it is a jump or a pole that takes them away.
+/// Returns true if a guard without bounds over the whole step has bounds over parts of it. Only a jump or a pole then
+/// prevents bounds over the whole.
 fn is_bounded(enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
-    // Off any regular division of the step, and far shorter than the time between jumps.
+    // Irregularly placed, and far narrower than the time between jumps.
     const WIDTH: f64 = 1e-6;
     [0.137, 0.457, 0.829].into_iter().any(|place| enclose(place, place + WIDTH).value.low > f64::NEG_INFINITY)
 }
 
-/// A place in a step, as a share of its length, and the value of a guard there.
+/// Position in a step, as a fraction of its length, and the value of a guard there.
 type Look = (f64, f64);
 
-/// Two looks between which a guard becomes negative.
+/// Two evaluations between which a guard becomes negative.
 type Bracket = [Look; 2];
 
-/// The search for the first place where a guard is negative, by bounds.
+/// Search by bounds for the first instant at which a guard is negative.
 struct Search<'a, V, B> {
     value: &'a mut V,
     enclose: &'a mut B,
-    /// Of the step, s.
+    /// Length of the step, s.
     length: f64,
-    /// Bounds that may still be computed.
+    /// Number of bounds that may still be computed.
     left: usize,
 }
 
 impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
-    /// The first bracket between two looks of which the earlier is not negative; `bounds` are those between them.
+    /// Returns the first bracket between two evaluations, the earlier of which is not negative; `bounds` are those
+    /// between them.
     fn first(&mut self, [a, b]: Bracket, bounds: Enclosure, halvings: u32) -> Option<Bracket> {
         let by_ends = (b.1 < 0.0).then_some([a, b]);
         let (value, rate) = (bounds.value, bounds.rate);
@@ -267,7 +274,8 @@ impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
         if rate.high <= 0.0 {
             return by_ends;
         }
-        // Nowhere below the lines from both ends with the extreme rates: their intersection, times the difference of the rates.
+        // The guard lies above the lines from both ends with the extreme rates; `lowest` is their intersection times
+        // the difference of the rates.
         let width = (b.0 - a.0) * self.length;
         let lowest = rate.high * a.1 - rate.low * b.1 + rate.low * rate.high * width;
         if b.1 >= 0.0 && lowest >= 0.0 {
@@ -279,7 +287,7 @@ impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
         let middle = 0.5 * (a.0 + b.0);
         let middle = (middle, (self.value)(middle));
         let first = self.half([a, middle], halvings);
-        // Where the middle is negative the first half has a bracket.
+        // If the guard is negative in the middle, the first half contains a bracket.
         first.or_else(|| self.half([middle, b], halvings))
     }
 
@@ -290,21 +298,22 @@ impl<V: FnMut(f64) -> f64, B: FnMut(f64, f64) -> Enclosure> Search<'_, V, B> {
     }
 }
 
-/// Places of a step in which a guard without bounds is looked at.
+/// Nodes of a step at which a guard without bounds is evaluated.
 const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// Those within it.
+/// Nodes of [`PLACES`] within the step.
 const INNER: [f64; 3] = [PLACES[1], PLACES[2], PLACES[3]];
 
-/// The first bracket of a guard without bounds, from its values at the ends and at the inner places between them: between
-/// these looks, and where the quartic through them has a minimum below 0.
+/// Returns the first bracket of a guard without bounds, from its values at the ends and at the inner nodes. The bracket
+/// lies between two of these values, or at a minimum below 0 of the quartic through them.
 #[inline]
 fn looks(value: &mut impl FnMut(f64) -> f64, ends: Bracket, inner: [f64; 3]) -> Option<Bracket> {
     let values = [ends[0].1, inner[0], inner[1], inner[2], ends[1].1];
     if is_far(&values) { None } else { look_closer(value, ends, &values) }
 }
 
-/// Whether values are positive, and no quartic through them can dip below 0: by no more than they differ. Most guards are.
+/// Returns true if all values are positive and exceed their spread, so that no quartic through them becomes negative.
+/// Most guards are of this kind.
 #[inline]
 fn is_far(values: &[f64; 5]) -> bool {
     let [mut low, mut high] = [values[0]; 2];
@@ -333,7 +342,8 @@ fn look_closer(value: &mut impl FnMut(f64) -> f64, [start, last]: Bracket, value
     None
 }
 
-/// Where the quartic through values at [`PLACES`] has a minimum below 0 between two of them, to a sixteenth of their distance.
+/// Returns the position between two nodes of [`PLACES`] where the quartic through the values has a minimum below 0, to
+/// a sixteenth of their distance.
 fn dip(values: &[f64; 5], between: usize) -> Option<f64> {
     const PARTS: u32 = 16;
     let (from, to) = (PLACES[between], PLACES[between + 1]);
@@ -343,7 +353,7 @@ fn dip(values: &[f64; 5], between: usize) -> Option<f64> {
     (value < 0.0).then_some(place)
 }
 
-/// The quartic through values at [`PLACES`], by Newton's divided differences.
+/// Evaluates the quartic through values at [`PLACES`], by Newton's divided differences.
 fn quartic(values: &[f64; 5], place: f64) -> f64 {
     let mut d = *values;
     for order in 1..5 {
@@ -354,7 +364,8 @@ fn quartic(values: &[f64; 5], place: f64) -> f64 {
     (0..4).rev().fold(d[4], |sum, k| d[k] + (place - PLACES[k]) * sum)
 }
 
-/// A guard that begins at zero, such as the speed of a joint that just broke away, may rise before it falls: looks closer.
+/// Refines a bracket whose guard is zero at its start and may rise before it falls. An example is the speed of a joint
+/// that just broke away.
 fn rise_before([a, b]: Bracket, value: &mut impl FnMut(f64) -> f64) -> Bracket {
     if a.1 > 0.0 {
         return [a, b];
@@ -373,8 +384,9 @@ fn rise_before([a, b]: Bracket, value: &mut impl FnMut(f64) -> f64) -> Bracket {
     [a, end]
 }
 
-/// A place where the value is negative, at most `resolution` behind one where it is not; the secant through both ends, moved by
-/// the resolution towards the end that it does not replace, and halving where that is slow.
+/// Returns a position where the value is negative, at most `resolution` after one where it is not. Uses the secant
+/// through both ends, shifted by the resolution towards the end that it does not replace. Bisects where the secant
+/// converges slowly.
 fn zero_between([mut a, mut b]: Bracket, resolution: f64, value: &mut impl FnMut(f64) -> f64) -> f64 {
     let resolution = resolution.max(f64::EPSILON * a.0);
     let mut width = b.0 - a.0;
@@ -395,14 +407,14 @@ fn zero_between([mut a, mut b]: Bracket, resolution: f64, value: &mut impl FnMut
     b.0
 }
 
-/// The tangents of the time of an event, as a number without value: `dt = -dg / (dg/dt)` by the implicit function
-/// theorem, with the rate of the guard along the solution: exact where the dynamics give it, else from the dense output. Where
-/// the guard only grazes zero the time has no derivative, and 0 stands for it.
+/// Returns the tangents of the event time, as a number with zero value: `dt = -dg / (dg/dt)` by the implicit function
+/// theorem. The rate of the guard along the solution is exact if the dynamics provide it, else taken from the dense
+/// output. If the guard only grazes zero, the event time has no derivative and 0 is returned.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 /// I.14; jumps of tangents at events: S. Galan, W. Feehery, P. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
 pub(super) fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>, x: &mut [S]) -> S {
-    /// Part of the step between the two places that give the rate.
+    /// Distance of the two evaluations that give the rate from the event, as a fraction of the step.
     const APART: f64 = 1e-3;
     if S::DIRECTIONS == 0 {
         return S::from(0.0);
@@ -421,7 +433,7 @@ pub(super) fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, ste
     if delay.tangents().iter().all(|d| d.is_finite()) { delay } else { S::from(0.0) }
 }
 
-/// Moves the state by `delay` along its derivative: to first order, and its value not at all.
+/// Moves the state by `delay` along its derivative, to first order; the value of the state does not change.
 pub(super) fn shift<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &mut [S], dx: &mut [S], delay: S) {
     if S::DIRECTIONS > 0 {
         f.derivative(t, x, dx);

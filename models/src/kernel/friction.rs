@@ -1,23 +1,24 @@
-//! Dry friction of coupled joints: which stick, which slide, decided by the balance of torques.
+//! Dry friction of coupled joints: the torque balance decides which joints stick and which slide.
 //!
-//! `M q'' = f - tau`, with `tau_i = T_i` where joint i slides forward, `-T_i` backward, and `tau_i` within its limit where
-//! it is stuck and `q''_i = 0`. No smoothed sign: a stuck joint stays exactly where it is.
+//! The equation is `M q'' = f - tau`. `tau_i = T_i` if joint i slides forward, `-T_i` if it slides backward. If the
+//! joint is stuck, `q''_i = 0` and `tau_i` is within its limit. The sign function is not smoothed: a stuck joint does
+//! not move at all.
 
 use mops_core::Scalar;
 
-/// How a joint with dry friction moves.
+/// Contact state of a joint with dry friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Contact {
-    /// At rest, held by a torque up to its limit.
+    /// At rest; friction balances the torque up to its limit.
     Stuck,
-    /// Speed positive, or about to be.
+    /// Sliding forward: speed positive, or about to become positive.
     Forward,
-    /// Speed negative, or about to be.
+    /// Sliding backward: speed negative, or about to become negative.
     Backward,
 }
 
 impl Contact {
-    /// 1 forward, -1 backward, 0 stuck.
+    /// Returns 1 for forward, -1 for backward, 0 for stuck.
     #[inline]
     pub fn sign(self) -> f64 {
         match self {
@@ -32,10 +33,11 @@ impl Contact {
     }
 }
 
-/// Accelerations, and friction torques of all joints, for given contacts; `sliding` are the torques of joints that slide.
+/// Computes the accelerations and friction torques of all joints for given contacts; `sliding` are the torques of
+/// sliding joints.
 ///
-/// Rows and columns of stuck joints are taken out of `M q'' = f - tau`; what is left is solved by elimination, which
-/// needs no pivoting because a mass matrix is positive definite.
+/// Rows and columns of stuck joints are removed from `M q'' = f - tau`. The remaining system is solved by Gaussian
+/// elimination, which needs no pivoting because a mass matrix is positive definite.
 pub fn balance<S: Scalar, const N: usize>(
     mass: &[[S; N]; N],
     force: &[S; N],
@@ -84,7 +86,7 @@ pub fn balance<S: Scalar, const N: usize>(
     (acceleration, torque)
 }
 
-/// The contacts of joints whose break-away torque is their sliding torque `limit`; see [`Moment::contacts`].
+/// Finds the contacts of joints whose break-away torque equals their sliding torque `limit`; see [`Moment::contacts`].
 pub fn contacts<const N: usize>(
     mass: &[[f64; N]; N],
     force: &[f64; N],
@@ -94,35 +96,37 @@ pub fn contacts<const N: usize>(
     Moment { mass, force, sliding: limit, limit, speed }.contacts(&[Contact::Stuck; N], None)
 }
 
-/// Joints at one moment.
+/// State of all joints at one instant.
 #[derive(Debug)]
 pub struct Moment<'a, const N: usize> {
     /// Mass matrix.
     pub mass: &'a [[f64; N]; N],
     /// Torques on the joints without dry friction.
     pub force: &'a [f64; N],
-    /// Friction torques of the joints if they slide, at their present speeds.
+    /// Friction torques of the joints if they slide, at their current speeds.
     pub sliding: &'a [f64; N],
-    /// Torque up to which a joint at rest sticks: at least the sliding torque at rest; 0 where it never sticks.
+    /// Break-away torques: a joint at rest sticks up to this torque. At least the sliding torque at rest; 0 for a joint
+    /// that never sticks.
     pub limit: &'a [f64; N],
     /// Speeds.
     pub speed: &'a [f64; N],
 }
 
 impl<const N: usize> Moment<'_, N> {
-    /// The contacts that agree with the torques: joints that move slide the way they move; each of those at rest is
-    /// stuck if the torque it takes is within its limit, else it slides the way it accelerates. The joint `released` has
-    /// just exceeded its limit and does not stick again.
+    /// Finds the contacts that are consistent with the torques. Moving joints slide in their direction of motion. A
+    /// joint at rest is stuck if the torque that this requires is within its limit; else it slides in the direction of
+    /// its acceleration. The joint `released` has just exceeded its limit and does not stick again.
     ///
-    /// Where break-away takes as much as sliding, exactly one choice agrees for a positive definite mass matrix (a linear
-    /// complementarity problem with a P-matrix: R. Cottle, J.-S. Pang, R. Stone, The Linear Complementarity Problem
-    /// (1992), theorem 3.3.7). Where it takes more, several may: of them the one nearest to `wish`, the contacts so far.
+    /// If the break-away torques equal the sliding torques, exactly one choice is consistent for a positive definite
+    /// mass matrix. This is a linear complementarity problem with a P-matrix: R. Cottle, J.-S. Pang, R. Stone, The
+    /// Linear Complementarity Problem (1992), theorem 3.3.7. If break-away torques are larger, several choices may be
+    /// consistent; the one nearest to `wish`, the contacts so far, is returned.
     pub fn contacts(&self, wish: &[Contact; N], released: Option<usize>) -> [Contact; N] {
         const CHOICES: [Contact; 3] = [Contact::Forward, Contact::Backward, Contact::Stuck];
         let resting: Vec<usize> = (0..N).filter(|&i| self.speed[i] == 0.0).collect();
         let moving: [Contact; N] = std::array::from_fn(|i| Contact::of(self.speed[i]));
         let largest = self.limit.iter().chain(self.force).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
-        // Rounding leaves the right choice at about 1e-16 where two of them meet.
+        // Rounding changes the excess of the right choice by about 1e-16 where two choices coincide.
         let rounding = 1e-12 * largest;
         let mut best = (f64::INFINITY, moving);
         #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
@@ -144,7 +148,7 @@ impl<const N: usize> Moment<'_, N> {
             });
             let excess = excess.fold(0.0, f64::max);
             let departures = resting.iter().filter(|&&i| contact[i] != wish[i]).count();
-            // Those that agree count by their departures, fewer than N + 1; all others come after them.
+            // Consistent choices are ranked by their departures, fewer than N + 1; all others rank after them.
             let rank = if excess <= rounding { departures as f64 } else { N as f64 + 1.0 + excess / largest };
             if rank < best.0 {
                 best = (rank, contact);
@@ -170,13 +174,13 @@ mod tests {
 
     #[test]
     fn a_joint_that_moves_can_tear_another_loose() {
-        // Joint 0 accelerates by about 10/2; through M01 it needs 2.5 of joint 1, more than its limit of 1.
+        // Joint 0 accelerates by about 10/2; through M01 joint 1 needs a torque of 2.5, above its limit of 1.
         let contact = contacts(&MASS, &[10.0, 0.0], &[0.0, 1.0], &[1.0, 0.0]);
         assert_eq!(contact, [Contact::Forward, Contact::Backward]);
     }
 
     #[test]
-    fn the_balance_holds_whatever_sticks() {
+    fn the_torques_balance_for_any_contacts() {
         for contact in [
             [Contact::Stuck, Contact::Stuck],
             [Contact::Forward, Contact::Stuck],
@@ -203,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn every_situation_at_rest_has_contacts_that_agree() {
+    fn consistent_contacts_exist_for_all_forces_at_rest() {
         for i in -20..=20 {
             for j in -20..=20 {
                 let force = [f64::from(i) * 0.1, f64::from(j) * 0.1];

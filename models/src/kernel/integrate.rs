@@ -1,4 +1,4 @@
-//! Integration from step to step: breaks, events.
+//! Integration over all steps, with breaks and events.
 
 use mops_core::{Failure, Scalar, Work};
 
@@ -10,7 +10,7 @@ use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
 use super::{Dynamics, Integrated, IntegrationMethod, Sink, Tolerance};
 
-/// What a method is asked to do: a step of length `h` from `x` at `t`.
+/// Input of a method: a step of length `h` from `x` at `t`.
 pub struct Attempt<'a, S> {
     pub(super) t: f64,
     pub(super) h: f64,
@@ -18,35 +18,35 @@ pub struct Attempt<'a, S> {
     pub(super) weights: &'a Weights,
 }
 
-/// A one-step method with error estimate and dense output.
+/// One-step method with error estimate and dense output.
 pub(super) trait Method<S: Scalar> {
-    /// The error of a step of length `h` is of this order in `h`.
+    /// Order of the error of a step in its length `h`.
     const ERROR_ORDER: f64;
-    /// Whether it damps what decays in short steps alone.
+    /// True for an explicit method, which damps fast decaying modes only in short steps.
     const IS_EXPLICIT: bool;
 
     fn new<D: Dynamics<S> + ?Sized>(f: &D, x: &[S]) -> Self;
 
-    /// The solution begins anew at `x`: at the start, and where an event or a break made the right-hand side jump.
+    /// Restarts at `x`: at the start, and where an event or a break made the right-hand side jump.
     fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work);
 
-    /// The derivative at the start of the next step.
+    /// Returns the derivative at the start of the next step.
     fn slope(&self) -> &[S];
 
-    /// Computes the state after the step, and the norm of its errors over their weights; NaN where there is none.
+    /// Computes the state after the step. Returns the weighted error norm, NaN if there is none.
     fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64;
 
-    /// The step was accepted, and the next begins where it ended.
+    /// Moves to the start of the next step after the step was accepted.
     fn advance(&mut self);
 
-    /// The coefficients of [`Step`] for the step last attempted.
+    /// Computes the coefficients of [`Step`] for the step last attempted.
     fn dense(&self, h: f64, x: &[S], next: &[S], dense: &mut [Vec<S>; 5]);
 }
 
-/// Integrates from `t` to `end`; `sink` is told of every step and event.
+/// Integrates from `t` to `end` and reports every step and event to `sink`.
 ///
 /// # Errors
-/// The state stops being finite, the steps run out, or become too small for the clock.
+/// The state becomes infinite, the step limit is reached, or the step size underflows.
 pub fn integrate<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
     t: f64,
@@ -84,13 +84,13 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     let mut proposed = first_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
     work.derivatives += 1;
     let mut sizes = StepSizes::new(M::ERROR_ORDER);
-    // Attempts at the present step that were rejected.
+    // Rejected attempts at the current step.
     let mut rejected = 0;
     let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
     let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
     let remembers = dynamics.remembers();
-    // The next break stays where it is up to an event or to the break itself, unless steps that were taken move it.
+    // The next break changes only at an event or at the break itself, unless accepted steps move it.
     let mut stop = dynamics.next_break(t).min(end);
 
     while t < end {
@@ -104,7 +104,8 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             stop = dynamics.next_break(t).min(end);
         }
         proposed = proposed.min(longest);
-        // A step that would leave a sliver before the stop is made to reach it. It is cut, and what was proposed stands.
+        // A step that would leave a sliver before the stop is lengthened to reach it. Cutting a step does not change
+        // the proposed step size.
         let reaches = t + 1.01 * proposed >= stop;
         let h = if reaches { stop - t } else { proposed };
         if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
@@ -152,7 +153,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             }
             continue;
         };
-        // The tangents of the state at the event are those at the time to which a tuner moves it.
+        // The tangents of the state at the event refer to the event time, which moves with the parameters.
         let delay = delay(dynamics, index, &step, &mut spare);
         let here = step.time(step.share);
         let at_stop = reaches && stop - here <= events.resolution(stop);
@@ -178,7 +179,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
-/// Inputs take the values of the break that was reached, which the sink is shown where it is the end.
+/// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink.
 fn pass_break<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
     (t, end): (f64, f64),
@@ -200,7 +201,7 @@ mod tests {
     use super::*;
     use mops_core::{Dual, math};
 
-    /// `x'' = -x`.
+    /// Harmonic oscillator `x'' = -x`.
     struct Oscillator;
     impl<S: Scalar> Dynamics<S> for Oscillator {
         fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
@@ -226,7 +227,7 @@ mod tests {
         assert!((dual[0].tangent[0] - math::cos(3.0)).abs() < 1e-9);
     }
 
-    /// `x' = x^2`, which is infinite at `t = 1` from `x = 1`.
+    /// System `x' = x^2`, whose solution from `x = 1` is infinite at `t = 1`.
     struct Explosion;
     impl Dynamics<f64> for Explosion {
         fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
@@ -247,7 +248,7 @@ mod tests {
         assert!(matches!(failure, Failure::StepLimit(_)), "{failure:?}");
     }
 
-    /// A ball that bounces on the floor and keeps the part `rebound` of its speed.
+    /// Ball that bounces on the floor and keeps the fraction `rebound` of its speed.
     struct Ball<S> {
         rebound: S,
         bounces: Vec<f64>,
@@ -283,7 +284,7 @@ mod tests {
 
     #[test]
     fn tangents_jump_at_events_as_the_closed_form_does() {
-        // Height and speed at 1.2 s, after bounces at 0.45 s and, for a rebound of 0.8, at 1.17 s.
+        // Height and speed at 1.2 s, after bounces at 0.45 s and at 1.17 s (for a rebound of 0.8).
         let closed = |height: f64, rebound: f64| {
             let (g, fall) = (9.81, (2.0 * height / 9.81).sqrt());
             let second = fall * (1.0 + 2.0 * rebound);

@@ -1,20 +1,20 @@
-//! The equations of a model at one point with exact slopes, so that it can be linearised there.
+//! Model equations at one point with exact derivatives, for linearisation there.
 
 use mops_core::{Along, DIRECTIONS, Dual, Failure, Instant, Local, OperatingPoint, Plant, Scalar};
 use nalgebra::DMatrix;
 
 use super::PlantModel;
 
-/// Speed up to which a joint is as good as at rest, rad/s or m/s: that of a model at rest after rounding.
+/// Speed up to which a joint counts as at rest, rad/s or m/s: covers the rounding of a model at rest.
 const STILL: f64 = 1e-9;
 
-/// Whether a joint with this speed has no dry friction where a model is linearised: on both sides of speed 0 it would have other
-/// signs, and in between no slope.
+/// Returns true if dry friction is left out for a joint with this speed when the model is linearised. At speed 0
+/// friction has opposite signs on both sides and no derivative in between.
 pub fn rests<S: Scalar>(at_rest: bool, speed: S) -> bool {
     at_rest || speed.value().abs() <= STILL
 }
 
-/// What the equations give at an operating point.
+/// Values of the equations at an operating point.
 struct Here<S> {
     /// Rates of the states, then the signals.
     values: Vec<S>,
@@ -33,10 +33,10 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
     Ok(Here { values, left_out })
 }
 
-/// [`mops_core::Model::local`] of a model that is given by its plant.
+/// Linearises a model given by its plant; implements [`mops_core::Model::local`].
 ///
 /// # Errors
-/// Parameters for which the model is not defined, or an operating point without finite slopes.
+/// The parameters are outside the domain of the model, or derivatives at the operating point are not finite.
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
     let OperatingPoint { parameters, states, inputs, at_rest } = *at;
     let Here { values, left_out } = look(model, at)?;
@@ -59,7 +59,9 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
     }
     let (rates, signals) = values.split_at(states.len());
     if !slopes.iter().chain(rates).all(|x| x.is_finite()) {
-        return Err(Failure::Undefined("the equations have no finite slope at the operating point".into()));
+        return Err(Failure::Undefined(
+            "the derivatives of the equations are not finite at the operating point".into(),
+        ));
     }
     let names = model.states();
     let frictionless = left_out.into_iter().map(|position| names[position].name.clone()).collect();

@@ -1,4 +1,4 @@
-//! Mechanisms: joints coupled by a mass matrix, with the friction of their bearings.
+//! Mechanisms: joints coupled by a mass matrix, with bearing friction.
 
 use mops_core::{EventInstant, Failure, Instant, Interface, Parameter, Plant, Port, Scalar, State, Unit, Variable};
 
@@ -6,27 +6,29 @@ use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};
 use super::rests;
 
-/// The rigid bodies of a mechanism with `N` joints: `M(q) q'' = f(t, q, q') - friction`.
+/// Rigid bodies of a mechanism with `N` joints: `M(q) q'' = f(t, q, q') - friction`.
 pub trait Bodies<S: Scalar, const N: usize> {
-    /// Mass matrix (kg m2) and torques without bearing friction (N m) under the inputs `u`, at angles `q` (rad) and speeds `w`
-    /// (rad/s).
+    /// Returns the mass matrix (kg m2) and the torques without bearing friction (N m), for inputs `u`, angles `q` (rad)
+    /// and speeds `w` (rad/s).
     fn mass_and_force(&self, t: f64, u: &[S], q: &[S; N], w: &[S; N]) -> ([[S; N]; N], [S; N]);
 }
 
-/// A joint as the user meets it.
+/// Names and texts of a joint in the user interface.
 #[derive(Debug)]
 pub struct Joint {
-    /// Name of its angle; `d` before it names the speed, `0` behind them the start values.
+    /// Name of the angle. The speed has the prefix `d`; the initial values of both have the suffix `0`.
     pub angle: &'static str,
-    /// What turns.
+    /// Description of the body that turns.
     pub about: &'static str,
-    /// Start angle where the study gives none, rad.
+    /// Default of the initial angle, rad.
     pub start: f64,
-    /// What is said when it sticks, slides, and is driven and braked by a friction that changes its sign.
+    /// Event texts: the joint sticks, slides, is driven by its friction, is braked again. The last two apply where the
+    /// friction torque changes its sign.
     pub events: [&'static str; 4],
 }
 
-/// Signals of the joints (angle and speed of each in turn), start values behind `parameters`, states.
+/// Returns the interface of a mechanism: angle and speed of each joint as signals and states, and initial states
+/// appended to `parameters`.
 pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<Variable>) -> Interface {
     let mut interface = Interface::default();
     for Joint { angle, about, start, .. } in joints {
@@ -38,7 +40,7 @@ pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<V
                 .zip(what.into_iter().zip([*start, 0.0]))
         {
             let parameter = format!("{name}0");
-            parameters.push(Parameter::new(&parameter, unit, format!("{about} at the start")).with_default(start));
+            parameters.push(Parameter::new(&parameter, unit, format!("initial {about}")).with_default(start));
             interface.signals.push(Variable::new(&name, unit, about));
             interface.states.push(State { name: name.clone(), start: parameter, signal: Some(name), rate_of });
         }
@@ -47,8 +49,8 @@ pub fn interface(joints: &[Joint], mut parameters: Vec<Parameter>, inputs: Vec<V
     Interface { parameters, inputs, ..interface }
 }
 
-/// Where effects act on joints of these angles, whose speeds are called `d` and the angle; on inputs; and on what shows the
-/// joints.
+/// Returns the ports of a mechanism: joints with these angles, whose speeds have the prefix `d`; actuators at the
+/// inputs; sensors of angles and speeds.
 pub fn ports(angles: &[&str], inputs: &[&str]) -> Vec<Port> {
     let torque = || Some(Unit::known("N m"));
     let of_joint = |angle: &&str| {
@@ -62,34 +64,35 @@ pub fn ports(angles: &[&str], inputs: &[&str]) -> Vec<Port> {
     joints.chain(inputs.iter().map(actuator)).chain(angles.iter().flat_map(sensors)).collect()
 }
 
-/// A mechanism with its friction, and how its joints move; the state is angle and speed of each joint in turn.
+/// Mechanism with its friction and the contacts of its joints; the state is angle and speed of each joint in turn.
 pub struct Mechanism<S, B, const N: usize> {
     bodies: B,
     start: Vec<S>,
     friction: [BearingFriction<S>; N],
     contact: [Contact; N],
-    /// Lines of the friction tables over which the joints slide.
+    /// Segments of the friction tables on which the joints slide.
     line: [usize; N],
-    /// Whether the friction of a joint drives it at present.
+    /// True for a joint that its friction drives at present.
     drives: [bool; N],
     guards: Vec<Guard>,
     events: [[&'static str; 4]; N],
     started: bool,
 }
 
-/// What a joint is watched for.
+/// Guard of a joint.
 #[derive(Debug, Clone, Copy)]
 enum Guard {
-    /// Sliding: its speed in its direction. Stuck: what is left of the limit.
+    /// Contact: the speed in the direction of sliding, or the margin to the break-away torque of a stuck joint.
     Contact(usize),
-    /// Sliding: the line of its friction table.
+    /// Segment of the friction table of a sliding joint.
     Line(usize),
-    /// The sign of its friction: a table that falls below zero makes no physical sense there, and says so.
+    /// Sign of the friction torque: a table below zero is not physical there, which an event reports.
     Sign(usize),
 }
 
 impl<S: Scalar, B: Bodies<S, N>, const N: usize> Mechanism<S, B, N> {
-    /// A mechanism of bodies, the friction of its joints, and the joints, from these angles and speeds on.
+    /// Creates a mechanism from its bodies, the friction of its joints, the joints, and their initial angles and
+    /// speeds.
     pub fn new(bodies: B, friction: [BearingFriction<S>; N], joints: &[Joint; N], start: &[S]) -> Self {
         let watched = |i: usize| {
             let sign = friction[i].drives_from().map(|_| Guard::Sign(i));
@@ -99,7 +102,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Mechanism<S, B, N> {
         };
         let guards = (0..N).flat_map(watched).collect();
         let events = std::array::from_fn(|i| joints[i].events);
-        // Until it settles at the start of a simulation; a joint without dry friction cannot stick.
+        // Valid until the first `settle` of a simulation; a joint without dry friction cannot stick.
         let contact = std::array::from_fn(|i| if friction[i].is_viscous() { Contact::Forward } else { Contact::Stuck });
         Self {
             bodies,
@@ -114,17 +117,17 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Mechanism<S, B, N> {
         }
     }
 
-    /// How the joints move.
+    /// Returns the contacts of the joints.
     pub fn contact(&self) -> &[Contact; N] {
         &self.contact
     }
 
-    /// Angles and speeds.
+    /// Splits the state into angles and speeds.
     fn split(x: &[S]) -> ([S; N], [S; N]) {
         (std::array::from_fn(|i| x[2 * i]), std::array::from_fn(|i| x[2 * i + 1]))
     }
 
-    /// Speed of a joint in the direction in which it slides, and its friction torque there.
+    /// Returns the speed of a joint in its direction of sliding, and its friction torque there.
     fn sliding(&self, i: usize, speed: S) -> (S, S) {
         let forward = match self.contact[i] {
             Contact::Forward => speed,
@@ -141,7 +144,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Mechanism<S, B, N> {
         (mass, force)
     }
 
-    /// Accelerations and friction torques.
+    /// Computes accelerations and friction torques.
     fn balance(&self, at: &Instant<'_, S>) -> ([S; N], [S; N]) {
         let (q, w) = Self::split(at.x);
         let (mass, force) = self.mass_and_force(at, &q, &w);

@@ -1,7 +1,8 @@
-//! The simulation kernel: adaptive Runge-Kutta steps with dense output, events, and the elements models are made of.
+//! Simulation kernel: adaptive Runge-Kutta methods with dense output, event location, and the elements that models are
+//! built from.
 
-/// Evaluates an expression with the constant `$N` as the number of states, where it is small and there are no tangents; else with 0,
-/// which stands for any number. The compiler unrolls loops over a known number of states.
+/// Evaluates an expression with the constant `$N`: the number of states where it is small and there are no tangents.
+/// Otherwise `$N` is 0, which means any number. The compiler unrolls loops over a known number of states.
 macro_rules! by_size {
     ($states:expr, $S:ty, $N:ident => $body:expr) => {
         match if <$S as mops_core::Scalar>::DIRECTIONS == 0 { $states } else { 0 } {
@@ -70,26 +71,29 @@ pub use plant_model::{PlantModel, Simulated};
 pub(crate) use record::{Recording, record, tangents_of, wanted};
 pub use step::Step;
 
-/// What the integrator steps: a closed system `x' = f(t, x)`, with modes between which events switch. Its inputs are its own.
+/// Closed system `x' = f(t, x)` that the integrator steps, with modes between which events switch. The system supplies
+/// its own inputs.
 ///
-/// [`Driven`] is a [`mops_core::Plant`] as such a system; a model is a plant.
+/// [`Driven`] turns a [`mops_core::Plant`] and its inputs into such a system; a model is a plant.
 pub trait Dynamics<S: Scalar> {
-    /// Writes `x'` at time `t` in the present mode. Within a step the mode and its inputs are smooth.
+    /// Writes `x'` at time `t` in the current mode to `dx`. Within a step the mode and its inputs are smooth.
     fn derivative(&self, t: f64, x: &[S], dx: &mut [S]);
 
-    /// A step of the explicit method, tried: the state after it goes to `next`, and the norm of its errors comes back. Provided here,
-    /// so that the stages are compiled together with the equations: as calls these are 6 % of the instructions of `pid-design`.
+    /// Attempts a step of the explicit method: writes the state after the step to `next` and returns its weighted error
+    /// norm. Provided here so that the stages are compiled together with the equations: as calls they take 6 % of the
+    /// instructions of `pid-design`.
     #[doc(hidden)]
     fn attempt(&self, method: &mut DormandPrince<S>, at: Attempt<'_, S>, next: &mut [S]) -> f64 {
         by_size!(at.x.len(), S, N => method.attempt_of::<Self, N>(self, at, next))
     }
 
-    /// The value of a signal; where not said otherwise, signals are the states.
+    /// Returns the value of a signal. By default, signals are the states.
     fn signal(&self, signal: usize, _t: f64, x: &[S]) -> S {
         x[signal]
     }
 
-    /// The values of a signal at several instants. Provided here, so that it is compiled together with the signal.
+    /// Returns the values of a signal at several instants. Provided here so that the loop is compiled together with the
+    /// signal.
     #[doc(hidden)]
     fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
         let mut values = [S::from(0.0); 5];
@@ -99,28 +103,29 @@ pub trait Dynamics<S: Scalar> {
         values
     }
 
-    /// Number of guards in the present mode.
+    /// Returns the number of guards in the current mode.
     fn guards(&self) -> usize {
         0
     }
 
-    /// The value of a guard: the mode holds while it is not negative.
+    /// Returns the value of a guard. The mode remains active while no guard is negative.
     fn guard(&self, _index: usize, _t: f64, _x: &[S]) -> S {
         S::from(1.0)
     }
 
-    /// A guard became negative: changes the mode, and the state where it jumps; tangents of `x` are those along the
-    /// event, whose time moves too. Returns what happened; an empty text where a user need not know.
+    /// Handles an event (a guard became negative): changes the mode, and the state where it jumps. The tangents of `x`
+    /// are taken along the event, whose time also varies. Returns a description of the event; empty for events that are
+    /// not reported to the user.
     fn switch(&mut self, _index: usize, _t: f64, _x: &mut [S]) -> &str {
         ""
     }
 
-    /// As [`mops_core::Plant::guard_shows`].
+    /// Returns the state and the factor of a guard that is a scaled state; see [`mops_core::Plant::guard_shows`].
     fn guard_shows(&self, _index: usize) -> Option<(usize, f64)> {
         None
     }
 
-    /// The values of a guard at several instants; provided here as [`Dynamics::signal_at`].
+    /// Returns the values of a guard at several instants. Provided here for the same reason as [`Dynamics::signal_at`].
     #[doc(hidden)]
     fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
         let mut values = [S::from(0.0); 3];
@@ -130,111 +135,113 @@ pub trait Dynamics<S: Scalar> {
         values
     }
 
-    /// The rate of a guard along the solution, per s; `None` where only values of the guard tell it.
+    /// Returns the rate of a guard along the solution, per s; `None` if only values of the guard are available.
     fn guard_rate(&self, _index: usize, _t: f64, _x: &[S]) -> Option<f64> {
         None
     }
 
-    /// Whether it encloses its guards.
+    /// Returns true if bounds of the guards are available from [`Dynamics::enclose_guard`].
     fn has_bounds(&self) -> bool {
         false
     }
 
-    /// Bounds of a guard and of its rate over a time in which the states stay within their bounds `x`; asked for where
-    /// [`Dynamics::has_bounds`].
+    /// Returns bounds of a guard and of its rate over a time span in which the states stay within their bounds `x`.
+    /// Called only if [`Dynamics::has_bounds`] returns true.
     fn enclose_guard(&self, _index: usize, _time: Enclosure, _x: &[Enclosure]) -> Enclosure {
         Enclosure::UNKNOWN
     }
 
-    /// The events of a guard accumulate at this instant, in intervals below `close` in s: takes the state to where it rests
-    /// and returns what happened.
+    /// Resolves an accumulation: the events of a guard accumulate at this instant, at intervals below `close` in s.
+    /// Moves the state to its rest state and returns a description of the event.
     ///
     /// # Errors
-    /// There is no such state: which events accumulate, and the way out. The simulation fails.
+    /// The system has no such rest state; the text names the accumulating events and the remedy. The simulation fails.
     fn rest(&mut self, _index: usize, _t: f64, _close: f64, _x: &mut [S]) -> Result<&str, String> {
-        Err("a mode of the model changes to and fro without end".to_owned())
+        Err("a mode of the model switches back and forth without end".to_owned())
     }
 
-    /// The typical size of a state, in its unit; `None` where only the simulation tells it.
+    /// Returns the typical size of a state, in its unit; `None` if only the simulation can determine it.
     fn scale(&self, _state: usize) -> Option<f64> {
         None
     }
 
-    /// The events that follow happen later by this number, which has tangents and no value: that is how the parameters move
-    /// their time. What resets read of time and of inputs moves with it.
+    /// Sets the delay of the events that follow: a number with zero value whose tangents are the derivatives of the
+    /// event time. The time and the inputs that resets read are delayed with the event.
     fn delay_events(&mut self, _delay: S) {}
 
-    /// The state that a signal shows as it is; `None` where it must be computed.
+    /// Returns the state that a signal equals; `None` if the signal must be computed.
     fn shows(&self, _signal: usize) -> Option<usize> {
         None
     }
 
-    /// The next time after `t` at which an input jumps or a sample is taken; infinity if never.
+    /// Returns the next time after `t`, s, at which an input jumps or a sample is taken; infinity if none follows.
     fn next_break(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// Longest step within which the inputs are well resolved, s: a state that rests says nothing of them.
+    /// Returns the longest step that resolves the inputs, s. While the state rests, its error gives no information
+    /// about the inputs.
     fn longest_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Longest step in which an explicit method damps what decays fast, s: at rest no error tells it, and tangents grow.
+    /// Returns the longest step with which an explicit method damps fast decaying modes, s. At rest no error limits the
+    /// step, and the tangents grow.
     fn damped_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// The places of the Jacobian `df/dx` that may differ from 0, as pairs of row and column; `None` if all may. The stiff
-    /// method solves with the band that they span.
+    /// Returns the entries of the Jacobian `df/dx` that may be nonzero, as pairs of row and column; `None` if all may.
+    /// The stiff method solves with the band that these entries span.
     fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
         None
     }
 
-    /// Tells every entry of the Jacobian `df/dx` as row, column and value, and returns `true`; `false` where the
-    /// implementor has no exact one, and differences must do.
+    /// Passes every entry of the Jacobian `df/dx` to `entry` as row, column and value, and returns true. Returns false
+    /// if no exact Jacobian is available and finite differences must be used.
     fn jacobian(&self, _t: f64, _x: &[S], _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         false
     }
 
-    /// A break was reached (also called once at the start): inputs take their new values.
+    /// Handles a break, and is called once at the start: inputs take their new values.
     fn pass_break(&mut self, _t: f64, _x: &mut [S]) {}
 
-    /// Whether it wants to be told of accepted steps.
+    /// Returns true if [`Dynamics::accepted`] is to be called for accepted steps.
     fn remembers(&self) -> bool {
         false
     }
 
-    /// A step was accepted: a delay keeps what will come out of it later.
+    /// Handles an accepted step: a delay stores the values that it outputs later.
     fn accepted(&mut self, _step: &Step<S>) {}
 }
 
-/// A time that a model's options give under `key`, in s.
+/// Returns the time in s that a model's options give under `key`.
 ///
 /// # Errors
-/// A quantity that is no time.
+/// The quantity is not a time.
 pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, Mistake> {
     time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| Mistake::new(key, e))
 }
 
-/// What the integrator tells of a simulation: steps, then events.
+/// Receiver of the progress of a simulation: of every step, then of the events at its end.
 pub trait Sink<S: Scalar, D: Dynamics<S> + ?Sized> {
-    /// A step was accepted; `dynamics` is in the mode that held during it.
+    /// Handles an accepted step; `dynamics` is in the mode that was active during the step.
     fn step(&mut self, step: &Step<S>, dynamics: &D);
-    /// Whether it reads states within steps; if not, they are not prepared.
+    /// Returns true if states within steps are read; if not, dense output is not prepared for this sink.
     fn reads_steps(&self) -> bool {
         true
     }
-    /// Why the simulation must end at this time, s, if it must; asked before every step.
+    /// Returns the reason why the simulation must end at time `t`, s, if it must. Called before every step.
     fn ends(&self, _t: f64) -> Option<Failure> {
         None
     }
-    /// The end was reached: inputs have their values of that instant.
+    /// Handles the end of the simulation; the inputs have their values at that instant.
     fn end(&mut self, _t: f64, _x: &[S], _dynamics: &D) {}
-    /// The mode changed.
+    /// Handles a change of the mode.
     fn event(&mut self, _t: f64, _what: &str) {}
 }
 
-/// Nobody listens.
+/// Sink that ignores steps and events.
 impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for () {
     fn step(&mut self, _: &Step<S>, _: &D) {}
     fn reads_steps(&self) -> bool {
@@ -242,5 +249,5 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for () {
     }
 }
 
-/// What a simulation gives: the last state, and the work.
+/// Result of a simulation: the final state and the computational work.
 pub type Integrated<S> = Result<(Vec<S>, Work), Failure>;

@@ -1,4 +1,4 @@
-//! Models that are given by their plants.
+//! Models given by their plants.
 
 use mops_core::{
     Along, Analysis, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar, Variable,
@@ -8,29 +8,29 @@ use mops_core::{
 use super::drive::Drive;
 use super::{Driven, Dynamics, Recording, Tolerance, local, record, tangents_of, wanted};
 
-/// A plant that is written once over the scalar, with what it offers and takes; [`Simulated`] makes a model of it.
+/// Plant that is written once over the scalar, with its interface; [`Simulated`] turns it into a model.
 ///
-/// The states are named by [`Interface::states`]; where that names signals for them, these have their units. What
-/// [`Interface::ports`] lists takes effects, in the order of the forces `w` that the plant adds to its equations.
+/// [`Interface::states`] names the states; a state with a signal has the unit of that signal. Effects act at
+/// [`Interface::ports`], in the order of the forces `w` that the plant adds to its equations.
 pub trait PlantModel: Send + Sync {
-    /// What the model offers and takes.
+    /// Returns the interface of the model: parameters, inputs, signals, states and ports.
     fn interface(&self) -> &Interface;
 
-    /// The plant at these values of the parameters.
+    /// Returns the plant at these values of the parameters.
     ///
     /// # Errors
-    /// Parameters for which it is not defined.
+    /// The parameters are outside the domain of the model.
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure>;
 
-    /// The plant to which effects are added, where it is another object.
+    /// Returns the plant to which effects are added, if it is a different object.
     ///
     /// # Errors
-    /// As [`PlantModel::plant`].
+    /// See [`PlantModel::plant`].
     fn open_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         self.plant(parameters)
     }
 
-    /// The states of the plant, in their order.
+    /// Returns the states of the plant, in order.
     fn states(&self) -> Vec<Variable> {
         let Interface { states, signals, .. } = self.interface();
         let variable = |name: &str, signal: Option<&String>| {
@@ -40,25 +40,25 @@ pub trait PlantModel: Send + Sync {
         states.iter().map(|state| variable(&state.name, state.signal.as_ref())).collect()
     }
 
-    /// What drives an input where a case does not, by its index; nothing if `None`.
+    /// Returns the default of an input, by its index, for cases that do not give it; `None` means zero.
     fn input(&self, _index: usize) -> Option<&Input> {
         None
     }
 
-    /// Accuracy and limits of its simulations.
+    /// Returns the accuracy and the limits of the simulations.
     fn tolerance(&self) -> Tolerance {
         Tolerance::default()
     }
 
-    /// Assumptions made in reading the model, one sentence each.
+    /// Returns the assumptions made in reading the model, one sentence each.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// The model of a plant: simulated, with exact tangents, linearised, and open at its ports.
+/// Model of a plant: simulated, with exact tangents, linearised, and open at its ports.
 ///
-/// A pendulum with viscous friction, open at its joint:
+/// Example: a pendulum with viscous friction, open at its joint:
 ///
 /// ```
 /// use mops_core::{Failure, Instant, Interface, Parameter, Plant, Scalar, Variable};
@@ -96,11 +96,11 @@ pub trait PlantModel: Send + Sync {
 ///         &self.0
 ///     }
 ///     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-///         Ok(At(parameters.try_into().expect("three parameters and two start values")))
+///         Ok(At(parameters.try_into().expect("three parameters and two initial states")))
 ///     }
 /// }
 ///
-/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which takes effects.
+/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which accepts effects.
 /// use mops_core::{Catalogue, EffectDraft, ModelDraft};
 /// let catalogue = Catalogue {
 ///     effects: mops_effects::effects(),
@@ -114,18 +114,18 @@ pub trait PlantModel: Send + Sync {
 /// ```
 pub struct Simulated<M> {
     of: M,
-    /// For each signal the state that it shows as it is.
+    /// Index of the state that each signal equals, if any.
     shows: Vec<Option<usize>>,
 }
 
 impl<M: PlantModel> Simulated<M> {
-    /// The model of this plant.
+    /// Creates the model of a plant.
     pub fn new(of: M) -> Self {
         let shows = shown(of.interface(), &of.states());
         Self { of, shows }
     }
 
-    /// What it was made of.
+    /// Returns the plant that the model was created from.
     pub fn plant_model(&self) -> &M {
         &self.of
     }
@@ -146,7 +146,8 @@ impl<M: PlantModel> Simulated<M> {
     }
 }
 
-/// For each signal of a model the state that it shows as it is: the one that names it, or one without a start value of its name.
+/// Returns for each signal the index of the state that it equals, if any. A state equals the signal that the interface
+/// gives for it. A state that is not in the interface equals the signal of its own name.
 pub(crate) fn shown(interface: &Interface, states: &[Variable]) -> Vec<Option<usize>> {
     let signal_of = |state: &Variable| match interface.states.iter().find(|s| s.name == state.name) {
         Some(named) => named.signal.clone(),

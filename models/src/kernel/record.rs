@@ -1,4 +1,4 @@
-//! From steps to traces: the signals of a model along its dense output, with their tangents.
+//! Traces of signals from the dense output of steps, with their tangents.
 
 use mops_core::{
     Along, Analysis, Cancellation, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
@@ -7,15 +7,16 @@ use mops_core::{
 use super::weights::SHARE;
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
-/// A recorded simulation: the signals, and their derivative along every direction of the scalar.
+/// Recorded simulation: the signals and their derivatives in every direction of the scalar.
 pub struct Recording {
-    /// The signals.
+    /// Signals.
     pub response: Response,
-    /// One per direction; on the segments of the signals.
+    /// Derivatives of the signals, one response per direction, on the segments of the signals.
     pub tangents: Vec<Response>,
 }
 
-/// The analysis and its tangents along the seeds, of which there is one at least, by a simulation over the scalar.
+/// Runs a simulation over the scalar: returns the analysis and its tangents along the seeds, of which there is at least
+/// one.
 ///
 /// # Errors
 /// The failure of the simulation.
@@ -39,11 +40,11 @@ pub fn tangents_of(
     Ok((Analysis::Time(analysis.expect("there is a seed")), tangents))
 }
 
-/// What is recorded of a simulation, and who may end it.
+/// Signals to record, and the means to cancel the simulation.
 pub struct Wanted {
     /// Signals, by index and name.
     pub signals: Vec<(usize, String)>,
-    /// Asks the simulation to end.
+    /// Requests the end of the simulation.
     pub cancellation: Cancellation,
 }
 
@@ -53,65 +54,65 @@ impl From<Vec<(usize, String)>> for Wanted {
     }
 }
 
-/// Bytes that a simulation may record, tangents included: 100,000 steps, the limit of steps where nothing else is said, of a
-/// hundred signals.
+/// Limit on the size of a recording in bytes, tangents included: sufficient for 100,000 steps, the default step limit,
+/// of a hundred signals.
 const ROOM: usize = 512 << 20;
 
-/// Bytes that traces are made with room for, at most: most simulations take few steps.
+/// Limit on the initial capacity of all traces in bytes; most simulations take few steps.
 const FIRST_ROOM: usize = 16 << 20;
 
-/// Bytes of a segment of a trace: its end and five coefficients.
+/// Size of a segment of a trace in bytes: its end and five coefficients.
 const SEGMENT: usize = 6 * size_of::<f64>();
 
-/// Records signals along the steps.
+/// Sink that records signals along the steps.
 struct Recorder<'a, S> {
     signals: &'a [(usize, String)],
-    /// The states that they show as they are.
+    /// Index of the state that each signal equals, if any.
     shows: Vec<Option<usize>>,
     cancellation: &'a Cancellation,
-    /// Bytes recorded so far, and how many may be.
+    /// Bytes recorded so far, and their limit.
     taken: usize,
     room: usize,
-    /// Traces of the signals, then of their tangents along every direction in turn.
+    /// Traces of the signals, then of their tangents in each direction.
     traces: Vec<Vec<Trace>>,
     events: Vec<Event>,
-    /// The state at [`Trace::NODES`].
+    /// States at [`Trace::NODES`].
     states: [Vec<S>; 5],
     resolved: Vec<Resolved>,
     tolerance: &'a Tolerance,
 }
 
-/// How well the steps resolve a computed signal.
+/// Resolution of a computed signal by the steps.
 #[derive(Debug, Clone, Copy)]
 struct Resolved {
     /// Largest absolute value so far.
     size: f64,
-    /// Slope at the end of the last step, per s; NaN before the first.
+    /// Rate at the end of the last step, per s; NaN before the first step.
     slope: f64,
-    /// The longest step whose quartic was compared with the signal and found right, s.
+    /// Longest step whose quartic agreed with the signal when compared, s.
     longest: f64,
 }
 
-/// Where within a step a computed signal is compared with its quartic, and as far from its end: near the extrema of the
-/// error of interpolation at [`Trace::NODES`], and no fractions of the step, so that no period that the nodes fall in with is
-/// one of these too.
+/// Position at which a computed signal is compared with its quartic, as a fraction of the step from its start and from
+/// its end. The position is near the extrema of the interpolation error at [`Trace::NODES`]. An irrational fraction
+/// avoids periods that coincide with the nodes.
 const CHECK: f64 = 0.112_701_665_379_258_3;
 
-/// What the quartic may be off, in tolerances: the dense output of the states is not better.
+/// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
 const OFF: f64 = 10.0;
 
-/// Halvings of a step at most.
+/// Limit on the number of halvings of a step.
 const HALVINGS: u32 = 12;
 
-/// A step longer by this than any that was compared is compared again.
+/// Ratio to the longest compared step beyond which a step is compared again.
 const LONGER: f64 = 1.2;
 
-/// What the values at [`Trace::NODES`] weigh in the slope of their quartic at the first of them, per length of the step; at
-/// the last the same from behind, with the other sign.
+/// Weights of the values at [`Trace::NODES`] in the derivative of their quartic at the first node, for a step of unit
+/// length. At the last node the weights are reversed, with opposite sign.
 const SLOPE: [f64; 5] = [-25.0 / 3.0, 16.0, -12.0, 16.0 / 3.0, -1.0];
 
-/// What the values at [`Trace::NODES`] weigh in their quartic at [`CHECK`]: Lagrange's basis. From behind they are those at the same distance
-/// from the end.
+/// Weights of the values at [`Trace::NODES`] in their quartic at [`CHECK`]: Lagrange's basis. Reversed, they apply at
+/// the same distance from the end.
 const WEIGHTS: [f64; 5] = {
     let mut weights = [1.0; 5];
     let (mut i, mut k) = (0, 0);
@@ -134,13 +135,15 @@ impl<S: Scalar> Recorder<'_, S> {
         }
     }
 
-    /// What the quartic of a signal may be off where its values are of this size: as the states, on a scale of its own.
+    /// Returns the permitted deviation of the quartic of a signal with values of this size. The rule is that of the
+    /// states, with the signal's own scale.
     fn allowed(&self, index: usize, size: f64) -> f64 {
         let Tolerance { relative, absolute, .. } = self.tolerance;
         OFF * (absolute.unwrap_or(SHARE * relative * self.resolved[index].size) + relative * size)
     }
 
-    /// Whether the quartic through the values is what the signal is near both ends. What is not finite is left alone.
+    /// Returns true if the quartic through the values agrees with the signal near both ends. Values that are not finite
+    /// count as agreeing.
     fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
         let [first, last] = [CHECK, 1.0 - CHECK].map(|s| signal(s).value());
         let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
@@ -151,8 +154,9 @@ impl<S: Scalar> Recorder<'_, S> {
         off.iter().all(|off| off.is_nan() || *off <= allowed)
     }
 
-    /// Whether the quartic of a step of this length must be compared with the signal: the step is longer than those that
-    /// were, or the quartic does not go on from the last one as smoothly as it should.
+    /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is
+    /// longer than all compared ones, or the derivative of the quartic does not continue that of the last one within
+    /// tolerance.
     fn must_compare(&mut self, index: usize, length: f64, values: &[S; 5]) -> bool {
         let slope = |weight: &dyn Fn(usize) -> f64| (0..5).map(|k| weight(k) * values[k].value()).sum::<f64>() / length;
         let begin = slope(&|k| SLOPE[k]);
@@ -161,7 +165,7 @@ impl<S: Scalar> Recorder<'_, S> {
         length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
-    /// Adds the part `[from, to]` of a step to the traces of a signal, in halves where one quartic does not do.
+    /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
     fn refine(
         &mut self,
         step: &Step<S>,
@@ -243,7 +247,7 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             if self.shows[i].is_some() {
                 continue;
             }
-            // An input that jumps at the end is seen in what follows it at once.
+            // An input jump at the end of the simulation appears in the signals that depend on it directly.
             let value = dynamics.signal(*signal, t, x);
             let before = self.traces[0][i].last();
             if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {
@@ -256,7 +260,7 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
     }
 
     fn event(&mut self, t: f64, what: &str) {
-        // Events without a name are between branches of an expression, nothing that happens to the plant.
+        // Events without a name switch branches of an expression and are no events of the plant.
         if !what.is_empty() {
             self.taken += size_of::<Event>() + what.len();
             self.events.push(Event { time: t, what: what.to_owned() });
@@ -278,7 +282,7 @@ pub fn record<S: Scalar, D: Dynamics<S> + ?Sized>(
     record_within(ROOM, dynamics, (start, end), tolerance, wanted)
 }
 
-/// [`record`] with the bytes that it may take.
+/// Implements [`record`] with a limit on the recorded bytes.
 fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
     room: usize,
     dynamics: &mut D,
@@ -310,7 +314,7 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
     Ok(Recording { response, tangents })
 }
 
-/// What a job wants of a model with these signals.
+/// Returns the signals to record and the cancellation of a job, for a model with these signals.
 pub fn wanted(job: &Job<'_>, signals: &[mops_core::Variable]) -> Wanted {
     Wanted {
         signals: job.signals.iter().map(|&i| (i, signals[i].name.clone())).collect(),

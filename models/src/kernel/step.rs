@@ -1,19 +1,19 @@
-//! An accepted step and its dense output.
+//! Accepted step and its dense output.
 
 use mops_core::Scalar;
 use mops_core::enclosure::{Enclosure, Interval};
 
-/// An accepted step from `start` to `start + taken`, with its dense output.
+/// Accepted step from `start` to `start + taken`, with its dense output.
 pub struct Step<S> {
-    /// Time at which it begins, s.
+    /// Start time of the step, s.
     pub start: f64,
-    /// Length of the step for which the dense output was made, s.
+    /// Length of the step for which the dense output was computed, s.
     pub length: f64,
-    /// Part of it that holds, s: less than `length` where an event ended it.
+    /// Length of the valid part of the step, s: less than `length` if an event ended the step.
     pub taken: f64,
-    /// The same part as a share of `length`.
+    /// Valid part of the step as a fraction of `length`.
     pub(super) share: f64,
-    /// `r0 .. r4` of [`Step::at`], each for all states.
+    /// Coefficients `r0 .. r4` of [`Step::at`], each for all states.
     pub(super) dense: [Vec<S>; 5],
 }
 
@@ -22,53 +22,54 @@ impl<S: Scalar> Step<S> {
         Self { start: 0.0, length: 0.0, taken: 0.0, share: 1.0, dense: std::array::from_fn(|_| x.to_vec()) }
     }
 
-    /// A new step, of which all holds.
+    /// Starts a new step, valid over its full length.
     #[inline]
     pub(super) fn begin(&mut self, start: f64, length: f64) {
         (self.start, self.length, self.taken, self.share) = (start, length, length, 1.0);
     }
 
-    /// An event ends the step at this share of its length.
+    /// Ends the step by an event at the fraction `share` of its length.
     pub(super) fn end_at(&mut self, share: f64) {
         (self.taken, self.share) = (share * self.length, share);
     }
 
-    /// The time at a share of its length, s.
+    /// Returns the time at the fraction `theta` of the step length, s.
     #[inline]
     pub(super) fn time(&self, theta: f64) -> f64 {
         self.start + theta * self.length
     }
 
-    /// The state at `start + s taken`, `s` in [0, 1].
+    /// Writes the state at `start + s taken`, `s` in [0, 1], to `x`.
     #[inline]
     pub fn state(&self, s: f64, x: &mut [S]) {
         self.at(s * self.share, x);
     }
 
-    /// The states at the shares `nodes` of what holds of the step.
+    /// Writes the states at the fractions `nodes` of the valid part of the step.
     pub(super) fn states<const K: usize>(&self, nodes: &[f64; K], states: &mut [Vec<S>; K]) {
         self.states_at(&nodes.map(|s| s * self.share), states);
     }
 
-    /// The states at these shares of its length.
+    /// Writes the states at the fractions `thetas` of the step length.
     pub(super) fn states_at<const K: usize>(&self, thetas: &[f64; K], states: &mut [Vec<S>; K]) {
         by_size!(self.dense[0].len(), S, N => states_of::<S, N>(&self.dense, thetas, states));
     }
 
-    /// One component of [`Step::state`].
+    /// Returns one component of [`Step::state`].
     #[inline(always)]
     pub(super) fn component(&self, s: f64, i: usize) -> S {
         let [r0, r1, r2, r3, r4] = &self.dense;
         value([r0[i], r1[i], r2[i], r3[i], r4[i]], s * self.share)
     }
 
-    /// The state at `start + theta length`: `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
+    /// Writes the state at `start + theta length` to `x`:
+    /// `r0 + theta (r1 + (1 - theta)(r2 + theta (r3 + (1 - theta) r4)))`.
     #[inline]
     pub(super) fn at(&self, theta: f64, x: &mut [S]) {
         by_size!(x.len(), S, N => state_of::<S, N>(&self.dense, theta, x));
     }
 
-    /// Bounds of the values of all components from the share `from` to the share `to`, and of their rates.
+    /// Computes bounds of all components and of their rates between the fractions `from` and `to` of the step length.
     pub(super) fn enclose(&self, from: f64, to: f64, bounds: &mut Vec<Enclosure>) {
         let (m, radius) = (0.5 * (from + to), 0.5 * (to - from));
         let per_second = Interval::point(1.0 / self.length);
@@ -89,7 +90,7 @@ fn states_of<S: Scalar, const N: usize>(dense: &[Vec<S>; 5], thetas: &[f64], sta
     }
 }
 
-/// The dense output of `N` states; 0 stands for any number.
+/// Evaluates the dense output of `N` states; `N = 0` means any number.
 #[inline(always)]
 fn state_of<S: Scalar, const N: usize>([r0, r1, r2, r3, r4]: &[Vec<S>; 5], theta: f64, x: &mut [S]) {
     let n = if N == 0 { x.len() } else { N };
@@ -99,16 +100,16 @@ fn state_of<S: Scalar, const N: usize>([r0, r1, r2, r3, r4]: &[Vec<S>; 5], theta
     }
 }
 
-/// The dense output of a state at a share of the step.
+/// Evaluates the dense output of one state at the fraction `theta` of the step length.
 #[inline(always)]
 fn value<S: Scalar>([r0, r1, r2, r3, r4]: [S; 5], theta: f64) -> S {
     let back = 1.0 - theta;
     r0 + (r1 + (r2 + (r3 + r4 * back) * theta) * back) * theta
 }
 
-/// Coefficients of the dense output in powers of `theta - m`.
+/// Returns the coefficients of the dense output in powers of `theta - m`.
 fn taylor([r0, r1, r2, r3, r4]: [f64; 5], m: f64) -> [f64; 5] {
-    // In powers of theta: theta (1 - theta) = theta - theta^2, and so on.
+    // In powers of theta: theta (1 - theta) = theta - theta^2, etc.
     let c = [r0, r1 + r2, r3 + r4 - r2, -(r3 + 2.0 * r4), r4];
     let value = c[0] + m * (c[1] + m * (c[2] + m * (c[3] + m * c[4])));
     let first = c[1] + m * (2.0 * c[2] + m * (3.0 * c[3] + m * 4.0 * c[4]));
@@ -121,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_hold_the_dense_output_and_its_slope() {
+    fn bounds_enclose_the_dense_output_and_its_derivative() {
         let mut step = Step::new(&[0.0]);
         step.begin(2.0, 0.5);
         step.dense = [1.0, -2.0, 3.0, 0.5, -4.0].map(|r| vec![r]);

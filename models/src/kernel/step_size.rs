@@ -1,4 +1,4 @@
-//! The lengths of steps: the first one, and how the next follows from the error of the last.
+//! Step size control: the initial step size, and the next step size from the error of the last step.
 //!
 //! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 //! II.4 (step size, first step); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
@@ -8,25 +8,25 @@ use mops_core::{Scalar, math};
 
 use super::Dynamics;
 
-/// PI control of the step size: the next length is `0.9 error^-(1/q - 0.75 beta) last_error^beta` times the last, with
-/// `beta = 0.04` as in the authors' DOPRI5, and `q` the order of the error in the length.
+/// PI control of the step size. The next step size is `0.9 error^-(1/q - 0.75 beta) last_error^beta` times the last. As
+/// in the authors' DOPRI5 `beta = 0.04`; `q` is the order of the error in the step size.
 pub(super) struct StepSizes {
     order: f64,
-    /// `log2` of the error of the step before.
+    /// Base-2 logarithm of the error of the previous step.
     last: f64,
 }
 
 const SAFETY: f64 = 0.9;
 const BETA: f64 = 0.04;
 
-/// A step is at most this much shorter and longer than the one before it.
+/// Bounds on the ratio of a step size to the previous one.
 const SHORTEST: f64 = 0.2;
 const LONGEST: f64 = 10.0;
 
-/// How much shorter a step is where the last had no error that is a number.
+/// Ratio of step sizes after a step whose error was not finite.
 const WITHOUT_ERROR: f64 = 0.1;
 
-/// `log2 1e-4`: the error that an earlier step counts as having had at least.
+/// Lower bound on the error of the previous step, as `log2 1e-4`.
 const SMALL: f64 = -13.287_712_379_549_449;
 
 impl StepSizes {
@@ -34,7 +34,7 @@ impl StepSizes {
         Self { order, last: SMALL }
     }
 
-    /// Ratio of the next length to that of the step accepted with this error.
+    /// Returns the ratio of the next step size to that of the step accepted with this error.
     #[inline]
     pub(super) fn after_acceptance(&mut self, error: f64, was_rejected: bool) -> f64 {
         let error = log2(error.max(1e-10));
@@ -43,14 +43,15 @@ impl StepSizes {
         factor.clamp(SHORTEST, if was_rejected { 1.0 } else { LONGEST })
     }
 
-    /// Ratio of the next length to that of the step rejected with this error, above 1 or no number.
+    /// Returns the ratio of the next step size to that of the step rejected with this error, which is above 1 or not
+    /// finite.
     pub(super) fn after_rejection(&self, error: f64) -> f64 {
         if error.is_finite() { (SAFETY * exp2(-log2(error) / self.order)).max(SHORTEST) } else { WITHOUT_ERROR }
     }
 }
 
-/// Logarithm to base 2 of a normal positive number, to 0.0011: its exponent, and a cubic of its mantissa that is exact at powers
-/// of 2. A step size needs no more, and every step needs it.
+/// Returns the base-2 logarithm of a normal positive number, to 0.0011. Adds to its exponent a cubic of its mantissa
+/// that is exact at powers of 2. Step size control needs no higher accuracy and calls this at every step.
 #[inline]
 fn log2(x: f64) -> f64 {
     const MANTISSA: u64 = (1 << 52) - 1;
@@ -61,8 +62,8 @@ fn log2(x: f64) -> f64 {
     exponent + m * (1.42 + m * (-0.5717 + m * 0.1517))
 }
 
-/// Power of 2, to 0.012 %: that of the floor of `x`, times a cubic of the rest that is exact at both its ends. `x` lies within the
-/// exponents of normal numbers.
+/// Returns 2 to the power `x`, to 0.012 %: 2 to the floor of `x`, times a cubic of the fractional part that is exact at
+/// both ends. `x` lies within the exponent range of normal numbers.
 #[inline]
 fn exp2(x: f64) -> f64 {
     #[allow(clippy::cast_possible_truncation)]
@@ -72,9 +73,9 @@ fn exp2(x: f64) -> f64 {
     power * (1.0 + m * (0.695 + m * (0.2275 + m * 0.0775)))
 }
 
-/// A first guess of the step size (algorithm II.4.14 of the source), with times in units of the interval and each state in
-/// units of its size, or where it starts at 0 of what it becomes at its first rate in a thousandth of the interval: so that the
-/// guess depends on no unit.
+/// Returns an initial step size (algorithm II.4.14 of the source). Times are in units of the interval, and each state
+/// in units of its size, so that the guess depends on no unit. The size of a state that starts at 0 is its initial rate
+/// times a thousandth of the interval.
 pub(super) fn first_step<S: Scalar, D: Dynamics<S> + ?Sized>(
     f: &D,
     (t, end): (f64, f64),
@@ -87,7 +88,7 @@ pub(super) fn first_step<S: Scalar, D: Dynamics<S> + ?Sized>(
         0.0 => 1e-3 * span * slope[i].value().abs(),
         size => size,
     };
-    // Sizes over the tolerance of the default; the guess goes with its fifth root.
+    // Sizes divided by the default tolerance; the guess varies with the fifth root of the tolerance.
     let scaled = |v: &[S]| {
         let ratio = |i: usize| if size(i) > 0.0 { v[i].value() / (1e-8 * size(i)) } else { 0.0 };
         #[allow(clippy::cast_precision_loss)]
@@ -116,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn logarithm_and_power_are_as_near_as_they_say() {
+    fn logarithm_and_power_have_their_stated_accuracy() {
         for k in -3000..3000 {
             let x = f64::from(k) / 97.0;
             let power = math::exp2(x);
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_of_the_tolerance_leaves_the_safety_and_a_rejection_stays_within_its_bounds() {
+    fn an_error_equal_to_the_tolerance_gives_the_safety_factor_and_a_rejection_stays_within_its_bounds() {
         let mut sizes = StepSizes { order: 5.0, last: 0.0 };
         assert_eq!(sizes.after_acceptance(1.0, false), SAFETY);
         assert_eq!(sizes.after_acceptance(0.0, false), LONGEST);

@@ -1,4 +1,4 @@
-//! What an error of a step is measured against: the size of each state, on a scale of its own.
+//! Error weights: the size of each state, relative to its own scale.
 
 use mops_core::{Scalar, Tolerance};
 
@@ -6,46 +6,47 @@ use super::Dynamics;
 
 /// Weights of the errors of all states: `relative |x_i| + floor_i`.
 ///
-/// The size `|x_i|` is that of the state at both ends of the step, and at least what the state becomes at its rate in [`BRIEF`]
-/// of the simulated time: a state that leaves 0 at a kink that no guard tells of would otherwise need infinitely short steps.
+/// The size `|x_i|` is the larger of the values at both ends of the step. The size is at least the change over
+/// [`BRIEF`] of the simulated time at the rate at the end of the step. A state that leaves 0 at a kink without a guard
+/// would otherwise need infinitely short steps.
 ///
-/// The floor is the tolerance where a state is small beside what it is elsewhere: `absolute` if the user gives it, else
-/// `SHARE relative s_i`. The scale `s_i` is the one that is declared for the state, or the largest `|x_j|` that state has
-/// had so far; a state that rests at 0 from the start has none, and its error counts against what it becomes in the step.
+/// The floor is the tolerance for a state that is small relative to its usual size: `absolute` if the user gives it,
+/// else `SHARE relative s_i`. The scale `s_i` is declared for the state, or else the largest `|x_i|` so far. A state
+/// that rests at 0 from the start has no scale. Its error is relative to the value that the state reaches in the step.
 ///
-/// No error is asked for that rounding hides: the rates of states that are differences of large numbers are rough, and a step
-/// of length `h` leaves `h` times that roughness whatever its length (see [`Weights::feel`]).
+/// The weights allow for rounding errors, which no step size can reduce. Rates of states that are differences of large
+/// numbers are rough. A step of length `h` has at least an error of `h` times that roughness (see [`Weights::feel`]).
 #[derive(Debug, Clone)]
 pub struct Weights {
     relative: f64,
-    /// A floor is the first number, plus the second times the scale of its state.
+    /// Coefficients of the floor: the first, plus the second times the scale of the state.
     floor: [f64; 2],
     /// Simulated time, s.
     span: f64,
-    /// Largest absolute value so far, or what is declared.
+    /// Largest absolute value so far, or the declared scale.
     scales: Vec<f64>,
-    /// The floors but for rounding.
+    /// Floors without the allowance for rounding.
     floors: Vec<f64>,
-    /// How far rounding of the states moves each rate, per s.
+    /// Change of each rate caused by rounding of the states, per s.
     roughness: Vec<f64>,
-    /// No rate is rough in shorter steps than this, s.
+    /// Step size below which no rate is rough, s.
     smooth: f64,
-    /// Attempts since the roughness was felt.
+    /// Attempts since the roughness was last measured.
     attempts: usize,
 }
 
-/// Share of the relative tolerance that holds of a state's own scale where the state passes through 0: a hundredth, as the
-/// absolute tolerance of 1e-10 is beside the relative one of 1e-8.
+/// Part of the relative tolerance that applies to the scale of a state which passes through 0. A hundredth is the ratio
+/// of the absolute tolerance 1e-10 to the relative tolerance 1e-8.
 pub(super) const SHARE: f64 = 0.01;
 
-/// Share of the simulated time in which a state that moves is no smaller than its rate makes it: far shorter than the motions
-/// of a model that an explicit method can follow, far longer than the resolution of the clock.
+/// Fraction of the simulated time over which the rate of a state sets a lower bound on its size. Far shorter than the
+/// motions that an explicit method can follow, far longer than the resolution of the clock.
 const BRIEF: f64 = 1e-6;
 
-/// Attempted steps after which the roughness is felt anew: often enough for states that grow, and a small part of the work.
+/// Attempted steps between measurements of the roughness: frequent enough for growing states, and little work.
 const OFTEN: usize = 64;
 
-/// Perturbation of a state, relative: a few units in the last place, so that sums of terms round differently.
+/// Relative perturbation of a state: a few units in the last place, so that sums of terms round differently.
 const PERTURBATION: f64 = 16.0 * f64::EPSILON;
 
 impl Weights {
@@ -68,7 +69,7 @@ impl Weights {
         weights
     }
 
-    /// Takes the sizes of an accepted state into account.
+    /// Updates the scales with an accepted state.
     #[inline]
     pub(super) fn follow<S: Scalar>(&mut self, x: &[S]) {
         by_size!(x.len(), S, N => self.follow_of::<S, N>(x));
@@ -84,8 +85,9 @@ impl Weights {
         }
     }
 
-    /// Finds out how rough the rates are, every so many attempts and where steps are rejected again and again: the rates are
-    /// compared with those of a state whose components differ by a few units in the last place, each by another share.
+    /// Measures the roughness of the rates, after every [`OFTEN`] attempts and after the third rejection of a step. The
+    /// rates are compared with those of a state whose components differ by a few units in the last place, each by a
+    /// different amount. Returns true if the rates were measured.
     pub(super) fn feel<S: Scalar, D: Dynamics<S> + ?Sized>(
         &mut self,
         f: &D,
@@ -99,7 +101,7 @@ impl Weights {
         self.attempts = 0;
         let (mut moved, mut here, mut there) = (x.to_vec(), x.to_vec(), x.to_vec());
         for (i, x) in moved.iter_mut().enumerate() {
-            // Shares of the golden ratio: no two states move alike, so that their differences move too.
+            // Multiples of the golden ratio: no two states change alike, so that their differences change too.
             #[allow(clippy::cast_precision_loss)]
             let share = 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
             *x = *x * (1.0 + share * PERTURBATION);
@@ -110,30 +112,30 @@ impl Weights {
         for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
             *roughness = if difference.is_finite() { difference } else { 0.0 };
         }
-        // Floors do not fall.
+        // Floors do not decrease.
         let limits = self.floors.iter().zip(&self.roughness);
         self.smooth = limits.fold(f64::INFINITY, |least, (floor, roughness)| least.min(floor / roughness));
         true
     }
 
-    /// The norm of the errors of `n` states in a step of length `h`, before any is added.
+    /// Returns the norm of the errors of `n` states in a step of length `h`, before any error is added.
     #[inline(always)]
     pub(super) fn norm(&self, h: f64, n: usize) -> Norm<'_> {
         let (floors, roughness) = (&self.floors[..n], &self.roughness[..n]);
         Norm { floors, roughness, relative: self.relative, brief: BRIEF * self.span, h, sum: 0.0 }
     }
 
-    /// The relative tolerance.
+    /// Returns the relative tolerance.
     pub(super) fn relative(&self) -> f64 {
         self.relative
     }
 
-    /// The size at which the error of a state begins to count relative to it.
+    /// Returns the size above which the error of a state counts relative to the state.
     pub(super) fn small(&self, state: usize) -> f64 {
         self.floors[state] / self.relative
     }
 
-    /// Whether in a step of length `h` rounding decides over the error of a state of these sizes more than its tolerance.
+    /// Returns true if in a step of length `h` rounding contributes more to the error of a state than its tolerance.
     pub(super) fn is_rough<S: Scalar>(&self, h: f64, x: &[S]) -> bool {
         let limits = self.floors.iter().zip(&self.roughness);
         h > self.smooth
@@ -143,7 +145,7 @@ impl Weights {
     }
 }
 
-/// The root mean square of errors over their weights, as it is summed up.
+/// Root mean square of the weighted errors, as a running sum.
 pub(super) struct Norm<'a> {
     floors: &'a [f64],
     roughness: &'a [f64],
@@ -155,14 +157,14 @@ pub(super) struct Norm<'a> {
 
 impl Norm<'_> {
     /// Adds the error of a state, with its values at both ends of the step and its rate at the end.
-    #[inline(always)] // With the number of states known, the divisions go in pairs.
+    #[inline(always)] // With a known number of states, the divisions are vectorised in pairs.
     pub(super) fn add(&mut self, state: usize, error: f64, [before, after, rate]: [f64; 3]) {
         let size = larger(larger(before.abs(), after.abs()), self.brief * rate.abs());
         let ratio = error / (self.floors[state] + self.relative * size + self.h * self.roughness[state]);
         self.sum += ratio * ratio;
     }
 
-    /// The root mean square of the errors that were added.
+    /// Returns the root mean square of the errors that were added.
     #[inline(always)]
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn of_errors(self) -> f64 {
@@ -170,7 +172,8 @@ impl Norm<'_> {
     }
 }
 
-/// The larger of two numbers, one of the processor's instructions: `f64::max` looks for NaN besides, which is in the errors too.
+/// Returns the larger of two numbers by a single processor instruction. `f64::max` also checks for NaN, which appears
+/// in the errors anyway.
 #[inline]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }

@@ -1,4 +1,4 @@
-//! Effects in simulations, against closed forms.
+//! Effects in simulations, compared with closed forms.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -38,7 +38,7 @@ parameters = { m = "kg", k = "N/m" }
 der        = { x = "v", v = "m*v' = u - k*(x - y)", y = "w", w = "m*w' = k*(x - y)" }
 "#;
 
-/// One effect at a place of a model.
+/// Creates a model with one effect at a place.
 fn with(text: &str, name: &str, place: &str, companion: Option<&str>) -> WithEffects {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
     let model: Arc<dyn Model> = Arc::from(options.build().expect("it is a model"));
@@ -60,7 +60,7 @@ fn analysis(model: &dyn Model, parameters: &[f64], input: Input, end: f64) -> An
     model.analyse(&Job { case: &case, parameters, signals: &signals, horizon: end }).expect("it simulates")
 }
 
-/// The value of a signal at some times.
+/// Returns the values of a signal at some times.
 fn values(model: &dyn Model, parameters: &[f64], input: Input, signal: &str, times: &[f64]) -> Vec<f64> {
     let end = times.last().expect("there are times");
     let analysis = analysis(model, parameters, input, *end);
@@ -76,9 +76,10 @@ const STEP: Input = Input::Step { time: 1.0, before: 0.0, after: 2.0 };
 const NOTHING: Input = Input::Constant(0.0);
 
 #[test]
-fn a_tank_with_a_leak_empties_as_torricelli_says() {
+fn a_tank_with_a_leak_empties_by_torricellis_law() {
     let model = with(TANK, "leak", "process:h", None);
-    // sqrt(h - hole) falls by k/(2 A) per second; A = 2, h0 = 1.44 + 0.5, k = 0.8, hole = 0.5: the level is there at 6 s.
+    // sqrt(h - hole) decreases by k/(2 A) per second; A = 2, h0 = 1.44 + 0.5, k = 0.8, hole = 0.5: h reaches the hole
+    // at 6 s.
     let times = [1.0, 3.0, 5.0, 8.0];
     let found = values(&model, &[2.0, 1.94, 0.8, 0.5], NOTHING, "h", &times);
     let level = |t: f64| 0.5 + math::powi((1.2 - 0.2 * t).max(0.0), 2);
@@ -88,7 +89,7 @@ fn a_tank_with_a_leak_empties_as_torricelli_says() {
 #[test]
 fn an_edge_keeps_a_level_where_as_much_spills_as_comes_in() {
     let model = with(TANK, "overflow", "process:h", None);
-    // A = 2, h0 = 0, inflow 0.5, k = 4, edge at 1, a plain edge: 1 + 0.125 (1 - exp(-2 (t - 4))).
+    // A = 2, h0 = 0, inflow 0.5, k = 4, plain edge at 1: h = 1 + 0.125 (1 - exp(-2 (t - 4))).
     let times = [2.0, 4.0, 5.0, 9.0];
     let found = values(&model, &[2.0, 0.0, 4.0, 1.0, 1.0], Input::Constant(0.5), "h", &times);
     let level = |t: f64| if t < 4.0 { 0.25 * t } else { 1.0 + 0.125 * (1.0 - math::exp(-2.0 * (t - 4.0))) };
@@ -98,7 +99,7 @@ fn an_edge_keeps_a_level_where_as_much_spills_as_comes_in() {
 #[test]
 fn what_spills_runs_into_the_next_tank() {
     let model = with(PAIR, "spill-over", "process:g", Some("process:h"));
-    // As the tank above; of what has spilled, 0.5 t - A g, a quarter is in the second tank.
+    // Same as the tank above; a quarter of the spilled volume, 0.5 t - A g, is in the second tank.
     let times = [2.0, 5.0, 9.0];
     let parameters = [2.0, 0.0, 0.0, 4.0, 1.0, 1.0, 0.25];
     let upper = values(&model, &parameters, Input::Constant(0.5), "g", &times);
@@ -117,21 +118,22 @@ fn a_loss_to_the_surroundings_decays_to_them() {
 }
 
 #[test]
-fn what_radiates_to_an_input_cools_as_stefan_says() {
+fn radiation_to_an_input_follows_stefans_law() {
     let model = with(TANK, "radiation-exchange", "process:h", Some("actuator:u"));
-    // A T' = -k T^4 with nothing around: 1/T^3 = 1/T0^3 + 3 k t/A.
+    // A T' = -k T^4 with surroundings at 0: 1/T^3 = 1/T0^3 + 3 k t/A.
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 0.1, 0.0], NOTHING, "h", &times);
     close(&found, &times.map(|t| math::powf(1.0 / 27.0 + 0.15 * t, -1.0 / 3.0)), 1e-6);
-    // Fed by as much as it radiates: A T' = u - k ((T + 1)^4 - (u + 1)^4) rests where (T + 1)^4 = (u + 1)^4 + u/k.
+    // With an inflow u, A T' = u - k ((T + 1)^4 - (u + 1)^4) has the equilibrium (T + 1)^4 = (u + 1)^4 + u/k.
     let found = values(&model, &[2.0, 3.0, 0.1, 1.0], Input::Constant(0.5), "h", &[200.0]);
     close(&found, &[math::powf(math::powi(1.5, 4) + 5.0, 0.25) - 1.0], 1e-6);
 }
 
 #[test]
-fn a_hidden_store_shares_what_there_is() {
+fn a_hidden_store_exchanges_until_both_are_equal() {
     let model = with(TANK, "hidden-store", "process:h", None);
-    // A = 2, k = 1, tau = 4: the hidden store holds k tau = 4. From h = 3 and z = 0: both end at 1, at the rate 1/2 + 1/4.
+    // A = 2, k = 1, tau = 4: the capacity of the hidden store is k tau = 4. From h = 3 and z = 0 both end at 1, at the
+    // rate 1/2 + 1/4.
     let times = [0.5, 2.0, 6.0];
     let found = values(&model, &[2.0, 3.0, 1.0, 4.0, -3.0], NOTHING, "h", &times);
     close(&found, &times.map(|t| 1.0 + 2.0 * math::exp(-0.75 * t)), 1e-7);
@@ -147,14 +149,14 @@ fn a_lag_follows_a_step_exponentially() {
 }
 
 #[test]
-fn a_lag_starts_where_its_free_start_value_says() {
+fn a_lag_starts_from_its_free_initial_state() {
     let model = with(BLOCK, "actuator-lag", "actuator:u", None);
     let found = values(&model, &[2.0, 0.0, 0.0, 0.5, 3.0], NOTHING, "v", &[2.0]);
     close(&found, &[1.5 * 0.5 * (1.0 - math::exp(-4.0))], 1e-7);
 }
 
 #[test]
-fn a_sensor_with_a_lag_lets_the_plant_alone() {
+fn a_sensor_with_a_lag_does_not_affect_the_plant() {
     let model = with(BLOCK, "sensor-lag", "sensor:v", None);
     let times = [0.5, 2.0];
     // v = t: z = t - tau (1 - exp(-t/tau)).
@@ -165,10 +167,10 @@ fn a_sensor_with_a_lag_lets_the_plant_alone() {
 }
 
 #[test]
-fn a_lag_of_second_order_overshoots_as_its_damping_says() {
+fn a_second_order_lag_has_the_overshoot_of_its_damping_ratio() {
     let model = with(BLOCK, "second-order-lag", "sensor:x", None);
     let (tau, d) = (0.2_f64, 0.3_f64);
-    // x = 1 at once where the state of the lag starts 1 below: the step response.
+    // Constant x = 1, with the state of the lag starting 1 below: the step response.
     let times: Vec<f64> = (1..40).map(|k| f64::from(k) * 0.05).collect();
     let found = values(&model, &[1.0, 1.0, 0.0, tau, d, -1.0, 0.0], NOTHING, "x", &times);
     let wd = (1.0 - d * d).sqrt() / tau;
@@ -190,16 +192,16 @@ fn a_delayed_step_comes_later() {
 #[test]
 fn an_actuator_of_limited_rate_takes_its_time() {
     let model = with(BLOCK, "input-rate-limit", "actuator:u", None);
-    // To 2 in 0.5 s from 1 s on, and back to 0 from 3 s on.
+    // To 2 within 0.5 s from 1 s on, and back to 0 from 3 s on.
     let pulse = Input::Sampled { times: vec![0.0, 1.0, 3.0], values: vec![0.0, 2.0, 0.0], hold: Hold::Zero };
     let found = values(&model, &[1.0, 0.0, 0.0, 4.0, 0.0], pulse, "v", &[1.0, 1.25, 1.5, 3.0, 3.25, 3.5, 4.0]);
     close(&found, &[0.0, 0.125, 0.5, 3.5, 3.875, 4.0, 4.0], 5e-6);
 }
 
 #[test]
-fn an_actuator_of_limited_rate_begins_where_its_free_start_value_says() {
+fn an_actuator_with_a_rate_limit_starts_from_its_free_initial_state() {
     let model = with(BLOCK, "input-rate-limit", "actuator:u", None);
-    // From 1 to the command 0 in 0.25 s.
+    // From 1 to the command 0 within 0.25 s.
     let found = values(&model, &[1.0, 0.0, 0.0, 4.0, 1.0], NOTHING, "v", &[0.125, 0.25, 1.0]);
     close(&found, &[0.09375, 0.125, 0.125], 5e-6);
 }
@@ -213,9 +215,9 @@ fn play_at_an_actuator_waits_for_half_its_gap() {
 }
 
 #[test]
-fn play_at_a_sensor_keeps_what_it_shows_where_the_motion_turns() {
+fn play_at_a_sensor_keeps_its_value_after_a_reversal() {
     let model = with(BLOCK, "backlash", "sensor:x", None);
-    // x = 1 - cos t; shown is x - 0.25 as it rises, and 1.75 behind the turn until x is below 1.5.
+    // x = 1 - cos t; the output is x - 0.25 while x rises, and 1.75 after the reversal until x is below 1.5.
     let cosine = Input::Sine { amplitude: 1.0, frequency: 1.0 / TAU, phase: PI / 2.0, offset: 0.0 };
     let times = [1.0, 2.0, 3.1, 3.5, 4.0, 5.0, 6.0];
     let found = values(&model, &[1.0, 0.0, 0.0, 0.5, 0.0], cosine, "x", &times);
@@ -230,7 +232,8 @@ fn play_at_a_sensor_keeps_what_it_shows_where_the_motion_turns() {
 fn a_mass_on_a_flexible_mode_swings_at_both_its_frequencies() {
     let model = with(BLOCK, "flexible-mode", "joint:x", None);
     let (m1, m2, w, k) = (2.0_f64, 0.5, 3.0, 8.0);
-    // With a spring k at the first mass by hand: a cosine of each eigenfrequency, started in its own shape.
+    // With a spring k at the first mass, in closed form: a cosine of each eigenfrequency, started in its own mode
+    // shape.
     let spring = BLOCK.replace("= u\"", "= u - 8 [N/m]*x\"");
     let sprung = with(&spring, "flexible-mode", "joint:x", None);
     let (a, b) = ((k + m2 * w * w) / m1 + w * w, k / m1 * w * w);
@@ -241,26 +244,26 @@ fn a_mass_on_a_flexible_mode_swings_at_both_its_frequencies() {
         let found = values(&sprung, &[m1, 1.0, 0.0, m2, w, 0.0, shape - 1.0, 0.0], NOTHING, "x", &times);
         close(&found, &times.iter().map(|t| math::cos(square.sqrt() * t)).collect::<Vec<_>>(), 1e-6);
     }
-    // Without it the masses move on together, as their momentum says.
+    // Without the spring the masses move on together, with the initial momentum.
     let found = values(&model, &[m1, 0.0, 1.0, m2, w, 0.5, 0.0, -1.0], NOTHING, "v", &[60.0]);
     close(&found, &[m1 / (m1 + m2)], 1e-6);
 }
 
 #[test]
-fn a_coupling_with_play_lets_go_within_its_gap() {
+fn a_coupling_with_play_transmits_nothing_within_its_gap() {
     let model = with(COUPLED, "coupling-play", "joint:x", Some("joint:y"));
-    // Masses 2 at rest, apart by 0; x at 1: the gap of 1 is crossed after 0.5 s, then they bounce for half a period of
-    // sqrt(2 k/m) = 4 rad/s, and have exchanged their speeds.
+    // Two masses of 2, at distance 0, with x at speed 1. The gap of 1 is crossed after 0.5 s. They are then in contact
+    // for half a period of sqrt(2 k/m) = 4 rad/s, and have exchanged their speeds.
     let parameters = [2.0, 16.0, 0.0, 1.0, 0.0, 0.0, 16.0, 1.0, 0.0];
     let times = [0.4, 0.5 + PI / 4.0 + 0.2];
     close(&values(&model, &parameters, NOTHING, "v", &times), &[1.0, 0.0], 1e-5);
     close(&values(&model, &parameters, NOTHING, "w", &times), &[0.0, 1.0], 1e-5);
 }
 
-/// The damping ratio z of the contact gives a coefficient of restitution of exp(-z / sqrt(1 - z^2) (pi - 2 asin(z))), where
-/// contact cannot pull: it ends where the relative acceleration is zero.
+/// Checks the coefficient of restitution of a contact with damping ratio z, exp(-z / sqrt(1 - z^2) (pi - 2 asin(z))).
+/// The contact cannot pull: it ends when the relative acceleration is zero.
 #[test]
-fn damped_contact_in_a_coupling_takes_speed_and_does_not_pull() {
+fn damped_contact_in_a_coupling_reduces_speed_and_does_not_pull() {
     let ratio: f64 = 0.3;
     let tau = 2.0 * ratio / 4.0;
     let damped = COUPLED.replace("k*(x - y)", "(k*(x - y) + 2.4 [N s/m]*(v - w))");
@@ -272,7 +275,7 @@ fn damped_contact_in_a_coupling_takes_speed_and_does_not_pull() {
 }
 
 #[test]
-fn a_spring_with_play_lets_go_within_its_gap() {
+fn a_spring_with_play_has_no_force_within_its_gap() {
     let model = with(&BLOCK.replace("= u\"", "= u - 8 [N/m]*x\""), "spring-play", "joint:x", None);
     let found = values(&model, &[2.0, 0.0, 1.0, 8.0, 1.0], NOTHING, "v", &[0.4, 0.5 + PI / 2.0 + 0.2]);
     close(&found, &[1.0, -1.0], 1e-5);
@@ -294,7 +297,7 @@ fn a_mass_that_becomes_less_is_faster_by_a_logarithm() {
 }
 
 #[test]
-fn a_block_in_a_fluid_slows_down_as_the_powers_of_the_speed_say() {
+fn a_block_in_a_fluid_slows_down_by_the_powers_of_the_speed() {
     let cases = [("viscous-friction", 1.0), ("quadratic-drag", 2.0), ("cubic-drag", 3.0)];
     for (name, p) in cases {
         let model = with(BLOCK, name, "joint:x", None);
@@ -314,9 +317,9 @@ fn a_block_in_a_fluid_slows_down_as_the_powers_of_the_speed_say() {
 }
 
 #[test]
-fn stiction_holds_up_to_its_limit_and_slides_with_less() {
+fn stiction_sticks_up_to_its_limit_and_slides_with_less() {
     let model = with(BLOCK, "stiction", "joint:x", None);
-    // 2 N while it slides, 4 N to break away.
+    // 2 N while sliding, 4 N to break away.
     close(&values(&model, &[2.0, 0.0, 0.0, 2.0, 1.0], Input::Constant(3.9), "v", &[3.0]), &[0.0], 1e-300);
     close(&values(&model, &[2.0, 0.0, 0.0, 2.0, 1.0], Input::Constant(5.0), "v", &[3.0]), &[4.5], 1e-8);
 }
@@ -331,8 +334,8 @@ fn friction_that_differs_by_direction_stops_earlier_one_way() {
 }
 
 #[test]
-fn bristles_that_have_bent_hold_like_dry_friction() {
-    // Behind the displacement y the block loses c v/m: energy m v0^2/2 = c (x - y (1 - ...)), to within c y.
+fn bent_bristles_act_like_dry_friction() {
+    // Beyond the displacement y the friction force is c: energy m v0^2/2 = c (x - y (1 - ...)), to within c y.
     for (name, shape) in [("dahl-friction", vec![1e-3]), ("lugre-friction", vec![0.0, 0.1, 1e-3, 0.0])] {
         let model = with(BLOCK, name, "joint:x", None);
         let parameters: Vec<f64> = [2.0, 0.0, 3.0, 4.0].into_iter().chain(shape).collect();
@@ -344,7 +347,7 @@ fn bristles_that_have_bent_hold_like_dry_friction() {
 #[test]
 fn a_hysteresis_at_small_strokes_is_a_spring() {
     let model = with(BLOCK, "bouc-wen", "joint:x", None);
-    // Far below its limit: stiffness c/y = 8, mass 2, frequency 2 rad/s.
+    // Far below the yield force: stiffness c/y = 8, mass 2, frequency 2 rad/s.
     let times = [0.4, 1.0, 2.0];
     let found = values(&model, &[2.0, 0.0, 0.002, 8.0, 1.0, 1.0, 1.5, 0.0], NOTHING, "x", &times);
     close(&found, &times.map(|t: f64| 0.001 * math::sin(2.0 * t)), 3e-6);
@@ -365,7 +368,7 @@ fn friction_of_a_loaded_gear_grows_with_the_input() {
     close(&found, &[3.0], 1e-9);
 }
 
-/// Time integral of half a period of a cosine that takes `length` to rise from 0 at `from` to 1.
+/// Returns the time integral of half a period of a cosine that rises from 0 at `from` to 1 within `length`.
 fn risen_so_far(t: f64, from: f64, length: f64) -> f64 {
     let since = (t - from).max(0.0);
     let rising = since.min(length);
@@ -387,7 +390,7 @@ fn a_block_whose_friction_changes_with_time_slows_down_by_its_integral() {
 #[test]
 fn a_command_whose_gain_changes_with_time_pushes_by_its_integral() {
     let (times, from, length) = ([0.5, 1.4, 2.2, 4.0], 1.0, 0.8);
-    // m = 2, u = 3: v = u/m (t + integral of the share gained).
+    // m = 2, u = 3: v = u/m (t + integral of the relative change of the gain).
     let drift = with(BLOCK, "input-gain-drift", "actuator:u", None);
     let found = values(&drift, &[2.0, 0.0, 0.0, -0.1], Input::Constant(3.0), "v", &times);
     close(&found, &times.map(|t| 1.5 * (t - 0.05 * t * t)), 1e-6);
@@ -412,7 +415,7 @@ fn a_short_gust_is_not_stepped_over() {
 }
 
 #[test]
-fn what_stores_energy_gives_it_back() {
+fn elastic_effects_return_their_energy() {
     type Potential = fn(f64) -> f64;
     let cases: [(&str, Vec<f64>, Potential); 8] = [
         ("constant-force", vec![0.7], |q| -0.7 * q),
@@ -437,7 +440,7 @@ fn what_stores_energy_gives_it_back() {
     }
 }
 
-/// A place of each sort on a block or in a tank, with what it needs beside it.
+/// Returns a place of each kind on a block or in a tank, with the second place that effects there need.
 fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
     let mut all = Vec::new();
     for effect in effects() {
@@ -470,7 +473,7 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
     all
 }
 
-/// Strengths at which the effects act within the range of the motion below.
+/// Returns parameters for which the effects are active within the range of the motion below.
 fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
     let of = |s: &Strength| match s.name {
         "limit" | "w" | "n" => 1.1,
@@ -488,7 +491,7 @@ fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
     if name == "bouc-wen" {
         all[3] = 1.5;
     }
-    // Where it is damped, the force jumps as contact is made, and the time of that has no tangent.
+    // With damping, the force jumps on contact, and the time of contact has no tangent.
     match name {
         "end-stop" => all[3] = 0.0,
         "coupling-play" => all[2] = 0.0,
@@ -498,8 +501,8 @@ fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
 }
 
 #[test]
-fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
-    // A command in steps, of which none is a round number of any strength.
+fn every_effect_simulates_at_its_ports_with_tangents_that_agree_with_differences() {
+    // A command in steps whose levels are no multiples of any parameter.
     let times: Vec<f64> = (0..8).map(|k| f64::from(k) * 0.5).collect();
     let levels = vec![1.3, 0.4, -1.7, 0.7, 1.9, -0.9, -1.4, 0.8];
     for (model, name, process) in everywhere() {
@@ -519,7 +522,7 @@ fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
         let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
         let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: 3.7 };
         let plain = analysis(&model, &parameters, input.clone(), 3.7);
-        // Rounding has no slope where it does not jump.
+        // Rounding has zero derivative between its jumps.
         let shaped = |k: &usize| !name.ends_with("quantisation") && !effect.strengths()[*k].fixed;
         let moved: Vec<usize> = (0..count - first).filter(shaped).map(|k| first + k).collect();
         let seed = |i: &usize| (0..parameters.len()).map(|j| f64::from(u8::from(*i == j))).collect();
@@ -540,7 +543,7 @@ fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
             for signal in &names {
                 let difference = (up.trace(signal).last() - down.trace(signal).last()) / 2e-4;
                 let exact = tangent.trace(signal).last();
-                // Where a step passes a kink, tangents are as exact as the step is short.
+                // If a step crosses a kink, the accuracy of tangents depends on the length of the step.
                 let agree = (exact - difference).abs() < 5e-3 * (1.0 + difference.abs());
                 assert!(
                     agree,
@@ -553,7 +556,7 @@ fn every_effect_simulates_at_its_ports_with_the_tangents_of_differences() {
 }
 
 #[test]
-fn what_a_sensor_lacks_lets_the_other_signals_alone() {
+fn a_sensor_effect_does_not_affect_other_signals() {
     for (model, name, _) in everywhere() {
         if !matches!(model.placements()[0].port, Port::Sensor { .. }) {
             continue;

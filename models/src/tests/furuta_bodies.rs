@@ -1,4 +1,4 @@
-//! The pendula of two and of three joints against a Newton-Euler derivation and published trajectories.
+//! Pendula with two and three joints, compared with a Newton-Euler derivation and published trajectories.
 
 use std::f64::consts::PI;
 
@@ -11,10 +11,10 @@ use crate::furuta_3_joint::{Furuta3JointOptions, ThreeBodies};
 use crate::kernel::elements::SpringDamper;
 use crate::kernel::mechanism::Bodies;
 
-/// Inertias J and Ja (kg m2), mass (kg), centre of mass and arm (m), gravity (m/s2).
+/// Inertias J and Ja (kg m2), mass (kg), distance of the centre of mass and length of the arm (m), gravity (m/s2).
 type Rods = [f64; 6];
 
-/// Table 4.5 of the thesis.
+/// Parameters of table 4.5 of the thesis.
 const TWO_RODS: Rods = [0.000464, 0.000227, 0.015102, 0.170544, 0.245, 9.81];
 const TWO_FRICTION: [(&str, f64); 6] = [
     ("tau11", 0.005485),
@@ -25,7 +25,7 @@ const TWO_FRICTION: [(&str, f64); 6] = [
     ("peak2", 1.228720),
 ];
 
-/// Table 4.6 of the thesis.
+/// Parameters of table 4.6 of the thesis.
 const THREE_RODS: Rods = [0.001082, 0.001656, 0.040414, 0.238454, 0.245, 9.81];
 const SPRING: f64 = 3.81909;
 const DAMPER: f64 = 0.010007;
@@ -78,7 +78,7 @@ fn near(value: f64, expected: f64, tolerance: f64) {
 
 #[test]
 fn mass_matrix_and_forces_have_their_published_values() {
-    // REFERENCE: the Lagrange equations by a computer algebra system, at this point.
+    // REFERENCE: the Lagrange equations evaluated at this point by a computer algebra system.
     let (q, w) = ([0.1, 2.0, 0.05], [0.5, -3.0, 0.7]);
     let (mass, force) = two_bodies(TWO_RODS).mass_and_force(0.0, &[0.0], &[q[0], q[1]], &[w[0], w[1]]);
     for (value, expected) in [
@@ -124,21 +124,22 @@ fn times(factor: f64, a: Vector) -> Vector {
     a.map(|x| factor * x)
 }
 
-/// `a` turned by `angle` about `axis` (Rodrigues' formula).
+/// Returns `a` rotated by `angle` about `axis` (Rodrigues' formula).
 fn turned(a: Vector, axis: Vector, angle: f64) -> Vector {
     let (sin, cos) = math::sin_cos(angle);
     plus(plus(times(cos, a), times(sin, cross(axis, a))), times((1.0 - cos) * dot(axis, a), axis))
 }
 
-/// The torques of the joints that give accelerations `a`, by the Newton-Euler recursion in world coordinates: y up, the
-/// arm along -x, the pendulum turns about the arm's x by theta, then about its own z by psi, its rod along its y.
+/// Returns the joint torques for accelerations `a`, by the Newton-Euler recursion in world coordinates. The axis y
+/// points up and the arm along -x. The pendulum turns about the arm's x by theta, then about its own z by psi; its rod
+/// is along its y.
 fn newton_euler([inertia, arm, m, l, r, g]: Rods, q: Vector, w: Vector, a: Vector) -> Vector {
     let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
     let axis1 = y;
     let axis2 = turned(x, y, q[0]);
     let axis3 = turned(turned(z, y, q[0]), axis2, q[1]);
     let along = |v: Vector| turned(turned(turned(v, y, q[0]), axis2, q[1]), axis3, q[2]);
-    // Outwards: angular speeds and accelerations, then that of the centre of mass.
+    // Forward recursion: angular velocities and accelerations, then the acceleration of the centre of mass.
     let (w1, a1) = (times(w[0], axis1), times(a[0], axis1));
     let w2 = plus(w1, times(w[1], axis2));
     let a2 = plus(a1, plus(times(a[1], axis2), cross(w1, times(w[1], axis2))));
@@ -148,7 +149,7 @@ fn newton_euler([inertia, arm, m, l, r, g]: Rods, q: Vector, w: Vector, a: Vecto
     let centre = times(l, along(y));
     let acceleration =
         plus(plus(cross(a1, end), cross(w1, cross(w1, end))), plus(cross(a3, centre), cross(w3, cross(w3, centre))));
-    // Inwards: the force at the centre of mass, the moment about it, and what the joints must give.
+    // Backward recursion: the force at the centre of mass, the moment about it, and the joint torques.
     let force = times(m, plus(acceleration, times(g, y)));
     let spin = |v: Vector| {
         let (ex, ez) = (along(x), along(z));
@@ -164,7 +165,7 @@ fn newton_euler([inertia, arm, m, l, r, g]: Rods, q: Vector, w: Vector, a: Vecto
 fn the_equations_agree_with_newton_and_euler_in_any_state() {
     let bodies = three_bodies(THREE_RODS, 0.0, 0.0);
     let planar = two_bodies(TWO_RODS);
-    // A Kronecker sequence: 1000 points spread over the box of states.
+    // Kronecker sequence: 1000 points distributed over the box of states.
     let spread = |k: usize, i: usize| {
         let step = [2.0_f64, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0][i].sqrt();
         #[allow(clippy::cast_precision_loss)]
@@ -190,8 +191,8 @@ fn the_equations_agree_with_newton_and_euler_in_any_state() {
     }
 }
 
-/// Kinetic and potential energy at `t`, J: half `w' M w` with the mass matrix of Newton and Euler (its columns are the
-/// torques of unit accelerations at rest), height of the centre of mass, spring.
+/// Returns kinetic and potential energy at `t`, J: half `w' M w`, height of the centre of mass, and spring. The columns
+/// of the Newton-Euler mass matrix are the torques of unit accelerations at rest.
 fn energy(rods: Rods, spring: f64, response: &Response, t: f64) -> f64 {
     let read = |name: &str| response.trace(name).map_or(0.0, |trace| trace.at(t));
     let q = [read("phi"), read("theta"), read("psi")];
@@ -215,7 +216,7 @@ fn without_friction_the_pendula_keep_their_energy() {
     assert!(response.trace("psi").unwrap().maximum().0 > 0.02, "the tilt takes part");
 }
 
-/// Energy drift over 3 s below 1e-9 of `m g l`.
+/// Checks that the energy drift over 3 s is below 1e-9 of `m g l`.
 fn check_energy(rods: Rods, spring: f64, response: &Response) {
     let [_, _, m, l, _, g] = rods;
     let first = energy(rods, spring, response, 0.0);
@@ -225,7 +226,7 @@ fn check_energy(rods: Rods, spring: f64, response: &Response) {
     }
 }
 
-/// Times and values at which a trace turns, those before `from` left out.
+/// Returns times and values of the turning points of a trace, from `from` on.
 fn turning_points(trace: &Trace, from: f64) -> Vec<(f64, f64)> {
     let pieces: Vec<_> = trace.pieces().into_iter().filter(|p| (p.value[1] - p.value[0]).abs() > 1e-12).collect();
     let turns = |pair: &[mops_core::Piece]| {
@@ -235,7 +236,7 @@ fn turning_points(trace: &Trace, from: f64) -> Vec<(f64, f64)> {
     pieces.windows(2).filter_map(turns).collect()
 }
 
-/// Turning points of theta, range of the arm, and end values, as published.
+/// Published turning points of theta, range of the arm, and final values.
 struct Swing {
     turns: &'static [(f64, f64)],
     arm: [f64; 2],
@@ -245,7 +246,7 @@ struct Swing {
 fn check_swing(response: &Response, swing: &Swing) {
     let turns = turning_points(response.trace("theta").unwrap(), 0.3);
     assert_eq!(turns.len(), swing.turns.len(), "{turns:?}");
-    // Published as samples at 0.01 s: the turn itself is up to a sample away.
+    // Published as samples at 0.01 s: the turning point is up to one sample away.
     for ((t, _), &(sample, expected)) in turns.into_iter().zip(swing.turns) {
         near(t, sample, 0.0101);
         near(response.trace("theta").unwrap().at(sample), expected, 6e-5);
@@ -282,8 +283,9 @@ fn two_joints_swing_as_published() {
             end: &[("phi", -0.984_041_67), ("theta", -3.297_631_23)],
         },
     );
-    // The table of the pendulum falls below zero at 7.357 rad/s: 0.001670/(0.001670 - 0.001443).
-    let event = validation.events.iter().find(|e| e.what.starts_with("pendulum driven")).expect("it is told");
+    // The friction table of the pendulum falls below zero at 7.357 rad/s: 0.001670/(0.001670 - 0.001443).
+    let event =
+        validation.events.iter().find(|e| e.what.starts_with("pendulum driven")).expect("the event is reported");
     near(validation.trace("dtheta").unwrap().at(event.time).abs(), 0.001670 / 0.000227, 1e-6);
 }
 

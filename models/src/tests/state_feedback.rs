@@ -1,4 +1,4 @@
-//! The upright pendulum under state feedback against published figures.
+//! Upright pendulum under state feedback, compared with published figures.
 
 use mops_core::math;
 use mops_core::{Case, Model, ModelOptions, OperatingPoint, Response};
@@ -8,7 +8,8 @@ use crate::furuta_2_joint::Furuta2JointOptions;
 use crate::furuta_linear::FurutaLinearOptions;
 use crate::furuta_state_feedback::FurutaStateFeedbackOptions;
 
-/// Lumped parameters of table 4.5 of the thesis before its rounding, spring of the arm, damper of the pendulum, 30 deg.
+/// Lumped parameters of table 4.5 of the thesis before rounding, spring of the arm, damper of the pendulum, setpoint of
+/// 30 deg.
 const PLANT: [(&str, f64); 7] = [
     ("a", 9.035_24e-4),
     ("b", 1.133_13e-3),
@@ -18,9 +19,9 @@ const PLANT: [(&str, f64); 7] = [
     ("d2", 2.5287e-5),
     ("setpoint", std::f64::consts::FRAC_PI_6),
 ];
-/// Placed at -5, -8, -10, -14, as printed.
+/// Gains for poles at -5, -8, -10, -14, as printed.
 const PLACED: [f64; 4] = [-0.1387, -0.0690, -0.7345, -0.1354];
-/// Table 5.4 of the thesis.
+/// Gains of table 5.4 of the thesis.
 const RETUNED: [f64; 4] = [-0.033_026_8, -0.021_845_1, -0.318_308, -0.061_468_8];
 
 fn values(gains: [f64; 4]) -> Vec<(&'static str, f64)> {
@@ -33,7 +34,8 @@ fn run(plant: &str, gains: [f64; 4]) -> Response {
     respond(model.as_ref(), &Case::default(), &values(gains), 5.0)
 }
 
-/// Rise time from 10 % to 90 %, settling time to 0.3 deg (both of the arm, to 30 deg, s), largest pendulum angle (deg).
+/// Returns the rise time from 10 % to 90 %, the settling time to 0.3 deg, and the largest pendulum angle (deg). Both
+/// times are those of the arm, to 30 deg, in s.
 fn figures(response: &Response) -> [f64; 3] {
     let arm = response.trace("phi").unwrap();
     let target = 30_f64.to_radians();
@@ -49,7 +51,8 @@ fn figures(response: &Response) -> [f64; 3] {
 
 #[test]
 fn the_loop_has_its_published_figures_before_and_after_retuning() {
-    // Thesis: 0.41 s, 1.11 s, 5.86 deg and 0.54 s, 1.2 s, 3 deg; more digits by an independent integration (SciPy).
+    // Thesis: 0.41 s, 1.11 s, 5.86 deg and 0.54 s, 1.2 s, 3 deg; further digits from an independent integration
+    // (SciPy).
     let rows = [
         ("nonlinear", PLACED, [0.40574, 1.11124, 5.86290], 0.0169),
         ("nonlinear", RETUNED, [0.54462, 1.19512, 3.00033], 0.0047),
@@ -81,15 +84,15 @@ fn a_limited_torque_stays_within_its_limit() {
     assert_eq!(response.events[0].what, "torque reaches its limit");
     let arm = response.trace("phi").unwrap().last().to_degrees();
     assert!((arm - 30.0).abs() < 1.0, "it gets there all the same: {arm}");
-    // Springs and dampers large enough to be seen in differences.
+    // Springs and dampers large enough to be visible in differences.
     let elements = [("c1", 1e-2), ("d1", 2e-3), ("c2", 1e-2), ("d2", 2e-3)];
     let damped: Vec<_> = elements.into_iter().chain(limited).collect();
     check_tangents_by(5e-6, model.as_ref(), &Case::default(), &damped, 2.0);
 }
 
 #[test]
-fn the_linear_pendulum_falls_as_its_unstable_pole_says() {
-    // Poles of the thesis's A: 6.739 is the unstable one; after a while it is all there is.
+fn the_linear_pendulum_falls_with_its_unstable_pole() {
+    // Poles of A in the thesis: 6.739 is the unstable one, which eventually dominates.
     let model = toml::from_str::<FurutaLinearOptions>("horizon = 2.0").unwrap().build().unwrap();
     let start: Vec<_> = PLANT.into_iter().filter(|(name, _)| *name != "setpoint").chain([("theta0", 1e-3)]).collect();
     let response = respond(model.as_ref(), &Case::default(), &start, 2.0);
@@ -98,7 +101,7 @@ fn the_linear_pendulum_falls_as_its_unstable_pole_says() {
     assert!((pole - 6.739).abs() < 1e-3, "{pole}");
 }
 
-/// `A` (rows of the rates) and `B` of a model upright at rest.
+/// Returns `A` (rows of the rates) and `B` of a model upright at rest.
 fn linearised(model: &dyn Model, given: &[(&str, f64)]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let parameters = values_of(model, given);
     let states = vec![0.0; model.equation_states().len()];
@@ -116,7 +119,7 @@ fn the_linearised_pendula_have_the_matrices_of_the_thesis() {
     let linear = toml::from_str::<FurutaLinearOptions>("").unwrap().build().unwrap();
     let plant: Vec<_> = PLANT.into_iter().filter(|(name, _)| *name != "setpoint").collect();
     let (a, b) = linearised(linear.as_ref(), &plant);
-    // Section 5.2; linearised by differences, it is right to 2e-4.
+    // Section 5.2; linearised by finite differences, accurate to 2e-4.
     let printed = [[-0.1082, 0.0, -25.4814, 0.0255], [0.0756, 0.0, 45.7597, -0.0458]];
     for (row, printed) in [&a[1], &a[3]].into_iter().zip(printed) {
         for (value, printed) in row.iter().zip(printed) {

@@ -1,4 +1,5 @@
-//! The linear system along a simulation: how small forces at the ports move the states and signals of a model with effects.
+//! Linearisation along a simulation: response of the states and signals of a model with effects to small forces at the
+//! ports.
 
 use mops_core::{Along, Cancellation, DIRECTIONS, Dual, Failure, Job, Opening, Scalar};
 use nalgebra::DMatrix;
@@ -8,31 +9,31 @@ use super::dynamics::Driven;
 use crate::kernel::drive::Drive;
 use crate::kernel::{Sink, Step, integrate};
 
-/// A moment of a simulation with its linear system `dx' = A dx + B db`, `dy = C dx + D db`; `b` are the inputs as they are
-/// commanded, then the forces.
+/// Instant of a simulation with its linearisation `dx' = A dx + B db`, `dy = C dx + D db`. The vector `b` contains the
+/// commanded inputs, then the forces.
 #[derive(Debug, Clone)]
 pub struct Moment {
     /// Time, s.
     pub t: f64,
-    /// States of the plant, then of the effects.
+    /// States of the plant, then those of the effects.
     pub x: Vec<f64>,
-    /// Their rates.
+    /// Rates of the states.
     pub rates: Vec<f64>,
-    /// The inputs as they are commanded.
+    /// Commanded inputs.
     pub u: Vec<f64>,
-    /// The signals that were asked for.
+    /// Requested signals.
     pub y: Vec<f64>,
-    /// `A`.
+    /// State matrix `A`.
     pub a: DMatrix<f64>,
-    /// `B`.
+    /// Input matrix `B`.
     pub b: DMatrix<f64>,
-    /// `C`.
+    /// Output matrix `C`.
     pub c: DMatrix<f64>,
-    /// `D`.
+    /// Feedthrough matrix `D`.
     pub d: DMatrix<f64>,
 }
 
-/// The state at chosen times, the mode of the step included.
+/// States at chosen times, with the mode of the step.
 struct Looks<'t> {
     times: &'t [f64],
     cancellation: &'t Cancellation,
@@ -45,7 +46,7 @@ struct Look {
     x: Vec<f64>,
     u: Vec<f64>,
     contacts: super::contacts::Contacts,
-    /// Of each effect whether its contact is closed, and what it remembers.
+    /// Contact and hysteresis state of each effect.
     effects: Vec<(Option<bool>, Vec<f64>)>,
 }
 
@@ -74,12 +75,12 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
 }
 
 impl WithEffects {
-    /// The linear system at increasing times along a simulation, for the signals of the job.
+    /// Linearises the model at increasing times along a simulation, for the signals of the job.
     ///
     /// # Errors
     /// The failure of the simulation.
     pub fn along(&self, job: &Job<'_>, times: &[f64]) -> Result<Vec<Moment>, Failure> {
-        let open = self.model.ported().expect("looked at when it was made");
+        let open = self.model.ported().expect("checked on creation");
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
         let plant = f64::open(open, &job.parameters[..self.own()])?;
         let mut dynamics = self.driven(plant, &acting, job, job.parameters);

@@ -1,7 +1,7 @@
-//! Dry friction at ports: which joints stick, and what holds them, found by asking the plant.
+//! Dry friction at ports: stuck joints and their friction forces, found by evaluating the plant.
 //!
-//! The rates of a plant depend on its forces affinely, `v' = a + B f`, so that the force that holds joints is what makes
-//! their accelerations vanish; no mass matrix is needed.
+//! The rates of a plant are affine in its forces, `v' = a + B f`. The friction forces of stuck joints make their
+//! accelerations vanish, so no mass matrix is needed.
 
 use mops_core::{Opening, Scalar};
 use nalgebra::{DMatrix, DVector};
@@ -9,20 +9,20 @@ use nalgebra::{DMatrix, DVector};
 use super::dynamics::Driven;
 use crate::kernel::friction::Contact;
 
-/// The joints with dry friction.
+/// Joints with dry friction.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Contacts {
     joints: Vec<Joint>,
 }
 
-/// A joint with dry friction.
+/// Joint with dry friction.
 #[derive(Debug, Clone, Copy)]
 struct Joint {
-    /// The effect that is its friction.
+    /// Effect that gives the friction.
     actor: usize,
-    /// The force of its equation.
+    /// Force in the equation of the joint.
     w: usize,
-    /// The state that is its speed.
+    /// Speed of the joint, as a state.
     velocity: usize,
     contact: Contact,
 }
@@ -40,7 +40,8 @@ impl Contacts {
         self.joints.iter().any(|joint| joint.contact == Contact::Stuck)
     }
 
-    /// 1 where the joint of this effect slides forward, -1 backward; `None` where it sticks or has no dry friction.
+    /// Returns 1 if the joint of this effect slides forward, -1 if backward; `None` if it is stuck or has no dry
+    /// friction.
     pub(super) fn direction(&self, actor: usize) -> Option<f64> {
         let joint = self.joints.iter().find(|joint| joint.actor == actor)?;
         (joint.contact != Contact::Stuck).then(|| joint.contact.sign())
@@ -48,8 +49,8 @@ impl Contacts {
 }
 
 impl<S: Opening> Driven<'_, S> {
-    /// Adds the forces that hold stuck joints to `w`; their accelerations are then 0. Returns what holds each contact, 0
-    /// where it slides.
+    /// Adds the friction forces of stuck joints to `w`, so that their accelerations are 0. Returns the friction force
+    /// of each contact, 0 if it slides.
     pub(super) fn hold(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) -> Vec<S> {
         let joints = &self.contacts.joints;
         let stuck: Vec<usize> = (0..joints.len()).filter(|&i| joints[i].contact == Contact::Stuck).collect();
@@ -64,7 +65,7 @@ impl<S: Opening> Driven<'_, S> {
             self.moved(t, x, u, &mut moved, dx);
             columns.push((0..n).map(|i| dx[joints[stuck[i]].velocity] - free[i]).collect::<Vec<S>>());
         }
-        // What the plant itself holds needs nothing more, and does not move.
+        // Joints that the plant itself keeps stuck need no force, and do not move.
         let moves: Vec<usize> = (0..n).filter(|&k| columns[k][k].value() != 0.0).collect();
         let pick = |list: &[S]| moves.iter().map(|&k| list[k]).collect::<Vec<S>>();
         let held = solve(&moves.iter().map(|&k| pick(&columns[k])).collect::<Vec<_>>(), &pick(&free));
@@ -87,12 +88,12 @@ impl<S: Opening> Driven<'_, S> {
         }
         let mut dx = vec![S::from(0.0); self.own];
         let held = self.balance(t, x, u, w, &mut dx)[index] * self.forward(joint.w);
-        // What holds it backward is friction against forward motion.
+        // A backward friction force is limited by the friction against forward motion.
         let friction = self.friction(joint.actor, t, x, u);
         friction.limit[usize::from(held.value() > 0.0)] - held.abs()
     }
 
-    /// A contact's guard became negative. Returns whether the joint now sticks.
+    /// Switches a contact after its guard became negative. Returns true if the joint is now stuck.
     pub(super) fn contact_switch(&mut self, index: usize, t: f64, x: &mut [S]) -> bool {
         let joint = self.contacts.joints[index];
         if joint.contact == Contact::Stuck {
@@ -108,8 +109,9 @@ impl<S: Opening> Driven<'_, S> {
         self.contacts.joints[index].contact == Contact::Stuck
     }
 
-    /// Finds the contacts of joints at rest that agree with the forces, nearest to what they were; joints that move slide
-    /// the way they move. The joint `released` has just exceeded its limit and does not stick again.
+    /// Finds the contacts of joints at rest that are consistent with the forces and nearest to the previous contacts.
+    /// Moving joints slide in their direction of motion. The joint `released` has just exceeded its limit and does not
+    /// stick again.
     pub(super) fn settle_contacts(&mut self, t: f64, x: &[S], released: Option<usize>) {
         const CHOICES: [Contact; 3] = [Contact::Stuck, Contact::Forward, Contact::Backward];
         let n = self.contacts.len();
@@ -147,7 +149,7 @@ impl<S: Opening> Driven<'_, S> {
                     let never = limit == 0.0 || released == Some(i);
                     excess = if never { f64::INFINITY } else { excess.max((held.abs() - limit) / limit) };
                 } else {
-                    // Accelerations are compared with those that the friction itself makes.
+                    // Any acceleration against the direction of sliding is inconsistent.
                     let a = dx[joint.velocity].value() * joint.contact.sign();
                     excess = excess.max(if a < 0.0 { 1.0 - a } else { 0.0 });
                 }
@@ -163,7 +165,7 @@ impl<S: Opening> Driven<'_, S> {
     }
 }
 
-/// Solves `columns f = -free` by elimination over the scalar; there are few.
+/// Solves `columns f = -free`; the systems are small.
 fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
     let n = free.len();
     match n {
@@ -171,7 +173,7 @@ fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
         1 => return vec![-free[0] / columns[0][0]],
         _ => {}
     }
-    // Values by LU, tangents by one step of Newton's method, which is exact for them.
+    // Values by LU decomposition; tangents by one Newton step, which is exact.
     let matrix = DMatrix::from_fn(n, n, |i, j| columns[j][i].value());
     let lu = matrix.lu();
     let right = DVector::from_fn(n, |i, _| -free[i].value());

@@ -1,4 +1,4 @@
-//! The equations of a plant together with those of the effects at its ports.
+//! Equations of a plant together with those of the effects at its ports.
 
 use std::cell::RefCell;
 
@@ -10,23 +10,23 @@ use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
 use crate::kernel::{Dynamics, shown};
 
-/// An effect in a simulation.
+/// Effect in a simulation.
 pub(super) struct Actor<S> {
     pub(super) acting: Box<dyn Acting<S>>,
     pub(super) place: Place,
-    /// Where its states begin, and how many it has.
+    /// Index of the first state of the effect, and number of its states.
     z: (usize, usize),
-    /// What it remembers.
+    /// Hysteresis state.
     pub(super) memory: Vec<S>,
-    /// By how much the first value that it lets through differs from the one that comes in.
+    /// Initial offset between output and input.
     ahead: S,
-    /// Whether its contact is closed; `None` where it has none.
+    /// True if the contact of the effect is closed; `None` without a contact.
     pub(super) closed: Option<bool>,
     inertial: bool,
 }
 
 impl<S: Scalar> Actor<S> {
-    /// Moves what it remembers to a moment; gives what it lets through then.
+    /// Updates the hysteresis state to an instant, and returns the output.
     pub(super) fn follow(&mut self, at: &At<'_, S>) -> S {
         let first = self.memory[0].value().is_nan();
         self.acting.remember(at, &mut self.memory);
@@ -38,7 +38,7 @@ impl<S: Scalar> Actor<S> {
 }
 
 impl WithEffects {
-    /// The plant with the effects of these indices.
+    /// Creates the plant with the effects of these indices.
     pub(super) fn driven<'a, S: Opening>(
         &self,
         plant: Box<dyn Plant<S> + 'a>,
@@ -68,16 +68,16 @@ impl WithEffects {
     }
 }
 
-/// An input, which an effect may delay.
+/// Input, possibly delayed by an effect.
 struct Command<'a, S> {
     drive: Drive<'a, S>,
     delay: Option<S>,
-    /// When it began, s: below 0 in a window of a record.
+    /// Start of the command, s: below 0 in a window of a record.
     begun: f64,
 }
 
 impl<S: Scalar> Command<'_, S> {
-    /// The time up to which a delayed input has come out.
+    /// Returns the time up to which a delayed input has reached the output.
     fn out(&self, t: f64) -> f64 {
         self.delay.map_or(t, |delay| (t - delay.value() + 1e-12 * (1.0 + t.abs())).max(self.begun))
     }
@@ -106,7 +106,7 @@ impl<S: Scalar> Command<'_, S> {
     }
 }
 
-/// A plant with effects; the state is that of the plant, then those of the effects.
+/// Plant with effects; the state consists of the states of the plant, then those of the effects.
 pub(super) struct Driven<'a, S> {
     pub(super) plant: Box<dyn Plant<S> + 'a>,
     pub(super) actors: Vec<Actor<S>>,
@@ -118,27 +118,27 @@ pub(super) struct Driven<'a, S> {
     breaks: Vec<f64>,
     longest_step: f64,
     damped_step: f64,
-    /// For each signal the state that it shows as it is.
+    /// Index of the state that each signal equals, if any.
     shows: Vec<Option<usize>>,
-    /// Whether no effect sits at a sensor.
+    /// True if no effect acts at a sensor.
     smooth: bool,
-    /// The same of those that no effect changes.
+    /// Index of the state that each signal equals, if any, for signals that no effect changes.
     untouched: Vec<Option<usize>>,
-    /// What a clock shows at time 0, s.
+    /// Clock time at the start of the simulation, s.
     begins: f64,
     started: bool,
-    /// What happened at the last event of the plant.
+    /// Text of the last event of the plant.
     happened: String,
     scratch: RefCell<Scratch<S>>,
-    /// For each force the sign with which a positive one acts forward.
+    /// Sign of each force for which it acts in the forward direction.
     forward: Vec<f64>,
-    /// Forces from outside; none but where the equations are looked at.
+    /// External forces; used only when the equations are evaluated for linearisation.
     further: Vec<S>,
-    /// Rates of inputs that do not move.
+    /// Rates of constant inputs: all 0.
     still: Vec<f64>,
 }
 
-/// Inputs and forces of the moment.
+/// Inputs, forces and rates at one instant.
 struct Scratch<S> {
     u: Vec<S>,
     w: Vec<S>,
@@ -202,7 +202,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// The state at the start; finds which joints have dry friction, and the signs of forces.
+    /// Returns the initial state. Also finds the joints with dry friction, and the signs of forces.
     pub(super) fn start(&mut self, parameters: &[S]) -> Result<Vec<S>, Failure> {
         let mut x = self.plant.start();
         let total = self.actors.last().map_or(self.own, |a| a.z.0 + a.z.1);
@@ -247,7 +247,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         Ok(x)
     }
 
-    /// What passes an actuator or a sensor before this effect.
+    /// Returns the value at an actuator or a sensor before this effect.
     fn passing(&self, index: usize, t: f64, x: &[S], u: &[S], w: &[S]) -> S {
         match self.actors[index].place.site {
             Site::Actuator { input } => u[input],
@@ -256,7 +256,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// What an effect sees.
+    /// Returns the port state that an effect receives.
     fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> At<'b, S> {
         let zero = S::from(0.0);
         let (q, v) = match actor.place.site {
@@ -281,7 +281,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         &x[actor.z.0..actor.z.0 + actor.z.1]
     }
 
-    /// The inputs as they reach the plant.
+    /// Computes the inputs that reach the plant.
     fn inputs(&self, t: f64, x: &[S], u: &mut Vec<S>) {
         u.clear();
         u.extend(self.commands.iter().map(|command| command.at(t)));
@@ -297,7 +297,8 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Forces of the effects but those in proportion to the acceleration, and but friction that holds a joint.
+    /// Computes the forces of the effects, without those proportional to the acceleration and without the friction of
+    /// stuck joints.
     fn forces(&self, t: f64, x: &[S], u: &[S], w: &mut Vec<S>) {
         w.clear();
         w.extend_from_slice(&self.further);
@@ -321,17 +322,17 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Number of states, those of the effects included.
+    /// Returns the number of states, including those of the effects.
     pub(super) fn size(&self) -> usize {
         self.actors.last().map_or(self.own, |actor| actor.z.0 + actor.z.1)
     }
 
-    /// The inputs as they are commanded, delays included.
+    /// Returns the commanded inputs, including delays.
     pub(super) fn commanded(&self, t: f64) -> Vec<S> {
         self.commands.iter().map(|command| command.at(t)).collect()
     }
 
-    /// Takes the contacts of another simulation, and of its effects whether they are closed and what they remember.
+    /// Copies the contacts of another simulation, and the contact and hysteresis states of its effects.
     pub(super) fn take(&mut self, contacts: &Contacts, effects: &[(Option<bool>, Vec<f64>)]) {
         self.contacts = contacts.clone();
         for (actor, (closed, memory)) in self.actors.iter_mut().zip(effects) {
@@ -340,12 +341,12 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Holds the commands.
+    /// Replaces the commands by constant ones.
     pub(super) fn command(&mut self, drives: impl Iterator<Item = Drive<'a, S>>) {
         self.commands = drives.map(|drive| Command { drive, delay: None, begun: 0.0 }).collect();
     }
 
-    /// Rates of all states and values of signals, with `further` forces at the ports.
+    /// Evaluates the rates of all states and the values of signals, with additional forces `further` at the ports.
     pub(super) fn look(&mut self, t: f64, x: &[S], further: &[S], signals: &[usize]) -> (Vec<S>, Vec<S>) {
         self.further = further.to_vec();
         let x = x.to_vec();
@@ -358,7 +359,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         (dx, outputs)
     }
 
-    /// The sign with which a force acts forward.
+    /// Returns the sign with which a force acts in the forward direction.
     pub(super) fn forward(&self, w: usize) -> f64 {
         self.forward[w]
     }
@@ -367,7 +368,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.plant.rates(&Instant { t, x: &x[..self.own], u, w }, dx);
     }
 
-    /// Rates of the plant for forces to which those in proportion to the acceleration are added.
+    /// Computes the rates of the plant, after adding the forces proportional to the acceleration.
     pub(super) fn moved(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) {
         for actor in self.actors.iter().filter(|actor| actor.inertial) {
             let Site::Joint { w: k, velocity, .. } = actor.place.site else { continue };
@@ -383,7 +384,8 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.own_rates(t, x, u, w, dx);
     }
 
-    /// Inputs, and forces with the friction that holds joints; the rates of the plant.
+    /// Computes inputs, forces including the friction of stuck joints, and the rates of the plant. Returns the friction
+    /// of each contact, empty if no joint is stuck.
     pub(super) fn balance(&self, t: f64, x: &[S], u: &mut Vec<S>, w: &mut Vec<S>, dx: &mut [S]) -> Vec<S> {
         self.inputs(t, x, u);
         self.forces(t, x, u, w);
@@ -394,14 +396,14 @@ impl<'a, S: Opening> Driven<'a, S> {
         Vec::new()
     }
 
-    /// Friction at a joint with a contact: sliding forces and limits against forward and backward.
+    /// Returns the friction at a joint with a contact: sliding forces and limits against forward and backward motion.
     pub(super) fn friction(&self, actor: usize, t: f64, x: &[S], u: &[S]) -> mops_core::DryFriction<S> {
         let actor = &self.actors[actor];
         let at = self.at(actor, t, x, u, S::from(0.0));
         actor.acting.friction(&at, self.states(actor, x)).expect("it has friction from the start")
     }
 
-    /// The value of a signal as it is measured; what is remembered comes in later.
+    /// Returns the measured value of a signal; effects with a hysteresis state are applied after the simulation.
     pub(super) fn measured(&self, signal: usize, t: f64, x: &[S]) -> S {
         let here = |actor: &&Actor<S>| {
             matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
@@ -418,7 +420,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx, .. } = &mut *scratch;
         dx.resize(self.own, S::from(0.0));
-        // Outputs may contain rates: the forces count.
+        // Outputs may contain rates, which depend on the forces.
         self.balance(t, x, u, w, dx);
         let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
         self.actors
@@ -427,7 +429,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             .fold(value, |value, actor| actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x)))
     }
 
-    /// Moves what actuators remember to the command of the moment.
+    /// Updates the hysteresis states of actuators to the current command.
     fn remember(&mut self, t: f64, x: &[S]) {
         let mut u: Vec<S> = self.commands.iter().map(|command| command.at(t)).collect();
         for index in 0..self.actors.len() {
@@ -443,7 +445,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Commands as they are from `t` on.
+    /// Moves the commands to their course from `t` on.
     fn follow_commands(&mut self, t: f64) {
         for command in &mut self.commands {
             let out = command.out(t);
@@ -451,10 +453,10 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Takes actuators that remember through what was commanded before time 0, in a window of a record.
+    /// Initialises the hysteresis states of actuators from the commands before time 0, in a window of a record.
     ///
-    /// N.B.: what comes before them on the same actuator and depends on the state of the plant, or has states of its own, is as
-    /// it is at time 0.
+    /// N.B.: effects before them on the same actuator that depend on the state of the plant, or have states, are
+    /// evaluated as at time 0.
     fn run_up(&mut self, x: &[S]) {
         let none = S::from(0.0);
         let ahead: Vec<S> = self.actors.iter_mut().map(|a| std::mem::replace(&mut a.ahead, none)).collect();
@@ -473,15 +475,16 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Not negative while the gap with this number stays open, or closed.
+    /// Returns the guard of a gap, by its number: not negative while the gap stays open, or closed.
     fn gap_guard(&self, number: usize, t: f64, x: &[S]) -> S {
         let mut gaps = self.actors.iter().filter(|actor| actor.closed.is_some());
-        let actor = gaps.nth(number).expect("it is one of them");
-        let gap = actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0))).expect("it had one at the start");
+        let actor = gaps.nth(number).expect("the number is valid");
+        let gap =
+            actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0))).expect("the effect had a gap at the start");
         if actor.closed == Some(true) { -gap } else { gap }
     }
 
-    /// Finds which contacts are closed: at the start, and where the state of the plant has jumped.
+    /// Finds the closed contacts, at the start and after a jump of the plant state.
     fn settle_gaps(&mut self, t: f64, x: &[S]) {
         for index in 0..self.actors.len() {
             let actor = &self.actors[index];
@@ -493,15 +496,15 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Its guard became negative. Returns whether it is closed now.
+    /// Switches a gap after its guard became negative. Returns true if the gap is now closed.
     fn gap_switch(&mut self, number: usize) -> bool {
         let mut gaps = self.actors.iter_mut().filter_map(|actor| actor.closed.as_mut());
-        let closed = gaps.nth(number).expect("it is one of them");
+        let closed = gaps.nth(number).expect("the number is valid");
         *closed = !*closed;
         *closed
     }
 
-    /// Passes a break of inputs. The time at which a delayed input jumps moves with the delay, and the state with it.
+    /// Handles a break of inputs. The time of a jump of a delayed input varies with the delay, and so does the state.
     fn pass(&mut self, t: f64, x: &mut [S]) {
         let delayed = self.commands.iter().any(|c| c.delay.is_some());
         if delayed && S::DIRECTIONS > 0 && self.started {
@@ -523,7 +526,8 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 }
 
-/// An event of the plant: what effects make of its inputs is taken as it is at that instant, whatever the parameters.
+/// Creates the instant of a plant event. The outputs of effects at actuators are taken at that instant; their
+/// dependence on the parameters is neglected.
 fn event<'a, S: Scalar>(at: Instant<'a, S>, still: &'a [f64]) -> EventInstant<'a, S> {
     EventInstant { at, du: still, delay: S::from(0.0) }
 }
@@ -539,7 +543,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let (own, further) = dx.split_at_mut(self.own);
         self.balance(t, x, u, w, own);
         for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
-            // An actuator's state follows what comes to it, not what it passes on.
+            // The state of an actuator effect follows its input, not its output.
             let value = match actor.place.site {
                 Site::Actuator { input } => self.commands[input].at(t),
                 _ => self.passing(index, t, x, u, w),
@@ -602,7 +606,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.plant.has_bounds()
     }
 
-    /// Guards of the plant, as far as they do not depend on what effects make of inputs and forces.
+    /// Returns bounds of the guards of the plant. Inputs with effects, and forces, are unbounded.
     fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
         if index >= self.plant.guards() {
             return Enclosure::UNKNOWN;
@@ -627,7 +631,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
             } else {
                 "a contact opens and closes"
             };
-            return Err(format!("{what} again and again"));
+            return Err(format!("{what} without end"));
         }
         let (mut u, mut w) = (Vec::new(), Vec::new());
         let mut dx = vec![S::from(0.0); self.own];
@@ -648,7 +652,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn next_break(&self, t: f64) -> f64 {
-        // What an effect makes of a signal may be rough: it is resolved where samples are taken.
+        // The output of a sensor effect may be rough, so steps end at all samples.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
         let next = self.plant.next_break(t).min(inputs);
@@ -666,7 +670,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     fn pass_break(&mut self, t: f64, x: &mut [S]) {
         let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
         let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
-        // What is remembered is moved up to the break, and across it.
+        // Hysteresis states are updated just before the break, and across it.
         if remembers && self.started {
             self.remember(t, x);
         } else if remembers && self.begins > 0.0 {

@@ -1,4 +1,5 @@
-//! A model with effects at its ports: itself a model, whose parameters are those of the model and the strengths.
+//! Model with effects at its ports. The result is a model, whose parameters are those of the base model and of the
+//! effects.
 
 mod along;
 mod contacts;
@@ -15,9 +16,9 @@ use mops_core::{
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
 pub use along::Moment;
 
-/// A model with effects.
+/// Model with effects.
 ///
-/// Where every effect is neutral the model itself is simulated, to the last bit.
+/// If every effect has its null value, the simulation is that of the base model, bit for bit.
 pub struct WithEffects {
     model: Arc<dyn Model>,
     placements: Vec<Placement>,
@@ -26,7 +27,7 @@ pub struct WithEffects {
     max_steps: usize,
 }
 
-/// Where an effect acts, as indices; and where its strengths and start values stand among the parameters.
+/// Place of an effect, as indices, and the indices of its parameters and initial states among the parameters.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     site: Site,
@@ -35,7 +36,7 @@ struct Place {
     starts: Option<usize>,
 }
 
-/// A port, as indices into states, inputs, signals, and forces `w`.
+/// Port, as indices of states, inputs, signals, and forces `w`.
 #[derive(Debug, Clone, Copy)]
 enum Site {
     Joint { w: usize, position: usize, velocity: usize },
@@ -45,13 +46,13 @@ enum Site {
 }
 
 impl WithEffects {
-    /// The model with these effects.
+    /// Adds effects to a model.
     ///
     /// # Errors
-    /// A model without ports, a port that it does not have, or one that the effect does not act at; two effects of one name.
-    /// The mistake stands under the name of the effect.
+    /// The model has no ports, a port does not exist, or the effect does not act there; or two effects have the same
+    /// name. The path of the mistake starts with the name of the effect.
     pub fn new(model: Arc<dyn Model>, placements: Vec<Placement>) -> Result<Self, Mistake> {
-        // To a model with effects more are added.
+        // Effects are added to those that the model already has.
         let before = model.augmented().map(|(model, placements)| (Arc::clone(model), placements.to_vec()));
         let (model, placements) = match before {
             Some((model, before)) => (model, [before, placements].concat()),
@@ -59,8 +60,8 @@ impl WithEffects {
         };
         let of = model.interface();
         if model.ported().is_none() {
-            let fact = "this model cannot take effects: it does not open its equations";
-            return Err(Mistake::here(fact).with_help("`mops check` tells which places the models of a study have"));
+            let fact = "this model does not support effects: its equations are not open";
+            return Err(Mistake::here(fact).with_help("`mops check` lists the places of the models in a study"));
         }
         let mut interface = of.clone();
         let mut places = Vec::new();
@@ -73,14 +74,14 @@ impl WithEffects {
                 let variable = Variable {
                     name: format!("{name}.{}", strength.name),
                     unit: match strength.trials {
-                        // 1/s would take 5 Hz for 5 rad/s.
+                        // With the unit 1/s, 5 Hz would be read as 5 rad/s.
                         Trials::Frequencies => Unit::known("rad/s"),
                         _ => unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
                     about: strength.about.to_owned(),
                 };
                 if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
-                    let fact = format!("the model has a parameter `{}` already", variable.name);
+                    let fact = format!("the model already has a parameter `{}`", variable.name);
                     return Err(Mistake::new(name, fact).with_help("give the effect another name"));
                 }
                 let default = strength.neutral;
@@ -97,7 +98,7 @@ impl WithEffects {
                 let variable = Variable {
                     name: parameter.clone(),
                     unit: unit(dimension, &placement.port, placement.companion.as_ref(), of),
-                    about: "start value of a state of the effect, over where it would rest".to_owned(),
+                    about: "initial state of the effect, relative to its equilibrium".to_owned(),
                 };
                 let range = [f64::NEG_INFINITY, f64::INFINITY];
                 interface.parameters.push(Parameter { variable, default: Some(0.0), range, infinite: false });
@@ -109,7 +110,7 @@ impl WithEffects {
         Ok(Self { model, placements, places, interface, max_steps: usize::MAX })
     }
 
-    /// Fails simulations that need more steps: effects at strengths that make them stiff.
+    /// Limits the number of steps: a simulation that needs more fails. Some parameter values make effects stiff.
     #[must_use]
     pub fn with_step_limit(mut self, max_steps: usize) -> Self {
         self.max_steps = max_steps;
@@ -121,22 +122,22 @@ impl WithEffects {
         Tolerance { max_steps: tolerance.max_steps.min(self.max_steps), ..tolerance }
     }
 
-    /// The model without effects.
+    /// Returns the model without effects.
     pub fn model(&self) -> &Arc<dyn Model> {
         &self.model
     }
 
-    /// The effects.
+    /// Returns the effects.
     pub fn placements(&self) -> &[Placement] {
         &self.placements
     }
 
-    /// Number of parameters of the model itself.
+    /// Returns the number of parameters of the base model.
     fn own(&self) -> usize {
         self.model.interface().parameters.len()
     }
 
-    /// Whether an effect may change something, along the tangents too.
+    /// Returns true if an effect may change the response or its tangents.
     fn acts<S: Scalar>(&self, index: usize, parameters: &[S]) -> bool {
         let neutral = self.placements[index].effect.strengths()[0].neutral;
         let first = parameters[self.places[index].strengths];
@@ -144,7 +145,7 @@ impl WithEffects {
     }
 
     fn simulate<S: Opening>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        let open = self.model.ported().expect("looked at when it was made");
+        let open = self.model.ported().expect("checked on creation");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
         let mut dynamics = self.driven(plant, &acting, job, parameters);
@@ -156,7 +157,7 @@ impl WithEffects {
 }
 
 impl Site {
-    /// Where an effect acts, and its companion.
+    /// Returns the place of an effect, and its second port.
     fn of_both(
         placement: &Placement,
         interface: &Interface,
@@ -170,7 +171,7 @@ impl Site {
         if !kind(port).is_some_and(|kind| effect.ports().contains(&kind)) {
             let names: Vec<&str> = effect.ports().iter().map(|kind| kind.name()).collect();
             let fact = format!("`{}` does not act at {port}", effect.name());
-            return Err(Mistake::new("place", fact).with_help(format!("it acts at: {}", names.join(", "))));
+            return Err(Mistake::new("place", fact).with_help(format!("the effect acts at: {}", names.join(", "))));
         }
         let here = site("place", port)?;
         let there = match (effect.companion(), companion) {
@@ -178,11 +179,11 @@ impl Site {
             (Some(wanted), Some(companion)) if kind(companion) == Some(wanted) => Some(site("companion", companion)?),
             (Some(wanted), given) => {
                 let (key, what) = if given.is_some() { ("companion", "another") } else { ("place", "a") };
-                let fact = format!("`{}` needs {what} second place: {}", effect.name(), wanted.name());
+                let fact = format!("`{}` needs {what} second place of kind {}", effect.name(), wanted.name());
                 let such = interface.ports.iter().find(|port| kind(port) == Some(wanted));
                 let help = such.map_or_else(
                     || format!("the model has no {}", wanted.name()),
-                    |port| format!("such as companion = \"{port}\""),
+                    |port| format!("for example companion = \"{port}\""),
                 );
                 return Err(Mistake::new(key, fact).with_help(help));
             }
@@ -221,7 +222,7 @@ impl Site {
     }
 }
 
-/// The unit of a strength at a port, where the model tells it.
+/// Returns the unit of an effect parameter at a port, as far as the units of the model determine it.
 fn unit(dimension: Dimension, port: &Port, companion: Option<&Port>, interface: &Interface) -> Unit {
     let of = |name: &str| {
         let all = interface.signals.iter().chain(&interface.inputs);

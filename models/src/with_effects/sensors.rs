@@ -1,4 +1,4 @@
-//! What sensors remember, and by how much they come late: brought in when the simulation is over, as nothing depends on it.
+//! Sensor effects with hysteresis or delay: applied after the simulation, as no other quantity depends on them.
 
 use mops_core::{At, Opening, Trace};
 
@@ -7,7 +7,7 @@ use super::dynamics::Driven;
 use crate::kernel::Recording;
 
 impl<S: Opening> Driven<'_, S> {
-    /// The recording with what sensors with a delay or a memory make of it.
+    /// Applies sensor effects with a delay or a hysteresis state to the recording.
     pub(super) fn remembered(&mut self, mut recording: Recording, signals: &[(usize, String)]) -> Recording {
         for actor in &mut self.actors {
             let Site::Sensor { signal } = actor.place.site else { continue };
@@ -32,7 +32,7 @@ impl<S: Opening> Driven<'_, S> {
                 for ends in knots.windows(2) {
                     let mut nodes = vec![[0.0; 5]; before.len()];
                     for (node, s) in Trace::NODES.into_iter().enumerate() {
-                        // Just within the segment: at its ends the trace may jump.
+                        // Just inside the segment, because the trace may jump at its ends.
                         let t = ends[0] + (ends[1] - ends[0]) * s.clamp(1e-9, 1.0 - 1e-9);
                         let mut value = S::from(before[0].at(t));
                         (0..S::DIRECTIONS).for_each(|d| value.set_tangent(d, before[1 + d].at(t)));

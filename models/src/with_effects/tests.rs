@@ -1,4 +1,4 @@
-//! Models with effects, against closed forms.
+//! Models with effects, compared with closed forms.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ parameters = { m = "kg" }
 der        = { x = "v", v = "m*v' = u" }
 "#;
 
-/// Values of `x` and `v` at the end.
+/// Returns the final values of `x` and `v`.
 fn run(model: &dyn Model, parameters: &[f64], inputs: Vec<(String, Input)>, end: f64) -> [f64; 2] {
     let case = Case { inputs, ..Case::default() };
     let job = Job { case: &case, parameters, signals: &[0, 1], horizon: end };
@@ -51,7 +51,7 @@ fn run(model: &dyn Model, parameters: &[f64], inputs: Vec<(String, Input)>, end:
 #[test]
 fn a_block_with_dry_friction_stops_where_its_energy_is_used_up() {
     let model = with(&equations(BLOCK), &[("coulomb-friction", "joint:x")]);
-    // m = 2, x0 = 0, v0 = 3, c = 4: stops after m v0/c = 1.5 s at m v0^2/(2 c) = 2.25 m, and stays.
+    // m = 2, x0 = 0, v0 = 3, c = 4: the block stops after m v0/c = 1.5 s at m v0^2/(2 c) = 2.25 m, and stays.
     let end = run(&model, &[2.0, 0.0, 3.0, 4.0], Vec::new(), 5.0);
     assert!((end[0] - 2.25).abs() < 1e-8 && end[1] == 0.0, "{end:?}");
     let early = run(&model, &[2.0, 0.0, 3.0, 4.0], Vec::new(), 1.0);
@@ -90,7 +90,7 @@ fn neutral_effects_change_no_bit() {
 }
 
 #[test]
-fn tangents_along_strengths_are_those_of_differences() {
+fn tangents_with_respect_to_effect_parameters_agree_with_differences() {
     let model = with(&equations(BLOCK), &[("coulomb-friction", "joint:x"), ("viscous-friction", "joint:x")]);
     let inputs = vec![("u".to_owned(), Input::Sine { amplitude: 6.0, frequency: 0.4, phase: 0.3, offset: 0.5 })];
     let case = Case { inputs, ..Case::default() };
@@ -112,9 +112,9 @@ fn tangents_along_strengths_are_those_of_differences() {
     }
 }
 
-/// The force of a damped stop jumps as contact is made, at a moment that moves with all that comes before.
+/// Checks tangents where the force of a damped stop jumps on contact, at a time that depends on all earlier parameters.
 #[test]
-fn tangents_across_damped_contacts_are_those_of_differences() {
+fn tangents_across_damped_contacts_agree_with_differences() {
     let exact = "tolerance = { relative = 1e-12, absolute = 1e-14 }";
     let model = with(&equations(&format!("{BLOCK}{exact}")), &[("end-stop", "joint:x")]);
     let case = Case { inputs: vec![("u".to_owned(), Input::Constant(1.0))], ..Case::default() };
@@ -136,13 +136,13 @@ fn stops_that_have_crossed_are_one_spring_about_their_middle() {
     assert!((v + 0.2 * omega * math::sin(4.0 * omega)).abs() < 1e-5, "{v}");
 }
 
-/// A catch 20 mm behind the stop throws the block back, 0.2 m before it.
+/// Checks a wall 20 mm behind the stop, which reverses the block and resets it to 0.2 m in front of the stop.
 #[test]
-fn a_contact_is_found_anew_where_the_state_jumps() {
+fn a_contact_is_updated_where_the_state_jumps() {
     let text = format!("{BLOCK}when = {{ wall = {{ guard = \"0.32 - x\", reset = {{ x = \"0.1\", v = \"-v\" }} }} }}");
     let model = with(&equations(&text), &[("end-stop", "joint:x")]);
     let [x, v] = run(&model, &[2.0, 0.0, 3.0, 500.0, -9.0, 0.3, 1e-3], Vec::new(), 0.2);
-    // It has flown on freely, and made no contact but the first.
+    // The block moves freely afterwards, with no contact but the first.
     assert!(v < -2.9 && x < 0.1, "{x} {v}");
     let case = Case::default();
     let thrown =
@@ -157,7 +157,7 @@ fn a_stop_is_a_spring_in_the_linear_system_while_it_is_reached() {
     let (m, k) = (2.0, 5000.0);
     let parameters = [m, 0.0, 3.0, k, -0.2, 0.3, 4e-3];
     let job = Job { case: &Case::default(), parameters: &parameters, signals: &[0], horizon: 0.3 };
-    // It is reached at 0.1 s, for half a period, 63 ms, or less.
+    // Reached at 0.1 s, for at most half a period, 63 ms.
     let moments = model.along(&job, &[0.05, 0.12, 0.2]).expect("it simulates");
     let stiffness: Vec<f64> = moments.iter().map(|moment| moment.a[(1, 0)]).collect();
     assert_eq!(stiffness, [0.0, -k / m, 0.0]);
@@ -166,7 +166,7 @@ fn a_stop_is_a_spring_in_the_linear_system_while_it_is_reached() {
 #[test]
 fn a_lag_at_rest_has_tangents_that_decay() {
     let model = with(&equations(BLOCK), &[("actuator-lag", "actuator:u")]);
-    // The command is 1 all along, and the lag begins at 1: nothing but its time limits the step.
+    // The command is constantly 1 and the lag starts at 1: only its time constant limits the step.
     let (tau, mass) = (1.5e-3, 2.0);
     let u = Input::Constant(1.0);
     let case = Case { inputs: vec![("u".into(), u)], ..Case::default() };
@@ -175,12 +175,12 @@ fn a_lag_at_rest_has_tangents_that_decay() {
     let mut of_start = vec![0.0; parameters.len()];
     of_start[4] = 1.0;
     let (_, tangents) = model.tangents(&job, &[of_start]).expect("it has them").expect("it simulates");
-    // What begins 1 too high leaves an impulse of tau.
+    // An initial state that is 1 too high adds an impulse of tau.
     assert!((tangents[0].trace("v").last() * mass / tau - 1.0).abs() < 1e-3, "{}", tangents[0].trace("v").last());
 }
 
 #[test]
-fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_remembers_or_is_late() {
+fn a_window_of_a_record_agrees_with_the_whole_record_for_actuators_with_hysteresis_or_delay() {
     const BEGINS: f64 = 1.03;
     let times: Vec<f64> = (0..20).map(|k| f64::from(k) * 0.1).collect();
     let values: Vec<f64> = (0..20).map(|k| math::sin(f64::from(k) * 1.7)).collect();
@@ -206,10 +206,10 @@ fn a_window_of_a_record_goes_on_as_the_whole_record_does_at_an_actuator_that_rem
             let end = ["x", "v"].map(|signal| window.trace(signal).last());
             for (signal, whole) in ["x", "v"].into_iter().zip(whole) {
                 let window = window.trace(signal).last();
-                // Kinks within a step cost the integrator digits.
+                // Kinks within a step reduce the accuracy of the integrator.
                 assert!((window - whole).abs() < 1e-6, "{effect} {hold:?} {signal}: {window} {whole}");
             }
-            // A clock that begins with the window knows nothing of what was before.
+            // A simulation whose clock starts with the window has no information about the time before.
             let late = run(&model, &parameters, input(BEGINS), 1.9 - BEGINS);
             assert!((late[1] - end[1]).abs() > 1e-3, "{effect} {hold:?}: {late:?} {end:?}");
         }
@@ -222,7 +222,7 @@ fn built_in(kind: &str) -> Arc<dyn Model> {
     Arc::from(kind.default_model().expect("every option has a default"))
 }
 
-/// Parameters in the order of the model, by name; others at their defaults.
+/// Returns parameters in the order of the model, given by name; others have their defaults.
 fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
     let unknown = given.iter().find(|(name, _)| !model.interface().parameters.iter().any(|p| p.variable.name == *name));
     assert_eq!(unknown, None);
@@ -231,7 +231,7 @@ fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
     model.interface().parameters.iter().map(|p| value(p).expect(&p.variable.name)).collect()
 }
 
-/// Traces of signals over 6 s with a torque that pushes, holds and lets go, and the events.
+/// Returns traces of signals over 6 s and the events, for a torque that rises, stays constant and is removed.
 fn pushed(
     model: &dyn Model,
     given: &[(&str, f64)],
@@ -256,10 +256,13 @@ fn pushed(
     let job = Job { case: &case, parameters: &parameters, signals: &wanted, horizon: 6.0 };
     let analysis = model.analyse(&job).expect("it simulates");
     let response = analysis.response().expect("it is a simulation").clone();
-    (signals.iter().map(|name| response.trace(name).expect("it was asked for").clone()).collect(), response.events)
+    (
+        signals.iter().map(|name| response.trace(name).expect("the signal was requested").clone()).collect(),
+        response.events,
+    )
 }
 
-/// The largest difference of two models' signals, each over the largest value of the signal or 1.
+/// Returns the largest difference of two models' signals, each divided by the maximum of the signal or 1.
 fn apart(a: &[mops_core::Trace], b: &[mops_core::Trace]) -> f64 {
     let times = || (0..460).map(|k| f64::from(k) * 0.013);
     let largest = |of: &dyn Fn(f64) -> f64| times().map(|t| of(t).abs()).fold(0.0, f64::max);
@@ -273,7 +276,7 @@ const LUMPED: [(&str, f64); 7] =
     [("a", 0.0044), ("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("theta0", 2.2)];
 
 #[test]
-fn dry_friction_as_an_effect_is_that_of_the_model_sticking_included() {
+fn dry_friction_as_an_effect_agrees_with_that_of_the_model_with_sticking() {
     let plain = built_in("furuta");
     let signals = ["phi", "dphi", "theta", "dtheta"];
     let (own, events) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012)]].concat(), &signals);
@@ -283,7 +286,7 @@ fn dry_friction_as_an_effect_is_that_of_the_model_sticking_included() {
     assert!(events.iter().any(|event| event.what == "a joint sticks"), "{events:?}");
     assert!(apart(&own, &added) < 1e-7, "{}", apart(&own, &added));
 
-    // The same in both joints, and shared between the model and the effect.
+    // Equal friction in both joints, shared between the model and the effect.
     let (own, _) = pushed(plain.as_ref(), &[&LUMPED[..], &[("ca", 0.012), ("cp", 0.001)]].concat(), &signals);
     let both = with(&plain, &[("coulomb-friction", "joint:phi"), ("coulomb-friction", "joint:theta")]);
     let (added, _) = pushed(&both, &[&LUMPED[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &signals);
@@ -305,7 +308,7 @@ fn a_pendulum_of_equations_takes_friction_as_the_built_in_one_does() {
 
 #[test]
 fn bodies_with_bearings_take_forces_at_every_joint() {
-    // A bearing whose table is flat is Coulomb friction, one that rises by 0.002 in 1 rad/s has viscous friction besides.
+    // A bearing with a flat table is Coulomb friction; one that rises by 0.002 in 1 rad/s also has viscous friction.
     let bodies = [("J", 4e-3), ("Ja", 0.01), ("m", 0.04), ("l", 0.1), ("r", 0.2), ("theta0", 2.2)];
     for (kind, signals) in [("furuta-2-joint", &["phi", "theta"][..]), ("furuta-3-joint", &["phi", "theta", "psi"])] {
         let plain = built_in(kind);
@@ -332,7 +335,7 @@ fn bodies_with_bearings_take_forces_at_every_joint() {
     }
 }
 
-/// `theta'' = u - 4 sin(theta) + w`, written in Rust.
+/// Pendulum `theta'' = u - 4 sin(theta) + w`, written in Rust.
 struct Pendulum(Interface);
 
 impl Pendulum {
@@ -361,7 +364,7 @@ impl PlantModel for Pendulum {
         &self.0
     }
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-        Ok(At(parameters.try_into().expect("one parameter and two start values")))
+        Ok(At(parameters.try_into().expect("one parameter and two initial states")))
     }
 }
 
@@ -396,7 +399,7 @@ fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_tex
     let case = Case::default();
     let job = Job { case: &case, parameters: &[4.0, 0.01, 0.0], signals: &[0], horizon: 2.0 };
     let (analysis, tangents) = own.tangents(&job, &[vec![0.0, 1.0, 0.0]]).expect("it has them").expect("it simulates");
-    // A small swing is 0.01 cos(2 t), and so is its slope by the start value but for 1e-4 of it.
+    // A small swing is 0.01 cos(2 t), and so is its derivative with respect to the initial angle, to 1e-4.
     assert!((analysis.trace("theta").at(2.0) - 0.01 * math::cos(4.0)).abs() < 1e-6);
     assert!((tangents[0].trace("theta").at(2.0) - math::cos(4.0)).abs() < 1e-3);
 }

@@ -1,5 +1,5 @@
-"""Reference values for tests/equations: the same plants by SciPy's DOP853 (rtol 1e-12, atol 1e-13), equations solved for
-the derivatives by hand or by numpy.linalg.solve. Run with SciPy 1.17."""
+"""Reference values for tests/equations: the same plants integrated by SciPy's DOP853 (rtol 1e-12, atol 1e-13). The equations
+are solved for the derivatives by hand or by numpy.linalg.solve. Run with SciPy 1.17."""
 
 import numpy as np
 from scipy.integrate import solve_ivp

@@ -1,4 +1,4 @@
-//! Dry friction that is 0, always or for a while, is no friction.
+//! Dry friction that is 0, always or for a while, has no effect.
 
 use super::*;
 use mops_core::math;
@@ -25,7 +25,7 @@ fn close(found: [f64; 2], expected: [f64; 2]) {
 }
 
 #[test]
-fn a_throw_without_friction_turns_round() {
+fn a_throw_without_friction_reverses() {
     let zeros = ["coulomb = 'c'", "coulomb = '0'", "coulomb = 'c*abs(q)/1 [m]'", "coulomb = 'c', peak = '1.5'"];
     for friction in zeros {
         for w0 in [1.0, 0.0, -1.0] {
@@ -50,7 +50,8 @@ fn an_oscillator_without_friction_keeps_its_amplitude() {
 
 #[test]
 fn a_brake_that_is_off_at_first_then_stops_the_motion() {
-    // Backward at -1 m/s from 1.5 s on the brake takes 0.5 m/s2: at rest after 2 s and 1 m.
+    // The block moves backward at -1 m/s. From 1.5 s on the brake decelerates it by 0.5 m/s2: at rest after 2 s and 1
+    // m.
     for coulomb in ["if(time > 1.5, 0.5, 0)", "clip(1e6 [m/s3]*(time - 1.5), 0, 0.5)"] {
         let model = joint("0", &format!("coulomb = '{coulomb}'"));
         let [q, w] = end(&model, &[("c", 0.0), ("q0", 0.0), ("w0", -1.0)], 10.0);
@@ -59,7 +60,7 @@ fn a_brake_that_is_off_at_first_then_stops_the_motion() {
 }
 
 #[test]
-fn a_joint_without_friction_moves_beside_one_that_sticks() {
+fn a_joint_without_friction_moves_while_another_sticks() {
     let text = "states = { a = 'm', va = 'm/s', b = 'm', vb = 'm/s' }\nparameters = { ca = 'm/s2', cb = 'm/s2' }\n\
                 der = { a = 'va', va = '-1 [1/s2]*a', b = 'vb', vb = '0.1 [1/s2]*a' }\n\
                 friction = { a = { coulomb = 'ca' }, b = { coulomb = 'cb' } }";

@@ -1,4 +1,4 @@
-//! Events against closed forms: each crossing once, wherever it falls in a step, and what comes of events that accumulate.
+//! Events, compared with closed forms: each crossing once, at any position within a step, and accumulating events.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Times of the events of this name.
+/// Returns the times of the events with this name.
 fn times(response: &Response, name: &str) -> Vec<f64> {
     response.events.iter().filter(|event| event.what == name).map(|event| event.time).collect()
 }
@@ -57,7 +57,7 @@ proptest! {
     ) {
         let text = "states = { x = '1', v = '1/s', n = '1' }\nparameters = { w = '1/s', c = '1' }\n\
                     der = { x = 'v', v = '-w^2*x', n = '0' }\nwhen.pass = { guard = 'x - c', reset = { n = 'n + 1' } }";
-        // x = cos(w t + phase) falls through the level where w t + phase = acos(level) + 2 pi k.
+        // x = cos(w t + phase) falls through the level at w t + phase = acos(level) + 2 pi k.
         let response = respond(
             &read(text).unwrap(), &[],
             &[("w", angular), ("c", level), ("x0", math::cos(phase)), ("v0", -angular * math::sin(phase))], 10.0,
@@ -71,7 +71,7 @@ proptest! {
     }
 
     #[test]
-    fn guards_on_time_alone_are_found_though_no_state_moves(
+    fn guards_on_time_alone_are_found_while_no_state_moves(
         frequency in 0.05..8.0_f64, level in -0.98..0.98_f64, phase in 0.0..6.2_f64, states in 0..2_usize,
     ) {
         let decay = ["", ", y = '-1 [1/s]*y'"][states];
@@ -88,13 +88,13 @@ proptest! {
         let expected: Vec<f64> = (-2..200).map(falls).filter(|t| *t > 0.0 && *t < 20.0).collect();
         let found = times(&response, "pass");
         prop_assert!(near(&found, &expected), "{found:?} {expected:?}");
-        // Above the level from a rise to the fall that follows it.
+        // Above the level from a rising crossing to the next falling one.
         let on: f64 = (-2..200).map(|k| falls(k).clamp(0.0, 20.0) - rises(k).clamp(0.0, 20.0)).sum();
         prop_assert!((at(&response, "e", 20.0) - on).abs() < 1e-7, "{} {on}", at(&response, "e", 20.0));
     }
 
     #[test]
-    fn a_window_of_a_state_is_found_however_short_beside_the_step(
+    fn a_window_of_a_state_is_found_however_short_relative_to_the_step(
         from in 1.0..98.0_f64, width in 1e-4..1.0_f64, rate in 0.5..2.0_f64,
     ) {
         let text = "states = { q = '1', n = '1' }\nparameters = { r = '1/s', m = '1', h = '1' }\nder = { q = 'r', n = '0' }\n\
@@ -106,7 +106,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tick_that_meets_a_sample_sees_the_new_value(
+    fn a_tick_at_the_time_of_a_sample_sees_the_new_value(
         ticks in prop::sample::select(&[0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.3, 0.5]),
         samples in prop::sample::select(&[0.01, 0.02, 0.025, 0.05, 0.1, 0.25, 0.3]),
         hold in prop::sample::select(&[Hold::Zero, Hold::First]),
@@ -115,7 +115,8 @@ proptest! {
                     der = { q = '1', s = '0', y = '(s - y)/1 [s]' }\n\
                     when.tick = { guard = 'T - q', reset = { q = '0', s = 'u' } }";
         let times_of = |period: f64| (0..=(5.0 / period).round() as usize).map(move |k| k as f64 * period);
-        // Held samples are numbers 0, 1, 2 ..; straight lines between them are the time over the period.
+        // Zero-order samples are the numbers 0, 1, 2, ...; with linear interpolation the input is time divided by the
+        // period.
         let input = Input::Sampled { times: times_of(samples).collect(), values: (0..times_of(samples).count()).map(|k| k as f64).collect(), hold };
         let response = respond(&read(text).unwrap(), &[("u", input)], &[("T", ticks)], 5.0);
         let found = times(&response, "tick");
@@ -133,7 +134,7 @@ proptest! {
     }
 }
 
-/// A ball on a floor, with a force per mass that lifts it.
+/// Returns the model of a ball on a floor, with a force per mass that lifts the ball.
 fn ball(at_rest: &str) -> String {
     format!(
         "states = {{ h = 'm', v = 'm/s' }}\ninputs = {{ a = 'm/s2' }}\nparameters = {{ e = '1' }}\n\
@@ -147,9 +148,9 @@ proptest! {
     #![proptest_config(mops_tiers::property(1_000))]
 
     #[test]
-    fn a_ball_that_bounces_out_rests_until_it_is_lifted(rebound in 0.05..0.9_f64, height in 0.01..20.0_f64, lift in 10.0..30.0_f64) {
+    fn a_ball_whose_bounces_accumulate_rests_until_it_is_lifted(rebound in 0.05..0.9_f64, height in 0.01..20.0_f64, lift in 10.0..30.0_f64) {
         let model = read(&ball(AT_REST)).unwrap();
-        // Bounces come to their end after sqrt(2 h/g) (1 + e)/(1 - e).
+        // The bounces accumulate at sqrt(2 h/g) (1 + e)/(1 - e).
         let end = (2.0 * height / 9.81).sqrt() * (1.0 + rebound) / (1.0 - rebound);
         let lifted = 1.5 * end;
         let input = Input::Step { time: lifted, before: 0.0, after: lift };
@@ -183,7 +184,7 @@ fn a_ball_that_lies_on_the_floor_stays_there() {
 }
 
 #[test]
-fn bounces_that_do_not_lose_go_on() {
+fn bounces_without_loss_continue() {
     let response = respond(&read(&ball(AT_REST)).unwrap(), &[], &[("e", 1.0), ("h0", 1.0)], 20.0);
     let fall = (2.0 / 9.81_f64).sqrt();
     let expected: Vec<f64> = (0..40).map(|k| fall * f64::from(2 * k + 1)).filter(|t| *t < 20.0).collect();
@@ -199,8 +200,9 @@ fn a_rest_that_is_elsewhere_is_a_failure() {
 }
 
 #[test]
-fn slopes_jump_at_guards_on_time_as_the_closed_form_does() {
-    // n counts falls of sin(w t) through c; x grows by its time at every event: dx/dw is that of the event times.
+fn tangents_jump_at_guards_on_time_as_the_closed_form_does() {
+    // n counts the falling crossings of sin(w t) through c, and x grows by the time of each: dx/dw is that of the event
+    // times.
     let text = "states = { x = 's' }\nparameters = { w = '1/s', c = '1' }\nder = { x = '0' }\n\
                 when.pass = { guard = 'sin(w*time) - c', reset = { x = 'x + time' } }";
     let model = read(text).unwrap();
@@ -249,7 +251,8 @@ fn an_output_sees_every_sample_of_an_input_the_last_one_too() {
 
 #[test]
 fn conditions_that_jump_or_have_poles_are_found_in_long_steps() {
-    // Time for which a condition of period T holds, from its share of a period; the model rests, so that steps are long.
+    // Time for which a condition of period T is true, as its fraction of a period. The model rests, so that steps are
+    // long.
     let atan2 = "atan2(sin(2*pi*time/T), cos(2*pi*time/T))";
     for (condition, share) in [
         (format!("{atan2} > 0"), 0.5),

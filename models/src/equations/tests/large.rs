@@ -3,7 +3,7 @@
 use super::{model, read, respond};
 use mops_core::math;
 
-/// `x' = text`, from `x = 1` over 1 s, where `k` is a parameter.
+/// Returns the model `x' = text`, from `x = 1` over 1 s, with a parameter `k`.
 fn of_one_state(text: &str) -> String {
     let tables = "states = { x = \"1\" }\nparameters = { k = \"1\" }\nstart = { x = 1.0 }\nhorizon = \"1 s\"";
     format!("{tables}\nder = {{ x = \"{text}\" }}")
@@ -12,7 +12,7 @@ fn of_one_state(text: &str) -> String {
 #[test]
 fn sums_products_and_conditions_may_have_any_number_of_operands() {
     let n = 30_000;
-    // All of them come to x' = k x, with k = -1.
+    // All of them reduce to x' = k x, with k = -1.
     let growth = [
         ("k*x", " + x - x", ""),
         ("k*x", "+0.5*k*x-0.5*x*k", ""),
@@ -34,7 +34,7 @@ fn sums_products_and_conditions_may_have_any_number_of_operands() {
 }
 
 #[test]
-fn what_is_nested_within_definitions_is_refused_before_the_stack_ends() {
+fn nesting_within_definitions_is_an_error_before_the_stack_overflows() {
     let nested = |lets: usize, functions: usize| {
         let level = |i: usize| {
             let below = if i + 1 < lets { format!("a{}", i + 1) } else { "x".to_owned() };
@@ -54,7 +54,7 @@ fn what_is_nested_within_definitions_is_refused_before_the_stack_ends() {
 
 #[test]
 fn definitions_that_use_the_one_before_several_times_cost_no_more_than_their_texts() {
-    // All of them leave 1 as it is.
+    // All of them leave 1 unchanged.
     let kinds = [
         "A*A",
         "A^2",

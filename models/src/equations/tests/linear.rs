@@ -1,4 +1,4 @@
-//! Random linear systems against the matrix exponential.
+//! Random linear systems, compared with the matrix exponential.
 
 use mops_core::math;
 use nalgebra::{DMatrix, DVector};
@@ -6,8 +6,10 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// The matrix exponential by scaling and squaring of its power series. Source: C. Moler, C. Van Loan, Nineteen dubious ways to
-/// compute the exponential of a matrix, SIAM Review 20 (1978), method 3.
+/// Computes the matrix exponential by scaling and squaring of its power series.
+///
+/// Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 20 (1978),
+/// method 3.
 fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     let halvings = (0..64).find(|&k| a.norm() * math::powi(0.5, k) < 0.5).expect("the matrix is finite");
     let small = a * math::powi(0.5, halvings);
@@ -16,7 +18,7 @@ fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     (0..halvings).fold(series, |power, _| &power * &power)
 }
 
-/// Number of states, then entries of the matrix and values at the start, of which a system takes as many as it needs.
+/// Generates the number of states, entries of the matrix and initial values; a system uses as many of them as it needs.
 fn systems() -> impl Strategy<Value = (usize, Vec<f64>, Vec<f64>)> {
     let entries = prop::collection::vec(prop_oneof![3 => -2.0..2.0_f64, 1 => Just(0.0), 1 => -30.0..3.0_f64], 25);
     (1..=5_usize, entries, prop::collection::vec(-1.0..1.0_f64, 5))
@@ -37,7 +39,7 @@ proptest! {
         let given: Vec<(&str, f64)> = names.iter().map(String::as_str).zip(start.iter().copied()).collect();
         let x0 = DVector::from_fn(n, |i, _| start[i]);
         let response = respond(&read(&text).unwrap(), &[], &given, 2.0);
-        // Errors grow at most as the system does on the way.
+        // Errors grow at most like the solution of the system.
         let size = (0..=20).map(|k| exponential(&(&a * (0.1 * f64::from(k)))).norm()).fold(1.0, f64::max) * x0.norm().max(1e-3);
         for t in [0.3, 1.0, 2.0] {
             let exact = exponential(&(&a * t)) * &x0;

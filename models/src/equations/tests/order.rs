@@ -1,4 +1,4 @@
-//! Limits and breakpoints must rise, whoever gives them.
+//! Limits and breakpoints must increase, whether given by numbers, constants or parameters.
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn text(value: &str) -> String {
 }
 
 #[test]
-fn numbers_constants_and_what_they_make_are_refused_out_of_order() {
+fn numbers_and_expressions_of_constants_out_of_order_are_an_error() {
     for value in [
         "deadzone(x, 2, 1)",
         "clip(x, 2, 1)",
@@ -22,7 +22,7 @@ fn numbers_constants_and_what_they_make_are_refused_out_of_order() {
         "clip(2*x, two, 1)",
     ] {
         let mistake = read(&text(value)).err().unwrap_or_else(|| panic!("{value} is accepted"));
-        assert!(mistake.to_string().contains("must rise"), "{value}: {mistake}");
+        assert!(mistake.to_string().contains("must increase"), "{value}: {mistake}");
     }
     for value in ["clip(x, 1, 1)", "deadzone(x, -1, 1)", "clip(x, one, two)", "table(x, one, 0, two, 1)"] {
         assert!(read(&text(value)).is_ok(), "{value}");
@@ -30,7 +30,7 @@ fn numbers_constants_and_what_they_make_are_refused_out_of_order() {
 }
 
 #[test]
-fn a_parameter_that_makes_the_order_wrong_makes_a_failure() {
+fn a_parameter_that_makes_the_order_wrong_is_a_failure() {
     for (value, right, wrong) in [
         ("clip(x, p, 1)", 0.5, 1.5),
         ("deadzone(x, -1, p)", 1.0, -2.0),
@@ -41,6 +41,6 @@ fn a_parameter_that_makes_the_order_wrong_makes_a_failure() {
         let model = read(&text(value)).unwrap();
         assert!(attempt(&model, &[], &[("p", right)], 1.0).is_ok(), "{value}");
         let failure = attempt(&model, &[], &[("p", wrong)], 1.0).unwrap_err();
-        assert!(failure.to_string().contains("must rise"), "{value}: {failure}");
+        assert!(failure.to_string().contains("must increase"), "{value}: {failure}");
     }
 }

@@ -1,22 +1,22 @@
-//! Errors relative to the size of each state: the same accuracy whatever the units are.
+//! Errors relative to the size of each state: the accuracy does not depend on units.
 
 use super::*;
 use mops_core::math;
 
-/// Decades of the size of the states beside 1.
+/// Decades of the size of the states relative to 1.
 const DECADES: [i32; 7] = [-12, -9, -6, -3, 0, 3, 6];
 
-/// The largest difference of a signal from its closed form, over the size of the signal.
+/// Returns the largest difference of a signal from its closed form, divided by the size of the signal.
 fn off(response: &Response, signal: &str, size: f64, end: f64, exact: impl Fn(f64) -> f64) -> f64 {
     let time = |k: i32| end * f64::from(k) / 200.0;
     (0..=200).map(|k| (at(response, signal, time(k)) - exact(time(k))).abs() / size).fold(0.0, f64::max)
 }
 
-/// What default tolerances of 1e-8 per step come to.
+/// Accuracy that results from default tolerances of 1e-8 per step.
 const ACCURACY: f64 = 1e-6;
 
 #[test]
-fn a_capacitor_is_charged_as_the_closed_form_says_from_picofarads_on() {
+fn a_capacitor_is_charged_as_in_the_closed_form_from_picofarads_on() {
     let text = "states = { q = 'C' }\ninputs = { u = 'V' }\nparameters = { R = 'ohm', C = 'F' }\nder = { q = '(u - q/C)/R' }\n\
                 outputs = { v = { value = 'q/C', unit = 'V' } }";
     let model = read(text).unwrap();
@@ -32,7 +32,7 @@ fn a_capacitor_is_charged_as_the_closed_form_says_from_picofarads_on() {
 }
 
 #[test]
-fn a_spring_swings_as_the_closed_form_says_at_all_sizes() {
+fn a_spring_swings_as_in_the_closed_form_at_all_sizes() {
     let text = "states = { x = 'm', v = 'm/s' }\nparameters = { k = '1/s2' }\nder = { x = 'v', v = '-k*x' }";
     let model = read(text).unwrap();
     for size in DECADES.map(|decade| math::powi(10.0, decade)) {
@@ -65,7 +65,7 @@ fn a_pendulum_of_any_length_swings_alike() {
 
 #[test]
 fn a_chain_of_integrators_starts_from_rest() {
-    // x6 = t^6/720: of higher order than the method, so that no first step is exact to the relative tolerance.
+    // x6 = t^6/720 is of higher order than the method, so that no first step is exact to the relative tolerance.
     let states: Vec<String> = (1..=6).map(|k| format!("x{k} = '1'")).collect();
     let der: Vec<String> = (1..=5).map(|k| format!("x{} = 'x{k}'", k + 1)).collect();
     let text = format!("states = {{ {} }}\nder = {{ x1 = '1', {} }}", states.join(", "), der.join(", "));
@@ -76,8 +76,8 @@ fn a_chain_of_integrators_starts_from_rest() {
 }
 
 #[test]
-fn a_difference_that_is_rounding_is_no_motion_to_follow() {
-    // Two equal masses under equal forces: e is their distance, 0 but for rounding.
+fn a_difference_within_rounding_does_not_limit_the_steps() {
+    // Two equal masses under equal forces: their distance e is 0 except for rounding.
     let text = "states = { e = 'm', a = 'm/s', b = 'm/s' }\nparameters = { k = '1/s2' }\n\
                 der = { e = 'a - b', a = '3.3 [m/s2]*cos(7 [1/s]*time) - 0.1 [1/s]*a - k*e', b = '3.3 [m/s2]*cos(7 [1/s]*time) - 0.1 [1/s]*b + k*e' }";
     let model = read(text).unwrap();
@@ -87,14 +87,14 @@ fn a_difference_that_is_rounding_is_no_motion_to_follow() {
 }
 
 #[test]
-fn the_longest_step_finds_what_is_at_rest_elsewhere() {
+fn a_limit_on_the_step_finds_a_state_that_rests_elsewhere() {
     let text = "states = { x = '1' }\nder = { x = 'exp(-(time - 500)^2)' }\ntolerance = { max-step = '1 s' }";
     let response = respond(&read(text).unwrap(), &[], &[], 1000.0);
     assert!((at(&response, "x", 1000.0) - std::f64::consts::PI.sqrt()).abs() < 1e-6);
 }
 
 #[test]
-fn a_declared_size_stands_for_one_that_is_not_known_yet() {
+fn a_declared_size_replaces_an_unknown_one() {
     let text = "states = { q = { unit = 'C', scale = '1 nC' } }\nder = { q = '0' }";
     assert!(read(text).is_ok());
     let mistake = read("states = { q = { unit = 'C', scale = '-1 nC' } }\nder = { q = '0' }").err().expect("a mistake");

@@ -1,4 +1,4 @@
-//! Units in equations: everything is coherent inside, and everything is checked.
+//! Units in equations: computations use coherent units, and all dimensions are checked.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ fn read_ok(text: &str) -> Equations {
     read(text).unwrap_or_else(|mistake| panic!("{mistake}\n{text}"))
 }
 
-/// What is wrong, with the part of the expression it stands at.
+/// Returns the mistake, with the part of the expression it refers to.
 fn wrong(text: &str) -> (String, String) {
     let mistake = read(text).err().unwrap_or_else(|| panic!("it was read: {text}"));
     (mistake.to_string(), mistake.help.unwrap_or_default())
@@ -18,7 +18,7 @@ fn wrong(text: &str) -> (String, String) {
 
 #[test]
 fn quantities_in_any_units_move_as_those_in_si_units() {
-    // A motor with a gear: every table in units of its own, and all in SI units.
+    // A motor with a gear: once with each table in its own units, and once in SI units.
     let si = "states = { i = 'A', w = 'rad/s', x = 'm' }\ninputs = { u = 'V' }\n\
               constants = { R = '0.6 ohm', L = '0.8e-3 H', Kt = '0.06 N m/A', J = '8e-5 kg m2', b = '1e-5 N m s', r = '5e-3 m' }\n\
               outputs = { q = { value = 'x', unit = 'm' } }\nstart = { w = '10 rad/s' }\n\
@@ -76,7 +76,7 @@ fn temperatures_are_computed_in_kelvin_whatever_their_scale() {
     assert!((room("degC", "283.15 K", "20 degC") - celsius).abs() < 1e-6);
     assert!((room("degC", "50 degF", "293.15 K") - celsius).abs() < 1e-6);
     assert!((room("degF", "10 degC", "68 degF") - (celsius * 1.8 + 32.0)).abs() < 1e-6);
-    // Radiation takes absolute temperatures.
+    // Radiation depends on absolute temperatures.
     let text =
         "states = { T = 'degC' }\nconstants = { e = '1e-12 1/K3/s' }\nder = { T = '-e*T^4' }\nstart = { T = 27 }";
     let exact = math::powf(3e-12 * 100.0 + math::powi(300.15, -3), -1.0 / 3.0) - 273.15;
@@ -104,7 +104,7 @@ fn hertz_count_cycles_in_equations() {
 }
 
 #[test]
-fn a_wrong_dimension_is_refused_at_its_term_wherever_it_stands() {
+fn a_wrong_dimension_is_an_error_at_its_term_in_any_position() {
     let base = "states = { x = 'm', v = 'm/s' }\ninputs = { F = 'N' }\nparameters = { k = 'N/m', m = 'kg', T = 's' }\n";
     for (rest, place, fact) in [
         ("der = { x = 'v', v = 'F/m - k*x' }", "der.v", "expected a quantity in m/s2, found one in N"),
@@ -195,7 +195,7 @@ fn powers_and_roots_have_rational_dimensions() {
 }
 
 #[test]
-fn what_has_no_unit_takes_the_one_that_the_equations_ask_for() {
+fn quantities_without_a_unit_get_the_one_that_the_equations_require() {
     let tanks = read_ok(
         "states = { h1 = 'V', h2 = 'V' }\ninputs = { u = 'V' }\nparameters = { k1 = '', k2 = '', k4 = '1/s', s = '' }\n\
          outputs = { sum = 'h1 + h2' }\n\
@@ -212,7 +212,7 @@ fn what_has_no_unit_takes_the_one_that_the_equations_ask_for() {
     assert_eq!(sum.unit.to_string(), "V");
     assert_eq!(tanks.notes().len(), 1);
     assert!(tanks.notes()[0].contains("`k1` in"), "{:?}", tanks.notes());
-    // A contradiction between two equations; and a claim that is wrong.
+    // A contradiction between two equations, and a wrong declaration.
     let two = |unit: &str| {
         format!(
             "states = {{ x = 'm', y = 'kg' }}\nparameters = {{ k = '{unit}' }}\nder = {{ x = 'k', y = 'k' }}\noutputs = {{ z = 'k*x' }}"
@@ -235,7 +235,7 @@ fn a_model_of_pure_numbers_has_a_pure_time() {
 }
 
 #[test]
-fn a_bare_number_counts_in_si_units_or_is_refused_beside_others() {
+fn a_bare_number_is_read_in_si_units_or_is_an_error_next_to_others() {
     let fine = read_ok(
         "states = { h = 'm', v = 'm/s' }\nder = { h = 'v', v = '-9.81' }\nwhen.b = { guard = 'h - 0.5', reset = { v = 3 } }",
     );
@@ -293,11 +293,11 @@ fn a_bare_number_counts_in_si_units_or_is_refused_beside_others() {
         let (mistake, help) = wrong(&format!("states = {{ x = '{unit}' }}\n{parameters}{rest}"));
         assert!(mistake.contains(&format!("beside {name}")) && help.contains(write), "{rest}\n{mistake}\n{help}");
     }
-    // 0 is the same in all units but those of temperature; pure numbers in products are pure.
+    // 0 is the same in all units except temperatures; numbers in products are pure numbers.
     read_ok(
         "states = { x = 'cm' }\nparameters = { r = 'cm/s' }\nder = { x = 'max(r, 0)*0.5' }\nwhen.e = { guard = 'x', reset = { x = 0 } }",
     );
-    // Units that cancel leave nothing to mistake.
+    // If units cancel, nothing is ambiguous.
     read_ok("states = { x = 'cm' }\nparameters = { k = 'V/cm', s = 'cm/s/V' }\nder = { x = 's*clip(k*x, 0, 10)' }");
 }
 
@@ -316,7 +316,7 @@ fn numbers_take_units_in_brackets() {
     let (mistake, _) = wrong("states = { x = 'm' }\nder = { x = '3 m/s + 1' }");
     assert!(mistake.contains("expected a unit in brackets, as in 20 [m]"), "{mistake}");
     assert!(wrong("states = { x = 'm' }\nder = { x = '3 [mars]' }").0.contains("`mars` is not a known unit"));
-    // A whole text is a quantity, as everywhere in a study.
+    // A text may be a quantity, as anywhere in a study.
     let text =
         "states = { x = 'cm' }\nder = { x = '6 m/min' }\nwhen.e = { guard = 'x - 1 [m]', reset = { x = '20 mm' } }";
     assert!((at(&respond(&read_ok(text), &[], &[], 3.0), "x", 3.0) - 30.0).abs() < 1e-9);
@@ -341,23 +341,23 @@ fn a_joint_in_degrees_and_rpm_has_friction_as_one_in_si_units() {
 }
 
 #[test]
-fn differences_ratios_and_angles_stand_beside_numbers() {
+fn differences_ratios_and_angles_combine_with_numbers() {
     for rest in [
-        // A difference of temperatures is in K, and 0 is none of degC.
+        // A difference of temperatures is in K, and 0 is not a value in degC.
         "states = { T = 'degC' }\nparameters = { k = '1/s', To = 'degC' }\nder = { T = 'k*max(To - T, 0)' }",
         "states = { T = 'degC' }\nparameters = { k = '1/s' }\nder = { T = 'if(T - 20 [degC] > 1, -k*(T - 20 [degC]), 0)' }",
         "states = { T = 'degC' }\nparameters = { k = 's', To = 'K' }\nder = { T = \"0 = To - T - k*T'\" }",
         "states = { T = 'degC' }\nparameters = { k = 's', To = 'K' }\nder = { T = '(0.5*(T + To) - T)/k' }",
-        // Ratios are pure numbers, in whatever units.
+        // Ratios are pure numbers, in any units.
         "states = { x = 'cm' }\nparameters = { v = 'm/s', L = 'm' }\nder = { x = 'v*(1 - x/L)' }",
         "states = { x = 'cm' }\nparameters = { v = 'm/s', tau = 'min' }\nder = { x = 'v*(1 - time/tau)' }",
         "states = { x = 'cm' }\nparameters = { v = 'm/s' }\nder = { x = 'v*ln(1 + x/1 [cm])' }",
         "states = { th = 'deg' }\nparameters = { w = 'rpm' }\nder = { th = 'w*sin(th - pi/2)' }",
         "states = { x = '%' }\nparameters = { k = '1/s' }\nder = { x = 'k*(1 [1] - x)' }",
-        // Literals with units say that time is one.
+        // Literals with units show that time has a unit.
         "states = { x = '1' }\nparameters = { k = '1/s' }\nder = { x = '-k*x + 1 [1/s]' }",
         "states = { x = '' }\nparameters = { k = '' }\nder = { x = '-k*x + 1 [m/s]' }",
-        // Branches, tables, members and definitions of numbers alone.
+        // Branches, tables, members and definitions consisting of numbers.
         "states = { 'x[1..3]' = '1' }\nparameters = { k = '1' }\nder = { 'x[i]' = 'if(x[i] > 0, 1, 2) - k*x[i]' }",
         "states = { 'x[1..2]' = 'm' }\nder = { 'x[i]' = 'table(x[i], 0, 1, 1, 2)' }",
         "states = { 'v[1..2]' = 'm/s' }\nlet = { 'g[1..2]' = '9.81' }\nder = { 'v[i]' = '-g[i]' }",
@@ -408,7 +408,7 @@ fn differences_ratios_and_angles_stand_beside_numbers() {
 }
 
 #[test]
-fn start_values_are_in_the_unit_of_their_own_state() {
+fn initial_values_are_in_the_unit_of_their_own_state() {
     let text = "states = { 'T[1]' = 'K', 'T[2]' = 'degC', th = 'deg', y = '' }\nder = { 'T[i]' = '0', th = '0', y = '0 [m/s]' }\n\
                 start = { 'T[1]' = '20 degC', 'T[2]' = '20 degC', th = 'pi/2', y = '0.1 m' }";
     let response = respond(&read_ok(text), &[], &[], 1.0);

@@ -1,9 +1,9 @@
-//! Play between a driving and a driven part.
+//! Backlash between a driving and a driven part.
 
 use mops_core::Scalar;
 
-/// Play of `gap`: the driven part `y` follows the driving one `u` at a distance of `gap/2` while it is pushed, and stays
-/// where it is while `u` crosses the gap. The driven part has no inertia of its own.
+/// Backlash of width `gap`. The driven part `y` follows the driving part `u` at a distance of `gap/2` while it is
+/// pushed. It stays at rest while `u` crosses the gap. The driven part has no inertia of its own.
 ///
 /// Source: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002),
 /// section 2 (the play operator).
@@ -13,24 +13,24 @@ pub struct Backlash<S> {
     side: Side<S>,
 }
 
-/// Which side touches.
+/// Side of the gap that is in contact.
 #[derive(Debug, Clone, Copy)]
 enum Side<S> {
     /// The driving part pushes forward.
     Forward,
-    /// It pushes backward.
+    /// The driving part pushes backward.
     Backward,
-    /// It crosses the gap; the driven part stays here.
+    /// The driving part crosses the gap; the driven part rests at this position.
     Open(S),
 }
 
 impl<S: Scalar> Backlash<S> {
-    /// Play of `gap` (positive) with the driven part at `y`.
+    /// Creates a backlash of width `gap` (positive) with the driven part at `y`.
     pub fn new(gap: S, y: S) -> Self {
         Self { gap, side: Side::Open(y) }
     }
 
-    /// The driven part, in the present mode.
+    /// Returns the position of the driven part in the current mode.
     #[inline]
     pub fn output(&self, u: S) -> S {
         match self.side {
@@ -40,7 +40,7 @@ impl<S: Scalar> Backlash<S> {
         }
     }
 
-    /// Not negative while the mode holds; `rate` is the rate of `u`.
+    /// Returns the guard: not negative while the mode is active; `rate` is the rate of `u`.
     #[inline]
     pub fn guard(&self, u: S, rate: S) -> S {
         match self.side {
@@ -50,7 +50,7 @@ impl<S: Scalar> Backlash<S> {
         }
     }
 
-    /// The guard became negative.
+    /// Switches the mode after the guard became negative.
     pub fn switch(&mut self, u: S) {
         self.side = match self.side {
             Side::Forward | Side::Backward => Side::Open(self.output(u)),
@@ -59,8 +59,8 @@ impl<S: Scalar> Backlash<S> {
         };
     }
 
-    /// After a jump of the driving part from `before` to `u`, or of its rate: the driven part is pushed along as far as
-    /// the gap asks.
+    /// Finds the mode after a jump of the driving part from `before` to `u`, or of its rate. The driven part is pushed
+    /// along as far as the gap requires.
     pub fn settle(&mut self, before: S, u: S, rate: S) {
         let y = self.output(before);
         let distance = (u - y).value();

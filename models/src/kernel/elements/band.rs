@@ -1,36 +1,36 @@
-//! Where a value lies relative to a band: the modes that saturation and dead zone share.
+//! Region of a value relative to a band: the modes that saturation and dead zone share.
 
 use mops_core::Scalar;
 
-/// Where a value lies.
+/// Region of a value relative to a band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// Below the band.
     Below,
-    /// Within it.
+    /// Within the band.
     Within,
-    /// Above it.
+    /// Above the band.
     Above,
 }
 
-/// A band from `low` to `high`, and where the value lies at present.
+/// Band from `low` to `high`, and the current region of the value.
 #[derive(Debug, Clone, Copy)]
 pub struct Band<S> {
     /// Lower end.
     pub low: S,
-    /// Upper end, above the lower.
+    /// Upper end, greater than the lower.
     pub high: S,
-    /// Where the value lies.
+    /// Current region of the value.
     pub region: Region,
 }
 
 impl<S: Scalar> Band<S> {
-    /// A band within which the value lies.
+    /// Creates a band, with the value within it.
     pub fn new(low: S, high: S) -> Self {
         Self { low, high, region: Region::Within }
     }
 
-    /// Not negative while the value stays in its region.
+    /// Returns the guard: not negative while the value stays in its region.
     #[inline]
     pub fn guard(&self, value: S) -> S {
         match self.region {
@@ -41,7 +41,7 @@ impl<S: Scalar> Band<S> {
         }
     }
 
-    /// The value left its region.
+    /// Changes the region after the guard became negative.
     pub fn switch(&mut self, value: S) {
         self.region = match self.region {
             Region::Below | Region::Above => Region::Within,

@@ -1,22 +1,22 @@
-//! A zone without response.
+//! Dead zone of a signal.
 
 use mops_core::Scalar;
 
 use super::band::{Band, Region};
 
-/// `y = u - high` above the zone, `u - low` below it, 0 within.
+/// Dead zone: `y = u - high` above the zone, `u - low` below it, 0 within.
 #[derive(Debug, Clone, Copy)]
 pub struct DeadZone<S> {
     band: Band<S>,
 }
 
 impl<S: Scalar> DeadZone<S> {
-    /// A zone from `low` to `high`.
+    /// Creates a dead zone from `low` to `high`.
     pub fn new(low: S, high: S) -> Self {
         Self { band: Band::new(low, high) }
     }
 
-    /// The response, in the present mode.
+    /// Returns the output in the current mode.
     #[inline]
     pub fn output(&self, u: S) -> S {
         match self.band.region {
@@ -26,19 +26,19 @@ impl<S: Scalar> DeadZone<S> {
         }
     }
 
-    /// Not negative while the mode holds.
+    /// Returns the guard: not negative while the mode is active.
     #[inline]
     pub fn guard(&self, u: S) -> S {
         self.band.guard(u)
     }
 
-    /// The guard became negative. Returns whether there is a response now.
+    /// Switches the mode after the guard became negative. Returns true if the input is now outside the zone.
     pub fn switch(&mut self, u: S) -> bool {
         self.band.switch(u);
         self.band.region != Region::Within
     }
 
-    /// Finds the mode from scratch.
+    /// Finds the mode for the input `u`.
     pub fn settle(&mut self, u: S) {
         self.band.settle(u);
     }

@@ -1,14 +1,15 @@
-//! A constant delay of a signal that is being simulated.
+//! Constant delay of a simulated signal.
 
 use std::collections::VecDeque;
 
 use mops_core::Scalar;
 
-/// `y(t) = u(t - time)`, with `u(t) = before` for t < 0.
+/// Delay `y(t) = u(t - time)`, with `u(t) = before` for t < 0.
 ///
-/// The model that holds a delay takes steps no longer than [`Delay::longest_step`], hands over `u` along every accepted
-/// step ([`crate::kernel::Dynamics::accepted`]), and breaks its steps at [`Delay::next_break`]. `u` is kept as the quartic
-/// through its values at five places of each step. Tangents along `time` are exact where `u` has no jumps.
+/// The model that owns a delay takes steps no longer than [`Delay::longest_step`] and ends steps at
+/// [`Delay::next_break`]. It passes on `u` along every accepted step ([`crate::kernel::Dynamics::accepted`]). `u` is
+/// stored as the quartic through its values at five nodes of each step. Tangents with respect to `time` are exact if
+/// `u` has no jumps.
 ///
 /// Source: A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2 (method of
 /// steps), 2.2 (propagation of jumps).
@@ -17,40 +18,40 @@ pub struct Delay<S> {
     time: S,
     before: S,
     pieces: VecDeque<Piece<S>>,
-    /// Jumps up to this time of `u` have come out.
+    /// Jumps of `u` up to this time have reached the output, s.
     passed: f64,
 }
 
-/// `u` over a step.
+/// Course of `u` over a step.
 #[derive(Debug, Clone)]
 struct Piece<S> {
     /// Start and end, s.
     start: f64,
     end: f64,
-    /// Coefficients of powers of the place within, from 0 to 1.
+    /// Coefficients in powers of the position within the piece, from 0 to 1.
     coefficients: [S; 5],
-    /// Whether `u` jumps at the start, or begins there.
+    /// True if `u` jumps at the start of the piece, or is first known there.
     jumps: bool,
 }
 
 impl<S: Scalar> Delay<S> {
-    /// Places of a step, from 0 to 1, at which [`Delay::push`] wants `u`.
+    /// Nodes of a step, as fractions from 0 to 1, at which [`Delay::push`] expects `u`.
     pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-    /// A delay of `time` (s, positive).
+    /// Creates a delay of `time` (s, positive).
     pub fn new(time: S, before: S) -> Self {
         Self { time, before, pieces: VecDeque::new(), passed: f64::NEG_INFINITY }
     }
 
-    /// Longest step with which all that is asked of the past is known, s.
+    /// Returns the longest step for which all required past values are known, s.
     pub fn longest_step(&self) -> f64 {
         0.5 * self.time.value()
     }
 
-    /// The delayed signal at `t`.
+    /// Returns the delayed signal at `t`.
     pub fn at(&self, t: f64) -> S {
         let then = t - self.time.value();
-        // A jump that has not come out yet hides what follows it.
+        // A jump that has not reached the output yet hides the pieces after it.
         let begun = |piece: &&Piece<S>| {
             if piece.jumps { piece.start <= self.passed && piece.start <= then + ROUNDING } else { piece.start <= then }
         };
@@ -59,7 +60,7 @@ impl<S: Scalar> Delay<S> {
         piece.coefficients.iter().rev().fold(S::from(0.0), |sum, &c| sum * s + c)
     }
 
-    /// Takes `u` on an accepted step, at [`Delay::NODES`].
+    /// Stores `u` over an accepted step, given at [`Delay::NODES`].
     pub fn push(&mut self, start: f64, end: f64, u: [S; 5]) {
         let jumps = self.pieces.back().is_none_or(|piece| {
             let last = piece.coefficients.iter().fold(0.0, |sum, c| sum + c.value());
@@ -80,17 +81,17 @@ impl<S: Scalar> Delay<S> {
         }
     }
 
-    /// The next time after `t` at which a jump of `u` comes out, s.
+    /// Returns the next time after `t` at which a jump of `u` reaches the output, s.
     pub fn next_break(&self, t: f64) -> f64 {
         let due = self.pieces.iter().filter(|piece| piece.jumps && piece.start > self.passed);
         due.map(|piece| piece.start + self.time.value()).find(|&out| out > t).unwrap_or(f64::INFINITY)
     }
 
-    /// A break was reached: a jump that is due comes out.
+    /// Handles a break: jumps that are due reach the output.
     pub fn pass_break(&mut self, t: f64) {
         self.passed = t - self.time.value() + ROUNDING;
     }
 }
 
-/// Times closer than this are the same, s.
+/// Time difference up to which two times count as equal, s.
 const ROUNDING: f64 = 1e-12;

@@ -1,8 +1,8 @@
-//! A first-order lag.
+//! First-order lag.
 
 use mops_core::Scalar;
 
-/// `T y' = u - y`: the output of `1/(T s + 1)` is its own state.
+/// First-order lag `T y' = u - y`: the transfer function `1/(T s + 1)`, with its output as state.
 #[derive(Debug, Clone, Copy)]
 pub struct Lag<S> {
     /// Time constant `T`, s, positive.
@@ -10,7 +10,7 @@ pub struct Lag<S> {
 }
 
 impl<S: Scalar> Lag<S> {
-    /// `y'` for input `u` and state `y`.
+    /// Returns `y'` for input `u` and state `y`.
     #[inline]
     pub fn derivative(&self, u: S, y: S) -> S {
         (u - y) / self.time

@@ -1,8 +1,8 @@
-//! Elements that models are made of: forces, limits and lags, each with the modes it has.
+//! Elements of models: forces, limits and lags, each with its modes.
 //!
-//! An element with modes is smooth in each of them. A model that holds one passes on its guard, which is not negative
-//! while the mode holds, and tells it to `switch` when the guard became negative; `settle` finds the mode from scratch,
-//! at the start and where an input jumps.
+//! An element is smooth in each of its modes. A model that contains an element passes on its guard, which is not
+//! negative while the mode is active. When the guard becomes negative, the model calls `switch`. At the start and where
+//! an input jumps, `settle` finds the mode.
 
 pub mod backlash;
 pub mod band;

@@ -1,31 +1,31 @@
-//! A function given by a table.
+//! Piecewise linear function given by a table.
 
 use mops_core::{Failure, Scalar};
 
-/// Straight lines through points `(x_k, y_k)`; outside the table the first and the last line go on.
+/// Piecewise linear function through points `(x_k, y_k)`, extrapolated by the first and the last line segment.
 ///
-/// Its modes are its lines: a model that simulates with tangents changes from one to the next by an event, because a step
-/// across a kink spoils tangents long before it spoils values. The model keeps the number of the line.
+/// Each segment is a mode. A model that is simulated with tangents changes segments by events, because a step across a
+/// kink degrades tangents long before it degrades values. The model stores the index of the segment.
 #[derive(Debug, Clone)]
 pub struct PiecewiseLinear<S> {
-    /// Where a line begins, its value there, and its slope.
+    /// Segments: start abscissa, value there, and slope.
     lines: Vec<[S; 3]>,
 }
 
 impl<S: Scalar> PiecewiseLinear<S> {
-    /// The function through `points`; one point alone makes it constant.
+    /// Creates the function through `points`; a single point gives a constant.
     ///
     /// # Errors
     /// No points, or abscissae that do not increase.
     pub fn new(points: &[[S; 2]]) -> Result<Self, Failure> {
         let Some(&[x, y]) = points.first() else {
-            return Err(Failure::Undefined("a table needs a point".into()));
+            return Err(Failure::Undefined("a table needs at least one point".into()));
         };
         let mut lines = Vec::with_capacity(points.len());
         for pair in points.windows(2) {
             let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
             if x1.value() <= x0.value() {
-                let fact = format!("a table runs from left to right, but {} follows {}", x1.value(), x0.value());
+                let fact = format!("the abscissae of a table must increase, found {} after {}", x1.value(), x0.value());
                 return Err(Failure::Undefined(fact));
             }
             lines.push([x0, y0, (y1 - y0) / (x1 - x0)]);
@@ -36,29 +36,29 @@ impl<S: Scalar> PiecewiseLinear<S> {
         Ok(Self { lines })
     }
 
-    /// The value at `x`.
+    /// Returns the value at `x`.
     #[inline]
     pub fn at(&self, x: S) -> S {
         self.on(self.line_at(x), x)
     }
 
-    /// The number of the line over `x`.
+    /// Returns the index of the segment that contains `x`.
     pub fn line_at(&self, x: S) -> usize {
         self.lines[1..].iter().take_while(|line| line[0].value() <= x.value()).count()
     }
 
-    /// The value at `x` on the line of that number, wherever it ends.
+    /// Returns the value at `x` on the segment `line`, extrapolated beyond its ends.
     #[inline]
     pub fn on(&self, line: usize, x: S) -> S {
         let [start, value, slope] = self.lines[line];
         value + (x - start) * slope
     }
 
-    /// Not negative while `x` is over the line of that number.
+    /// Returns the guard: not negative while `x` is on the segment `line`.
     #[inline]
     pub fn guard(&self, line: usize, x: S) -> S {
         let over = |k: usize| {
-            // Rounding at a kink must not lead to and fro.
+            // Rounding at a kink must not cause chattering.
             let kink = self.lines[k][0];
             (x - kink, kink.value().abs() * 1e-10)
         };
@@ -72,7 +72,7 @@ impl<S: Scalar> PiecewiseLinear<S> {
         }
     }
 
-    /// The number of the line that follows when the guard became negative.
+    /// Returns the index of the next segment after the guard became negative.
     pub fn next(&self, line: usize, x: S) -> usize {
         let middle = if line + 1 < self.lines.len() {
             0.5 * (self.lines[line][0].value() + self.lines[line + 1][0].value())
@@ -82,12 +82,12 @@ impl<S: Scalar> PiecewiseLinear<S> {
         if line > 0 && x.value() < middle { line - 1 } else { (line + 1).min(self.lines.len() - 1) }
     }
 
-    /// Whether it is one straight line.
+    /// Returns true if the function is one straight line.
     pub fn is_straight(&self) -> bool {
         self.lines.len() == 1
     }
 
-    /// The first abscissa from `from` on at which it becomes negative; `None` if it never does.
+    /// Returns the first abscissa, at `from` or above, at which the function becomes negative; `None` if it never does.
     pub fn becomes_negative(&self, from: f64) -> Option<f64> {
         let line = |k: usize| self.lines[k].map(Scalar::value);
         if self.at(S::from(from)).value() < 0.0 {

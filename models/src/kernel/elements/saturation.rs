@@ -1,22 +1,22 @@
-//! A limit on a signal.
+//! Saturation of a signal.
 
 use mops_core::Scalar;
 
 use super::band::{Band, Region};
 
-/// `y = min(max(u, low), high)`.
+/// Saturation `y = min(max(u, low), high)`.
 #[derive(Debug, Clone, Copy)]
 pub struct Saturation<S> {
     band: Band<S>,
 }
 
 impl<S: Scalar> Saturation<S> {
-    /// A limit from `low` to `high`.
+    /// Creates a saturation from `low` to `high`.
     pub fn new(low: S, high: S) -> Self {
         Self { band: Band::new(low, high) }
     }
 
-    /// The limited signal, in the present mode.
+    /// Returns the limited signal in the current mode.
     #[inline]
     pub fn output(&self, u: S) -> S {
         match self.band.region {
@@ -26,19 +26,19 @@ impl<S: Scalar> Saturation<S> {
         }
     }
 
-    /// Not negative while the mode holds.
+    /// Returns the guard: not negative while the mode is active.
     #[inline]
     pub fn guard(&self, u: S) -> S {
         self.band.guard(u)
     }
 
-    /// The guard became negative. Returns whether the limit now acts.
+    /// Switches the mode after the guard became negative. Returns true if the limit is now active.
     pub fn switch(&mut self, u: S) -> bool {
         self.band.switch(u);
         self.band.region != Region::Within
     }
 
-    /// Finds the mode from scratch.
+    /// Finds the mode for the input `u`.
     pub fn settle(&mut self, u: S) {
         self.band.settle(u);
     }

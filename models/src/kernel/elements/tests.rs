@@ -1,4 +1,4 @@
-//! Elements in small systems, against closed forms.
+//! Elements in small systems, compared with closed forms.
 
 use mops_core::math;
 use mops_core::{Dual, Scalar, Trace};
@@ -8,7 +8,7 @@ use crate::kernel::{Dynamics, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
-/// Keeps a signal and the times of the events.
+/// Records a signal and the times of the events.
 struct Record<F> {
     states: usize,
     signal: F,
@@ -73,7 +73,7 @@ fn tangents_of_a_table_are_those_of_its_lines() {
 }
 
 #[test]
-fn bearing_friction_refuses_what_makes_no_sense() {
+fn invalid_bearing_friction_is_an_error() {
     assert!(BearingFriction::new(&[[0.0, 1.0], [1.0, 2.0]], 0.9).is_err(), "break-away below sliding");
     assert!(BearingFriction::new(&[[0.0, -1.0], [1.0, 2.0]], 1.0).is_err(), "driving at rest");
     assert!(BearingFriction::new(&[[0.5, 1.0], [1.0, 2.0]], 1.0).is_err(), "no value at rest");
@@ -82,7 +82,7 @@ fn bearing_friction_refuses_what_makes_no_sense() {
     near(falling.limit(), 1.228_72 * 0.001_67, 1e-15);
 }
 
-/// A mass on a spring and a damper.
+/// Mass on a spring and a damper.
 struct Sprung(SpringDamper<f64>);
 impl Dynamics<f64> for Sprung {
     fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
@@ -92,7 +92,7 @@ impl Dynamics<f64> for Sprung {
 
 #[test]
 fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
-    // x'' + 2 D w x' + w^2 (x - 1) = 0 with w = 3, D = 0.2, from 2 at rest.
+    // x'' + 2 D w x' + w^2 (x - 1) = 0 with w = 3, D = 0.2, starting at rest from x = 2.
     let (w, d): (f64, f64) = (3.0, 0.2);
     let element = SpringDamper { spring: w * w, damper: 2.0 * d * w, rest: 1.0 };
     let (x, _) = simulate(Sprung(element), &[2.0, 0.0], 4.0, |_, _, x| x[0]);
@@ -104,7 +104,7 @@ fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
     near(element.energy(2.0), 4.5, 1e-15);
 }
 
-/// `x' = y`, where `y` follows `2 sin t` through an element with a mode.
+/// System `x' = y`, where `y` is the response of an element with modes to `2 sin t`.
 struct Through<E>(E);
 
 trait Element {
@@ -171,24 +171,24 @@ impl<E: Element> Dynamics<f64> for Through<E> {
 use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
 #[test]
-fn a_saturated_sine_is_cut_where_it_meets_the_limit() {
+fn a_saturated_sine_is_clipped_at_the_limit() {
     let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
     assert_eq!(events.len(), 4);
-    // Half a period: twice 2 (1 - cos(pi/6)), and 1 for 2 pi/3.
+    // Half a period: twice 2 (1 - cos(pi/6)), plus 1 times 2 pi/3.
     near(integral.at(PI), 4.0 * (1.0 - math::cos(FRAC_PI_6)) + 2.0 * PI / 3.0, 1e-9);
     near(integral.at(TAU), 0.0, 1e-9);
 }
 
 #[test]
-fn a_dead_zone_answers_only_beyond_its_edges() {
+fn a_dead_zone_responds_only_outside_its_limits() {
     let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
-    // What a saturation leaves: 4 - its integral over half a period.
+    // Complement of a saturation: 4 minus its integral over half a period.
     near(integral.at(PI), 4.0 - 4.0 * (1.0 - math::cos(FRAC_PI_6)) - 2.0 * PI / 3.0, 1e-9);
 }
 
@@ -196,7 +196,8 @@ fn a_dead_zone_answers_only_beyond_its_edges() {
 fn play_is_crossed_at_every_reversal() {
     let (y, events) =
         simulate(Through(Backlash::new(1.0, 0.0)), &[0.0], TAU, |through, t, _| through.0.output(2.0 * math::sin(t)));
-    // Touches at sin = 1/4, reverses at pi/2, touches below where 2 sin t = 1.5 - 0.5, reverses at 3 pi/2, and above.
+    // Contact at sin = 1/4, reversal at pi/2, contact below at 2 sin t = 1.5 - 0.5, reversal at 3 pi/2, and contact
+    // above.
     let exact = [math::asin(0.25), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
     assert_eq!(events.len(), exact.len(), "{events:?}");
     for (event, exact) in events.iter().zip(exact) {
@@ -218,7 +219,7 @@ fn a_backlash_that_is_moved_by_a_jump_is_pushed_along() {
     near(play.output(2.4), 2.5, 0.0);
 }
 
-/// `T y' = 1 - y`.
+/// First-order lag `T y' = 1 - y`.
 struct Lagging<S>(Lag<S>);
 impl<S: Scalar> Dynamics<S> for Lagging<S> {
     fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
@@ -236,7 +237,7 @@ fn a_lag_approaches_a_step_exponentially() {
     near(y[0].tangent[0], -8.0 * math::exp(-4.0), 1e-8);
 }
 
-/// `y' = -y(t - T)`, `y = 1` up to 0.
+/// Delayed feedback `y' = -y(t - T)`, with `y = 1` up to time 0.
 struct Delayed<S>(Delay<S>);
 impl<S: Scalar> Dynamics<S> for Delayed<S> {
     fn derivative(&self, t: f64, _: &[S], dx: &mut [S]) {
@@ -266,7 +267,7 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
 
 #[test]
 fn a_delayed_feedback_is_its_polynomials() {
-    // By the method of steps: sum over k of (-1)^k (t - (k - 1) T)^k / k!, as far as t > (k - 1) T; here T = 1.
+    // Method of steps: sum over k of (-1)^k (t - (k - 1) T)^k / k! for t > (k - 1) T; here T = 1.
     let exact = |t: f64| {
         1.0 - t + math::powi((t - 1.0).max(0.0), 2) / 2.0 - math::powi((t - 2.0).max(0.0), 3) / 6.0
             + math::powi((t - 3.0).max(0.0), 4) / 24.0
@@ -281,7 +282,7 @@ fn a_delayed_feedback_is_its_polynomials() {
     near(y[0].tangent[0], -1.5 + 0.25, 1e-8);
 }
 
-/// A step from 0 to 1 at 0.3 s, delayed by half a second, integrated.
+/// Integral of a step from 0 to 1 at 0.3 s, delayed by half a second.
 struct DelayedStep(Delay<f64>, f64);
 impl Dynamics<f64> for DelayedStep {
     fn derivative(&self, t: f64, _: &[f64], dx: &mut [f64]) {

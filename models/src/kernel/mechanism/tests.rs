@@ -1,4 +1,4 @@
-//! Stick and slip against closed forms.
+//! Stick-slip motion, compared with closed forms.
 
 use mops_core::math;
 use mops_core::{Dual, Scalar};
@@ -15,7 +15,7 @@ const fn joint(events: [&'static str; 4]) -> Joint {
 const FIRST: Joint = joint(["first sticks", "first slides", "first driven", "first braked"]);
 const SECOND: Joint = joint(["second sticks", "second slides", "second driven", "second braked"]);
 
-/// The mechanism from this state on.
+/// Creates a mechanism that starts from this state.
 fn mechanism<S: Scalar, B: Bodies<S, N>, const N: usize>(
     bodies: B,
     friction: [BearingFriction<S>; N],
@@ -41,7 +41,8 @@ impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for Events {
     }
 }
 
-/// A block of mass `m` on a belt that runs at `belt`, held by a spring `k`; the coordinate is its place on the belt.
+/// Block of mass `m` on a belt with speed `belt`, restrained by a spring `k`; the coordinate is the position on the
+/// belt.
 struct Block<S> {
     m: f64,
     k: S,
@@ -56,8 +57,8 @@ impl<S: Scalar> Bodies<S, 1> for Block<S> {
 
 #[test]
 fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
-    // Stick to the break-away force, then half an oscillation and more about the sliding force until it moves with the
-    // belt again. With A = (peak - 1) F/k and w = sqrt(k/m): slip for 2 (pi - atan(A w/v))/w, stick for 2 A/v.
+    // The block sticks up to the break-away force, then oscillates about the sliding force until it has the speed of
+    // the belt again. With A = (peak - 1) F/k and w = sqrt(k/m): slip for 2 (pi - atan(A w/v))/w, stick for 2 A/v.
     let (m, k, belt, force, peak) = (0.5, 20.0, 0.3, 2.0, 1.4);
     let friction = BearingFriction::new(&[[0.0, force], [1.0, force]], peak).unwrap();
     let mut block = mechanism(Block { m, k, belt }, [friction], &[FIRST], &[0.0, 0.0]);
@@ -78,7 +79,7 @@ fn a_block_on_a_belt_sticks_and_slips_with_the_period_of_the_closed_form() {
 }
 
 #[test]
-fn the_place_of_a_block_on_a_belt_has_the_tangent_of_its_differences() {
+fn tangents_of_the_position_of_a_block_on_a_belt_agree_with_differences() {
     let (m, belt, force, peak) = (0.5, 0.3, 2.0, 1.4);
     let end = |k: f64| {
         let friction = BearingFriction::new(&[[0.0, force], [1.0, force]], peak).unwrap();
@@ -95,7 +96,7 @@ fn the_place_of_a_block_on_a_belt_has_the_tangent_of_its_differences() {
     assert!(x[0].value == end(20.0) && (x[0].tangent[0] - difference).abs() < 1e-6, "{x:?} {difference}");
 }
 
-/// Two joints with a force on each that grows with time: `rate t`.
+/// Two joints, each with a force that increases with time: `rate t`.
 struct Pulled {
     mass: [[f64; 2]; 2],
     rate: [f64; 2],
@@ -107,15 +108,16 @@ impl Bodies<f64, 2> for Pulled {
     }
 }
 
-/// Constant friction.
+/// Creates constant friction.
 fn dry(force: f64, peak: f64) -> BearingFriction<f64> {
     BearingFriction::new(&[[0.0, force]], peak).unwrap()
 }
 
 #[test]
 fn two_joints_stuck_at_once_are_released_in_turn() {
-    // The first at t = 1. Then it accelerates with (t - 1)/2, which takes (t - 1)/4 of the second besides its own t/4:
-    // with the sign of the coupling the second holds t/4 - (t - 1)/4 = 1/4 for ever, or t/4 + (t - 1)/4 up to 2 at 4.5.
+    // Joint 1 breaks away at t = 1 and accelerates with (t - 1)/2. It exerts (t - 1)/4 on joint 2, besides the own
+    // force t/4. Depending on the sign of the coupling, the friction of joint 2 is constant at t/4 - (t - 1)/4 = 1/4,
+    // or t/4 + (t - 1)/4 reaches 2 at t = 4.5.
     for (coupling, second) in [(0.5, None), (-0.5, Some(4.5))] {
         let bodies = Pulled { mass: [[2.0, coupling], [coupling, 1.0]], rate: [1.0, 0.25] };
         let mut pair = mechanism(bodies, [dry(1.0, 1.0), dry(2.0, 1.0)], &[FIRST, SECOND], &[0.0; 4]);
@@ -127,7 +129,7 @@ fn two_joints_stuck_at_once_are_released_in_turn() {
             Some(t) => {
                 assert_eq!(events.0.len(), 2, "{:?}", events.0);
                 assert!((events.0[1].0 - t).abs() < 1e-9 && events.0[1].1 == "second slides", "{:?}", events.0);
-                // Up to then x1 = (t - 1)^3/12.
+                // Up to this time x1 = (t - 1)^3/12.
                 assert!(x[3] > 0.0);
             }
         }
@@ -136,21 +138,21 @@ fn two_joints_stuck_at_once_are_released_in_turn() {
 
 #[test]
 fn one_joint_that_breaks_away_can_tear_the_other_loose_at_once() {
-    // Break-away of the first at 2 leaves 1 N m too much, an acceleration of 0.5 and a pull of 0.25 on the second, which
-    // holds 0.2: it goes at the same instant, not a step later.
+    // When joint 1 breaks away at 2, the force exceeds sliding friction by 1 N m. The acceleration is 0.5, which exerts
+    // 0.25 on joint 2. The limit of joint 2 is 0.2, so it breaks away at the same instant, not a step later.
     let bodies = Pulled { mass: [[2.0, 0.5], [0.5, 1.0]], rate: [1.0, 0.0] };
     let mut pair = mechanism(bodies, [dry(1.0, 2.0), dry(0.2, 1.0)], &[FIRST, SECOND], &[0.0; 4]);
     let mut events = Events::default();
     let (x, _) = integrate(&mut pair, 0.0, 3.0, &[0.0; 4], &TIGHT, &mut events).unwrap();
     assert_eq!(events.0.len(), 1, "{:?}", events.0);
     assert_eq!(pair.plant.contact(), &[Contact::Forward, Contact::Backward]);
-    // With both sliding: 2 a1 + a2/2 = t - 1, a1/2 + a2 = 0.2; a2 = (1.6 - 0.5 (t - 1))/... by Cramer, determinant 1.75.
+    // Both joints slide: 2 a1 + a2/2 = t - 1, a1/2 + a2 = 0.2; Cramer's rule with determinant 1.75.
     let a2 = |t: f64| (2.0 * 0.2 - 0.5 * (t - 1.0)) / 1.75;
-    // Integral of a2 from 2 to 3, linear: its value in the middle.
+    // Integral of the linear a2 from 2 to 3: its value in the middle.
     assert!((x[3] - a2(2.5)).abs() < 1e-9, "{x:?}");
 }
 
-/// A chain of two masses between springs, pushed to and fro.
+/// Chain of two masses between springs, excited periodically.
 struct Chain;
 
 impl Bodies<f64, 2> for Chain {
@@ -171,7 +173,7 @@ fn joints_that_stick_and_slide_for_long_never_chatter() {
                 let mut chain = mechanism(Chain, friction, &[FIRST, SECOND], &[0.5, 0.0, -0.2, 0.0]);
                 let mut events = Events::default();
                 integrate(&mut chain, 0.0, 50.0, &[0.5, 0.0, -0.2, 0.0], &fine, &mut events).unwrap();
-                // 16 periods: a joint stops at most a few times in each.
+                // 16 periods, with at most a few stops of a joint in each.
                 assert!(events.0.len() < 200, "{peak} {force} {other}: {}", events.0.len());
             }
         }

@@ -1,10 +1,10 @@
-//! Recorded signals against what they are functions of.
+//! Recorded signals, compared with the functions that define them.
 
 use super::*;
 use mops_core::Halt;
 use mops_core::math;
 
-/// A state that rests, or runs with the clock, at this rate: either way steps are as long as they may be. The signal is a
+/// State with this constant rate, 0 or that of the clock, so that steps are as long as possible. The signal is a
 /// function of time and state.
 struct Idle<F>(f64, F);
 impl<S: Scalar, F: Fn(f64, S) -> S> Dynamics<S> for Idle<F> {
@@ -18,7 +18,8 @@ impl<S: Scalar, F: Fn(f64, S) -> S> Dynamics<S> for Idle<F> {
 
 const TOLERANCE: Tolerance = Tolerance { max_steps: 1000, ..Tolerance::DEFAULT };
 
-/// The largest difference between the recorded signal and the function of time and state it is, over a thousand times.
+/// Returns the largest difference between the recorded signal and its function of time and state, over a thousand
+/// times.
 fn difference<S: Scalar>(start: S, rate: f64, horizon: f64, f: impl Fn(f64, S) -> S) -> [f64; 2] {
     let signals = vec![(0, "y".to_owned())].into();
     let recording = record(&mut Idle(rate, &f), &[start], horizon, &TOLERANCE, &signals).unwrap();
@@ -37,12 +38,12 @@ fn difference<S: Scalar>(start: S, rate: f64, horizon: f64, f: impl Fn(f64, S) -
 
 #[test]
 fn a_signal_that_follows_the_clock_is_exact_while_the_state_rests() {
-    // Periods that divide the horizon, and with it the nodes of a step.
+    // Periods that divide the horizon, and so coincide with the nodes of a step.
     for angular in [20.0, 2.0 * std::f64::consts::TAU, 8.0 * std::f64::consts::TAU] {
         let [off, _] = difference(1.0, 0.0, 10.0, |t, _| math::sin(angular * t));
         assert!(off < 2e-7, "{angular}: {off}");
     }
-    // NIST StRD, Thurber, with its certified parameters: a quotient of cubics, from 1 s to 1400.
+    // NIST StRD, Thurber, with its certified parameters: a quotient of cubics, from 1 s to 1400 s.
     let thurber = |t: f64| {
         let x = t - 3.0;
         let over = 1288.13968 + x * (1491.0792535 + x * (583.23836877 + x * 75.416644291));
@@ -71,7 +72,7 @@ fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
     assert!((trace.at(7.29), trace.at(7.31)) == (0.0, 1.0));
 }
 
-/// `y' = 1` in steps of 1 s. Every signal is `y`; each look calls the function with its time.
+/// System `y' = 1` in steps of 1 s. Every signal is `y`; each evaluation calls the function with its time.
 struct Clock<F>(F);
 impl<S: Scalar, F: Fn(f64)> Dynamics<S> for Clock<F> {
     fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
@@ -87,12 +88,12 @@ impl<S: Scalar, F: Fn(f64)> Dynamics<S> for Clock<F> {
 }
 
 #[test]
-fn what_is_recorded_is_limited_tangents_and_signals_counted() {
+fn the_limit_of_a_recording_counts_tangents_and_signals() {
     let endless = Tolerance { max_steps: usize::MAX, ..TOLERANCE };
     for signals in [1, 2, 7] {
         let wanted = (0..signals).map(|i| (i, format!("y{i}"))).collect::<Vec<_>>().into();
         let room = 100 * signals * SEGMENT;
-        // Steps of 1 s: 100 of them fit in, and with three tangents a quarter.
+        // Steps of 1 s: the limit allows 100 of them, and a quarter of that with three tangents.
         let run = |end: f64| record_within(room, &mut Clock(|_| ()), (&[0.0], end), &endless, &wanted);
         assert!(run(95.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
@@ -114,7 +115,7 @@ fn a_simulation_ends_at_the_step_after_the_request() {
         if patient {
             wanted.cancellation = request.patient();
         }
-        // Asked for while the simulation goes: at 50 s.
+        // Requested during the simulation, at 50 s.
         let mut clock = Clock(|t: f64| {
             if t > 50.0 {
                 request.request(why);
