@@ -5,7 +5,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Generations, Next, Population, Renewal};
+use crate::population::{Next, Population, RestartRule, StagnationMonitor};
 use crate::ranking::compare;
 use crate::variation::Variation;
 
@@ -75,7 +75,7 @@ struct State {
     /// Memory for children.
     children: Vec<Vec<f64>>,
     variation: Variation,
-    generations: Generations,
+    stagnation: StagnationMonitor,
 }
 
 impl Solver for Genetic {
@@ -90,9 +90,9 @@ impl Solver for Genetic {
         }
         let options = &self.options;
         let mut random = oracle.stream("genetic");
-        let population = Population::sampled(oracle, options.population.max(4), Some(start), &mut random)?;
+        let population = Population::sample(oracle, options.population.max(4), Some(start), &mut random)?;
         let GeneticOptions { tolerance, patience, restarts, .. } = *options;
-        let generations = Generations::of(&population, Renewal { tolerance, patience, restarts });
+        let stagnation = StagnationMonitor::new(&population, RestartRule { tolerance, patience, restarts });
         let variation = Variation {
             crossover: options.crossover,
             crossover_index: options.crossover_index,
@@ -102,20 +102,20 @@ impl Solver for Genetic {
         // Children come in pairs.
         let pairs = population.len().div_ceil(2);
         let children = vec![vec![0.0; start.len()]; 2 * pairs];
-        self.state = Some(State { random, population, children, variation, generations });
+        self.state = Some(State { random, population, children, variation, stagnation });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
         state.generation(oracle)?;
-        match state.generations.after(&state.population) {
+        match state.stagnation.next(&state.population) {
             Next::Generation => return Ok(Progress::Continue),
             Next::End => return Ok(Progress::Stalled),
-            Next::Members => {}
+            Next::Restart => {}
         }
         let best = state.population.points[0].clone();
-        state.population = Population::sampled(oracle, state.population.len(), Some(&best), &mut state.random)?;
+        state.population = Population::sample(oracle, state.population.len(), Some(&best), &mut state.random)?;
         // Finer steps around what is known.
         state.variation.mutation_index *= 1.5;
         state.variation.crossover_index *= 1.2;
@@ -131,7 +131,7 @@ impl State {
         for pair in children.chunks_exact_mut(2) {
             let [a, b] = pair else { continue };
             for child in [&mut *a, &mut *b] {
-                let parent = self.winner();
+                let parent = self.tournament_winner();
                 child.copy_from_slice(&self.population.points[parent]);
             }
             self.variation.cross(a, b, &mut self.random);
@@ -141,14 +141,14 @@ impl State {
         let answers = oracle.evaluate(&children[..size])?;
         self.population.points.extend(children.drain(..size));
         self.population.merits.extend(answers.iter().map(|answer| answer.merit));
-        let dead = self.population.keep_best(size);
-        children.extend(dead);
+        let unused = self.population.truncate(size);
+        children.extend(unused);
         self.children = children;
         Ok(())
     }
 
     /// The better of two members drawn at random.
-    fn winner(&mut self) -> usize {
+    fn tournament_winner(&mut self) -> usize {
         let size = self.population.len();
         let (a, b) = (self.random.random_range(0..size), self.random.random_range(0..size));
         if compare(&self.population.merits[b], &self.population.merits[a]).is_lt() { b } else { a }

@@ -1,6 +1,6 @@
 //! The limited-memory BFGS method of argmin, on a smooth stand-in for the largest of the rows.
 
-mod smooth;
+mod smooth_maximum;
 
 use argmin::core::Executor;
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::start::usable_start;
-use smooth::Smooth;
+use smooth_maximum::SmoothProblem;
 
 /// Limited-memory BFGS, by argmin, for many tuners and smooth criteria. It follows slopes of one number per point: in place
 /// of the largest row and the largest violation, which have kinks, the smooth function of Kreisselmeier and Steinhauser,
@@ -41,14 +41,14 @@ impl SolverOptions for LBfgsOptions {
     const KIND: &'static str = "l-bfgs";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(LBfgs { options: self.clone(), start: None, round: 0 })
+        Box::new(LBfgs { options: self.clone(), start: None, stage: 0 })
     }
 }
 
 struct LBfgs {
     options: LBfgsOptions,
     start: Option<Vec<f64>>,
-    round: usize,
+    stage: usize,
 }
 
 /// Sharpness of the smooth function, round by round: it exceeds the largest of `m` rows by at most `ln m / sharpness`, in
@@ -68,7 +68,7 @@ impl Solver for LBfgs {
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.start = usable_start(oracle, start)?;
-        self.round = 0;
+        self.stage = 0;
         Ok(())
     }
 
@@ -78,19 +78,19 @@ impl Solver for LBfgs {
         if start.is_empty() {
             return Ok(Progress::Converged);
         }
-        let Some(&sharpness) = SHARPNESS.get(self.round) else { return Ok(Progress::Stalled) };
-        self.round += 1;
-        let Some(problem) = Smooth::new(oracle, start, sharpness)? else { return Ok(Progress::Stalled) };
+        let Some(&sharpness) = SHARPNESS.get(self.stage) else { return Ok(Progress::Stalled) };
+        self.stage += 1;
+        let Some(problem) = SmoothProblem::new(oracle, start, sharpness)? else { return Ok(Progress::Stalled) };
         let method = LBFGS::new(MoreThuenteLineSearch::new(), self.options.memory.max(1));
-        let begin = problem.begin(start);
+        let variables = problem.variables_of(start);
         let iterations = self.options.max_iterations;
-        let run = Executor::new(&problem, method).configure(|state| state.param(begin).max_iters(iterations)).run();
+        let run = Executor::new(&problem, method).configure(|state| state.param(variables).max_iters(iterations)).run();
         if let Some(halt) = problem.halt() {
             return Err(halt);
         }
         // The line search gives up with an error where the slopes lead no further.
         let end = run.ok().and_then(|done| done.state.best_param);
-        let moved = end.map(|v| smooth::inside(&v));
+        let moved = end.map(|v| smooth_maximum::point_of(&v));
         self.start = moved.or_else(|| self.start.take());
         Ok(Progress::Continue)
     }

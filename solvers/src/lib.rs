@@ -1,23 +1,26 @@
 //! Solvers of mops: one file each, behind one seam ([`mops_core::Solver`]).
 
 mod active_set;
-mod argmin_adapter;
+mod argmin_cost;
+pub mod argmin_solver;
 pub mod auto;
+mod chaining;
+mod cholesky;
 pub mod cma_es;
-mod definite;
 pub mod differential_evolution;
-mod directions;
 pub mod epigraph;
 pub mod evolution;
-pub mod for_argmin;
 pub mod genetic;
 pub mod l_bfgs;
 pub mod levenberg_marquardt;
+mod linearised_criteria;
+mod local_archive;
+mod multimethod;
 mod multistart;
 pub mod nelder_mead;
+mod noise_detection;
 pub mod nsga2;
 pub mod nsga3;
-mod own;
 mod pareto;
 pub mod particle_swarm;
 pub mod pattern_search;
@@ -25,13 +28,10 @@ mod penalty;
 mod population;
 mod quasi_newton;
 mod ranking;
-mod relay;
-mod rows;
-mod second_opinion;
+mod simplex_lattice;
 pub mod simulated_annealing;
 pub mod sqp;
 mod start;
-mod texture;
 mod variation;
 pub mod weighted_chebyshev;
 

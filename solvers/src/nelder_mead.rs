@@ -6,7 +6,7 @@ use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::argmin_adapter::Cost;
+use crate::argmin_cost::Cost;
 use crate::start::usable_start;
 
 /// The simplex method of Nelder and Mead, by argmin, begun again at its own end until that brings nothing. It sees one
@@ -38,7 +38,13 @@ impl SolverOptions for NelderMeadOptions {
     const KIND: &'static str = "nelder-mead";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Simplex { options: self.clone(), start: None, size: self.size, before: f64::INFINITY, unit: None })
+        Box::new(Simplex {
+            options: self.clone(),
+            start: None,
+            size: self.size,
+            last_value: f64::INFINITY,
+            objective_scale: None,
+        })
     }
 }
 
@@ -48,9 +54,9 @@ struct Simplex {
     /// Edges of the next simplex; they shrink each time.
     size: f64,
     /// Value at which the last simplex ended.
-    before: f64,
+    last_value: f64,
     /// Factor of the objective.
-    unit: Option<f64>,
+    objective_scale: Option<f64>,
 }
 
 impl Solver for Simplex {
@@ -61,8 +67,8 @@ impl Solver for Simplex {
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.start = usable_start(oracle, start)?;
         self.size = self.options.size;
-        self.before = f64::INFINITY;
-        self.unit = None;
+        self.last_value = f64::INFINITY;
+        self.objective_scale = None;
         Ok(())
     }
 
@@ -83,19 +89,19 @@ impl Solver for Simplex {
         let Ok(method) = NelderMead::new(corners).with_sd_tolerance(self.options.tolerance) else {
             return Ok(Progress::Stalled);
         };
-        let cost = Cost::new(oracle, self.unit);
+        let cost = Cost::new(oracle, self.objective_scale);
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
         if let Some(halt) = cost.halt() {
             return Err(halt);
         }
-        self.unit = cost.unit();
+        self.objective_scale = cost.objective_scale();
         let Ok(done) = run else { return Ok(Progress::Stalled) };
         let value = done.state.best_cost;
-        let gained = self.before - value;
-        if gained <= self.options.tolerance.max(1e-6 * value.abs()) {
+        let improvement = self.last_value - value;
+        if improvement <= self.options.tolerance.max(1e-6 * value.abs()) {
             return Ok(Progress::Converged);
         }
-        self.before = value;
+        self.last_value = value;
         self.size *= 0.3;
         if let Some(end) = done.state.best_param {
             self.start = Some(end.iter().map(|u| u.clamp(0.0, 1.0)).collect());

@@ -1,6 +1,6 @@
 //! NSGA-II: a front by non-dominated sorting and crowding.
 
-mod thinning;
+mod pruning;
 
 use std::cmp::Ordering;
 
@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
 use crate::variation::Variation;
-use thinning::Thinning;
+use pruning::Pruning;
 
 /// Looks for the front of designs that no other is better than in every criterion (NSGA-II): members that few dominate
 /// survive, and of those the ones in sparse places. For two criteria, or three; needs `objective = "each"`. Feasible points
@@ -58,7 +58,7 @@ pub struct Crowding {
     population: usize,
     sorter: FrontSorter,
     feasible: Vec<u32>,
-    others: Vec<u32>,
+    infeasible: Vec<u32>,
     objectives: Vec<f64>,
     /// Rank and distance of every place of the pool.
     rank: Vec<u32>,
@@ -68,8 +68,8 @@ pub struct Crowding {
     fitness: Vec<(u32, f64)>,
     /// Places of the feasible points by rank, and where each rank begins.
     by_rank: Vec<u32>,
-    begins: Vec<usize>,
-    thinning: Thinning,
+    offsets: Vec<usize>,
+    pruning: Pruning,
 }
 
 impl Survival for Crowding {
@@ -78,23 +78,23 @@ impl Survival for Crowding {
     }
 
     fn survive(&mut self, pool: &Pool, keep: usize, _: &mut Stream) -> &[u32] {
-        by_feasibility(pool, &mut self.feasible, &mut self.others);
+        by_feasibility(pool, &mut self.feasible, &mut self.infeasible);
         self.sort(pool);
         self.chosen.clear();
-        for rank in 0..self.begins.len() - 1 {
-            let (from, to) = (self.begins[rank], self.begins[rank + 1]);
-            self.measure(pool, from, to);
-            let left = keep - self.chosen.len();
-            if to - from > left {
-                self.thinning.thin(pool, &mut self.by_rank[from..to], left, &mut self.distance);
+        for rank in 0..self.offsets.len() - 1 {
+            let (from, to) = (self.offsets[rank], self.offsets[rank + 1]);
+            self.crowding_distances(pool, from, to);
+            let remaining = keep - self.chosen.len();
+            if to - from > remaining {
+                self.pruning.prune(pool, &mut self.by_rank[from..to], remaining, &mut self.distance);
             }
-            self.chosen.extend(self.by_rank[from..to].iter().take(left));
+            self.chosen.extend(self.by_rank[from..to].iter().take(remaining));
             if self.chosen.len() == keep {
                 break;
             }
         }
-        let left = keep - self.chosen.len();
-        self.chosen.extend(self.others.iter().take(left));
+        let remaining = keep - self.chosen.len();
+        self.chosen.extend(self.infeasible.iter().take(remaining));
         self.fitness.clear();
         self.fitness.extend(self.chosen.iter().map(|&i| (self.rank[i as usize], self.distance[i as usize])));
         &self.chosen
@@ -121,30 +121,30 @@ impl Crowding {
         let ranks = self.sorter.sort(&self.objectives, pool.m);
         let fronts = ranks.iter().max().map_or(0, |rank| *rank as usize + 1);
         // A counting sort by rank.
-        self.begins.clear();
-        self.begins.resize(fronts + 1, 0);
-        ranks.iter().for_each(|rank| self.begins[*rank as usize + 1] += 1);
+        self.offsets.clear();
+        self.offsets.resize(fronts + 1, 0);
+        ranks.iter().for_each(|rank| self.offsets[*rank as usize + 1] += 1);
         for rank in 0..fronts {
-            self.begins[rank + 1] += self.begins[rank];
+            self.offsets[rank + 1] += self.offsets[rank];
         }
         self.by_rank.clear();
         self.by_rank.resize(ranks.len(), 0);
         for (&i, &rank) in self.feasible.iter().zip(ranks) {
             self.rank[i as usize] = rank;
-            let place = &mut self.begins[rank as usize];
-            self.by_rank[*place] = i;
-            *place += 1;
+            let slot = &mut self.offsets[rank as usize];
+            self.by_rank[*slot] = i;
+            *slot += 1;
         }
-        self.begins.rotate_right(1);
-        self.begins[0] = 0;
-        for (later, &i) in (0_u32..).zip(&self.others) {
+        self.offsets.rotate_right(1);
+        self.offsets[0] = 0;
+        for (later, &i) in (0_u32..).zip(&self.infeasible) {
             self.rank[i as usize] = fronts as u32 + later;
         }
     }
 
     /// The crowding distance of a front: the sum over the objectives of the gap between the neighbours, relative to the
     /// front's range; infinite at the ends.
-    fn measure(&mut self, pool: &Pool, from: usize, to: usize) {
+    fn crowding_distances(&mut self, pool: &Pool, from: usize, to: usize) {
         let front = &mut self.by_rank[from..to];
         #[allow(clippy::cast_precision_loss)]
         let share = 1.0 / pool.m as f64;

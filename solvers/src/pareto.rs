@@ -5,29 +5,29 @@ use nalgebra::DMatrix;
 
 use crate::active_set::dot;
 use crate::epigraph::{Direction, Subproblem};
-use crate::rows::{Linear, Rows};
+use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
 /// Improvement per unit of step, relative to the steepest slope of its row, below which a direction is none: the accuracy
 /// of slopes by differences.
 const IMPROVEMENT: f64 = 1e-3;
 
 /// Relative slope below which differences see nothing but noise.
-const SMALLEST_SLOPE: f64 = 1e-5;
+const SMALLEST_GRADIENT: f64 = 1e-5;
 
 /// How far a direction is followed, in the unit box.
-const AHEAD: f64 = 1e-3;
+const TRIAL_STEP: f64 = 1e-3;
 
 /// Number of times that pieces beyond a kink are added.
-const MOST_PIECES: usize = 12;
+const MAX_CUTS: usize = 12;
 
 /// So many of them, and slopes are taken all around the point.
-const FEW_PIECES: usize = 2;
+const CUTS_BEFORE_SAMPLING: usize = 2;
 
 /// How far around the point that is, in the unit box.
-const AROUND: f64 = 0.5 * AHEAD;
+const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
 
 /// A piece from around the point that stands higher above it, per unit of [`AHEAD`], lies beyond a jump and says nothing of it.
-const JUMP: f64 = 0.5;
+const MAX_CUT_VALUE: f64 = 0.5;
 
 /// Looks for a direction that lowers one row to be minimised and raises none, within the bounds and the active
 /// constraints. None: `certified-local`. One, that also holds a small step ahead: `no`. No slopes, or a direction that
@@ -57,38 +57,38 @@ pub struct Certificate {
 /// As [`certify`], with what the criteria are worth.
 pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
     let mut weights = None;
-    let pareto = shown(oracle, point, &mut weights);
+    let pareto = check(oracle, point, &mut weights);
     Certificate { pareto, weights: weights.filter(|_| pareto == Pareto::CertifiedLocal) }
 }
 
-fn shown(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>) -> Pareto {
-    let Ok(Some(at)) = oracle.linearise(point, 0.1 * AHEAD) else { return Pareto::NotShown };
+fn check(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>) -> Pareto {
+    let Ok(Some(at)) = oracle.linearise(point, 0.1 * TRIAL_STEP) else { return Pareto::NotShown };
     let shape = oracle.shape().clone();
     if point.is_empty() || !shape.rows.iter().any(|(usage, _)| *usage == Usage::Minimise) {
         return Pareto::NotShown;
     }
-    let here = at.at.scaled.clone().expect("a point that was linearised has values");
-    let Some(mut cone) = Cone::new(&shape, &at) else { return Pareto::NotShown };
-    for added in 1..=MOST_PIECES {
-        let Some((step, promised, worth)) = cone.direction(point) else { return Pareto::NotShown };
-        if promised <= IMPROVEMENT {
-            *weights = Some(worth);
+    let values = at.at.scaled.clone().expect("a point that was linearised has values");
+    let Some(mut cone) = DescentCone::new(&shape, &at) else { return Pareto::NotShown };
+    for added in 1..=MAX_CUTS {
+        let Some((step, predicted, trade_offs)) = cone.direction(point) else { return Pareto::NotShown };
+        if predicted <= IMPROVEMENT {
+            *weights = Some(trade_offs);
             return Pareto::CertifiedLocal;
         }
         // The pieces known see an improvement: does the problem?
-        let ahead: Vec<f64> = point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
-        let Ok(mut answers) = oracle.evaluate(std::slice::from_ref(&ahead)) else { return Pareto::NotShown };
-        let Some(there) = answers.pop().and_then(|answer| answer.scaled) else { return Pareto::NotShown };
-        if improves(&shape, &here, &there) {
+        let trial: Vec<f64> = point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
+        let Ok(mut answers) = oracle.evaluate(std::slice::from_ref(&trial)) else { return Pareto::NotShown };
+        let Some(trial_values) = answers.pop().and_then(|answer| answer.scaled) else { return Pareto::NotShown };
+        if is_improvement(&shape, &values, &trial_values) {
             return Pareto::No;
         }
-        let Ok(Some(beyond)) = oracle.linearise(&ahead, 0.1 * AHEAD) else { return Pareto::NotShown };
+        let Ok(Some(beyond)) = oracle.linearise(&trial, 0.1 * TRIAL_STEP) else { return Pareto::NotShown };
         cone.add(&shape, point, &beyond, f64::INFINITY);
-        if added == FEW_PIECES {
-            for beside in around(point) {
+        if added == CUTS_BEFORE_SAMPLING {
+            for beside in sampling_points(point) {
                 // Where nothing can be simulated nothing is known.
-                match oracle.linearise(&beside, 0.1 * AHEAD) {
-                    Ok(Some(beside)) => cone.add(&shape, point, &beside, JUMP * AHEAD),
+                match oracle.linearise(&beside, 0.1 * TRIAL_STEP) {
+                    Ok(Some(beside)) => cone.add(&shape, point, &beside, MAX_CUT_VALUE * TRIAL_STEP),
                     Ok(None) => {}
                     Err(_) => return Pareto::NotShown,
                 }
@@ -99,69 +99,72 @@ fn shown(oracle: &mut dyn Oracle, point: &[f64], weights: &mut Option<Vec<f64>>)
 }
 
 /// The points a little to either side along every coordinate, as far as they lie in the box.
-fn around(point: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+fn sampling_points(point: &[f64]) -> impl Iterator<Item = Vec<f64>> {
     let beside = move |j: usize, step: f64| {
         let u = point[j] + step;
         (0.0..=1.0).contains(&u).then(|| point.iter().enumerate().map(|(k, v)| if k == j { u } else { *v }).collect())
     };
-    (0..point.len()).flat_map(move |j| [AROUND, -AROUND].into_iter().filter_map(move |step| beside(j, step)))
+    (0..point.len())
+        .flat_map(move |j| [SAMPLING_RADIUS, -SAMPLING_RADIUS].into_iter().filter_map(move |step| beside(j, step)))
 }
 
 /// Whether no row is worse, one is better, and all constraints hold.
-fn improves(shape: &Shape, here: &[f64], there: &[f64]) -> bool {
-    let (before, after) = (shape.objectives(here), shape.objectives(there));
+fn is_improvement(shape: &Shape, values: &[f64], trial_values: &[f64]) -> bool {
+    let (before, after) = (shape.objectives(values), shape.objectives(trial_values));
     let none_worse = before.iter().zip(&after).all(|(b, a)| a <= b);
-    let feasible = shape.inequalities(there).iter().all(|c| *c <= mops_core::FEASIBLE)
-        && shape.equalities(there).iter().all(|c| c.abs() <= mops_core::FEASIBLE);
+    let feasible = shape.inequalities(trial_values).iter().all(|c| *c <= mops_core::FEASIBLE)
+        && shape.equalities(trial_values).iter().all(|c| c.abs() <= mops_core::FEASIBLE);
     none_worse && feasible && before != after
 }
 
 /// Directions along which no piece of any row rises.
-struct Cone {
+struct DescentCone {
     /// Rows to be minimised, each measured from its value here in units of its steepest slope.
-    objectives: Vec<Linear>,
+    objectives: Vec<LinearModel>,
     /// Their pieces beyond kinks: the row, and the piece.
-    pieces: Vec<(usize, Linear)>,
+    cuts: Vec<(usize, LinearModel)>,
     /// Constraints that are active, or nearly.
-    inequalities: Vec<Linear>,
-    equalities: Vec<Linear>,
+    inequalities: Vec<LinearModel>,
+    equalities: Vec<LinearModel>,
     /// Value here and steepest slope of the rows to be minimised.
     scales: Vec<(f64, f64)>,
 }
 
-impl Cone {
+impl DescentCone {
     /// `None` where a row has no slope.
     fn new(shape: &Shape, at: &Linearisation) -> Option<Self> {
         // Every row on its own, also where the objective is their sum.
-        let rows = Rows::of(&Shape { objective: Objective::Max, ..shape.clone() }, at);
-        let steepest = |row: &Linear| row.slope.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
-        let scales: Vec<(f64, f64)> = rows.objectives.iter().map(|row| (row.value, steepest(row))).collect();
-        if scales.iter().any(|(value, slope)| *slope < SMALLEST_SLOPE * value.abs().max(f64::MIN_POSITIVE)) {
+        let criteria =
+            LinearisedCriteria::from_linearisation(&Shape { objective: Objective::Max, ..shape.clone() }, at);
+        let steepest = |row: &LinearModel| row.gradient.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
+        let scales: Vec<(f64, f64)> = criteria.objectives.iter().map(|row| (row.value, steepest(row))).collect();
+        if scales.iter().any(|(value, steepest)| *steepest < SMALLEST_GRADIENT * value.abs().max(f64::MIN_POSITIVE)) {
             return None;
         }
-        let still = |row: &Linear| Linear { value: 0.0, slope: row.slope.clone() };
+        let at_zero = |row: &LinearModel| LinearModel { value: 0.0, gradient: row.gradient.clone() };
         Some(Self {
-            objectives: rows.objectives.iter().zip(&scales).map(|(row, scale)| scaled(row, *scale)).collect(),
-            pieces: Vec::new(),
-            inequalities: rows.inequalities.iter().filter(|row| row.value > -1e-4).map(still).collect(),
-            equalities: rows.equalities.iter().map(still).collect(),
+            objectives: criteria.objectives.iter().zip(&scales).map(|(row, scale)| normalised(row, *scale)).collect(),
+            cuts: Vec::new(),
+            inequalities: criteria.inequalities.iter().filter(|row| row.value > -1e-4).map(at_zero).collect(),
+            equalities: criteria.equalities.iter().map(at_zero).collect(),
             scales,
         })
     }
 
     /// The rows as they extend to here from a point beyond a kink; what lies above the row here is brought down to it, if it is
     /// not higher than `highest`.
-    fn add(&mut self, shape: &Shape, here: &[f64], beyond: &Linearisation, highest: f64) {
-        let rows = Rows::of(&Shape { objective: Objective::Max, ..shape.clone() }, beyond);
-        let back: Vec<f64> = here.iter().zip(&beyond.at.point).map(|(a, b)| a - b).collect();
-        let extended = |row: Linear| {
-            let value = row.value + dot(&row.slope, &back);
-            (value <= highest).then(|| Linear { value: value.min(0.0), slope: row.slope })
+    fn add(&mut self, shape: &Shape, point: &[f64], beyond: &Linearisation, max_value: f64) {
+        let criteria =
+            LinearisedCriteria::from_linearisation(&Shape { objective: Objective::Max, ..shape.clone() }, beyond);
+        let offset: Vec<f64> = point.iter().zip(&beyond.at.point).map(|(a, b)| a - b).collect();
+        let extended = |row: LinearModel| {
+            let value = row.value + dot(&row.gradient, &offset);
+            (value <= max_value).then(|| LinearModel { value: value.min(0.0), gradient: row.gradient })
         };
-        for (k, (row, scale)) in rows.objectives.iter().zip(&self.scales).enumerate() {
-            self.pieces.extend(extended(scaled(row, *scale)).map(|piece| (k, piece)));
+        for (k, (row, scale)) in criteria.objectives.iter().zip(&self.scales).enumerate() {
+            self.cuts.extend(extended(normalised(row, *scale)).map(|cut| (k, cut)));
         }
-        let inequalities = rows.inequalities.into_iter().filter_map(extended);
+        let inequalities = criteria.inequalities.into_iter().filter_map(extended);
         self.inequalities.extend(inequalities.filter(|row| row.value > -1e-4));
     }
 
@@ -170,40 +173,42 @@ impl Cone {
     fn direction(&self, point: &[f64]) -> Option<(Vec<f64>, f64, Vec<f64>)> {
         // All lengths in units of the step, so that values and slopes are of one size.
         let n = point.len();
-        let near = |row: &Linear| Linear { value: row.value / AHEAD, slope: row.slope.clone() };
-        let mut inequalities: Vec<Linear> = self.objectives.iter().map(near).collect();
-        inequalities.extend(self.pieces.iter().map(|(_, piece)| near(piece)));
-        inequalities.extend(self.inequalities.iter().map(near));
-        let sum = |slope: Vec<f64>, row: &Linear| slope.iter().zip(&row.slope).map(|(a, b)| a + b).collect();
-        let total = Linear { value: 0.0, slope: self.objectives.iter().fold(vec![0.0; n], sum) };
-        let cone = Rows { objectives: vec![total], inequalities, equalities: self.equalities.clone() };
+        let in_step_units =
+            |row: &LinearModel| LinearModel { value: row.value / TRIAL_STEP, gradient: row.gradient.clone() };
+        let mut inequalities: Vec<LinearModel> = self.objectives.iter().map(in_step_units).collect();
+        inequalities.extend(self.cuts.iter().map(|(_, cut)| in_step_units(cut)));
+        inequalities.extend(self.inequalities.iter().map(in_step_units));
+        let sum =
+            |gradient: Vec<f64>, row: &LinearModel| gradient.iter().zip(&row.gradient).map(|(a, b)| a + b).collect();
+        let total = LinearModel { value: 0.0, gradient: self.objectives.iter().fold(vec![0.0; n], sum) };
+        let cone = LinearisedCriteria { objectives: vec![total], inequalities, equalities: self.equalities.clone() };
         let low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
         let high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
         // A penalty above every multiplier keeps the direction inside the cone.
         let mut direction = Direction::default();
         let hessian = DMatrix::identity(n, n) * 1e-6;
         Subproblem::default().solve(&cone, &hessian, [&low, &high], 1e4, &mut direction)?;
-        let promised = (0..self.objectives.len()).map(|k| self.fall(k, &direction.step)).sum();
+        let predicted = (0..self.objectives.len()).map(|k| self.decrease(k, &direction.step)).sum();
         // The sum of the rows, and what keeps each of them from rising.
-        let held = &direction.multipliers.inequalities;
+        let constraint_multipliers = &direction.multipliers.inequalities;
         let m = self.objectives.len();
-        let mut weights: Vec<f64> = held[..m].iter().map(|multiplier| 1.0 + multiplier).collect();
-        for ((k, _), multiplier) in self.pieces.iter().zip(&held[m..]) {
+        let mut weights: Vec<f64> = constraint_multipliers[..m].iter().map(|multiplier| 1.0 + multiplier).collect();
+        for ((k, _), multiplier) in self.cuts.iter().zip(&constraint_multipliers[m..]) {
             weights[*k] += multiplier;
         }
-        weights.iter_mut().zip(&self.scales).for_each(|(weight, (_, slope))| *weight /= slope);
-        Some((direction.step.iter().map(|d| AHEAD * d).collect(), promised, weights))
+        weights.iter_mut().zip(&self.scales).for_each(|(weight, (_, steepest))| *weight /= steepest);
+        Some((direction.step.iter().map(|d| TRIAL_STEP * d).collect(), predicted, weights))
     }
 
     /// What a row falls by along a step, as all of its pieces see it.
-    fn fall(&self, row: usize, step: &[f64]) -> f64 {
-        let own = -dot(&self.objectives[row].slope, step);
-        let pieces = self.pieces.iter().filter(|(k, _)| *k == row);
-        pieces.map(|(_, piece)| -(piece.value / AHEAD + dot(&piece.slope, step))).fold(own, f64::min)
+    fn decrease(&self, row: usize, step: &[f64]) -> f64 {
+        let linear_decrease = -dot(&self.objectives[row].gradient, step);
+        let cuts = self.cuts.iter().filter(|(k, _)| *k == row);
+        cuts.map(|(_, cut)| -(cut.value / TRIAL_STEP + dot(&cut.gradient, step))).fold(linear_decrease, f64::min)
     }
 }
 
 /// A row measured from `value`, in units of `slope`.
-fn scaled(row: &Linear, (value, slope): (f64, f64)) -> Linear {
-    Linear { value: (row.value - value) / slope, slope: row.slope.iter().map(|s| s / slope).collect() }
+fn normalised(row: &LinearModel, (value, steepest): (f64, f64)) -> LinearModel {
+    LinearModel { value: (row.value - value) / steepest, gradient: row.gradient.iter().map(|s| s / steepest).collect() }
 }

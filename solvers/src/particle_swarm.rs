@@ -6,7 +6,7 @@ use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::argmin_adapter::Cost;
+use crate::argmin_cost::Cost;
 
 /// Particle swarm optimisation, by argmin: a global search without slopes. It sees one number per point, the penalised
 /// maximum. Ends after a number of iterations.

@@ -19,7 +19,7 @@ impl Population {
     ///
     /// # Errors
     /// The run is over.
-    pub fn sampled(
+    pub fn sample(
         oracle: &mut dyn Oracle,
         size: usize,
         start: Option<&[f64]>,
@@ -46,7 +46,7 @@ impl Population {
     }
 
     /// Keeps so many of the best, these in order, and gives the others' points, as memory for children.
-    pub fn keep_best(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
+    pub fn truncate(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
         let order = self.order();
         let (mut points, merits) = (std::mem::take(&mut self.points), std::mem::take(&mut self.merits));
         self.points = order[..size].iter().map(|&i| std::mem::take(&mut points[i])).collect();
@@ -55,19 +55,19 @@ impl Population {
     }
 
     /// Whether the members no longer differ: in what they are worth, relative to `unit`, or in where they are.
-    fn has_collapsed(&self, tolerance: f64, unit: f64) -> bool {
+    fn has_converged(&self, tolerance: f64, unit: f64) -> bool {
         let order = self.order();
         let (best, worst) = (self.merits[order[0]], self.merits[order[self.len() - 1]]);
-        let flat = |a: f64, b: f64, unit: f64| (b - a).abs() <= tolerance * a.abs().max(unit);
-        let equal = best.is_feasible() == worst.is_feasible()
+        let is_flat = |a: f64, b: f64, unit: f64| (b - a).abs() <= tolerance * a.abs().max(unit);
+        let merits_equal = best.is_feasible() == worst.is_feasible()
             && (best == worst
-                || (flat(best.objective, worst.objective, unit)
-                    && (best.is_feasible() || flat(best.violation, worst.violation, 1.0))));
+                || (is_flat(best.objective, worst.objective, unit)
+                    && (best.is_feasible() || is_flat(best.violation, worst.violation, 1.0))));
         let spread = |j: usize| {
             let (low, high) = self.points.iter().fold((1.0_f64, 0.0_f64), |(l, h), p| (l.min(p[j]), h.max(p[j])));
             high - low
         };
-        equal || (0..self.points[0].len()).all(|j| spread(j) < 1e-12)
+        merits_equal || (0..self.points[0].len()).all(|j| spread(j) < 1e-12)
     }
 }
 
@@ -78,7 +78,7 @@ pub fn merits(evaluations: &[Evaluation]) -> Vec<Merit> {
 
 /// When the members of a population are drawn anew.
 #[derive(Debug, Clone, Copy)]
-pub struct Renewal {
+pub struct RestartRule {
     /// Members are alike when what they are worth differs by less than this, relative to the objective.
     pub tolerance: f64,
     /// Generations without a better point that are too many.
@@ -93,44 +93,44 @@ pub enum Next {
     /// Another one.
     Generation,
     /// New members.
-    Members,
+    Restart,
     /// Nothing.
     End,
 }
 
 /// Watches a population from generation to generation.
 #[derive(Debug, Clone)]
-pub struct Generations {
-    rules: Renewal,
+pub struct StagnationMonitor {
+    rule: RestartRule,
     /// Size of an objective that counts as one.
     unit: f64,
     best: Merit,
-    idle: usize,
-    renewed: usize,
+    stalled: usize,
+    restarts: usize,
 }
 
-impl Generations {
+impl StagnationMonitor {
     /// From the first members on, the start in front.
-    pub fn of(members: &Population, rules: Renewal) -> Self {
+    pub fn new(members: &Population, rule: RestartRule) -> Self {
         let unit = members.merits[0].objective.abs().min(1.0);
-        Self { rules, unit, best: Merit::FAILED, idle: 0, renewed: 0 }
+        Self { rule, unit, best: Merit::FAILED, stalled: 0, restarts: 0 }
     }
 
     /// What comes after a generation with these members.
-    pub fn after(&mut self, members: &Population) -> Next {
+    pub fn next(&mut self, members: &Population) -> Next {
         let best = members.merits[members.order()[0]];
-        self.idle = if best.is_better_than(&self.best) { 0 } else { self.idle + 1 };
-        if self.idle == 0 {
+        self.stalled = if best.is_better_than(&self.best) { 0 } else { self.stalled + 1 };
+        if self.stalled == 0 {
             self.best = best;
         }
-        if self.idle < self.rules.patience && !members.has_collapsed(self.rules.tolerance, self.unit) {
+        if self.stalled < self.rule.patience && !members.has_converged(self.rule.tolerance, self.unit) {
             return Next::Generation;
         }
-        if self.renewed >= self.rules.restarts {
+        if self.restarts >= self.rule.restarts {
             return Next::End;
         }
-        self.renewed += 1;
-        (self.best, self.idle) = (Merit::FAILED, 0);
-        Next::Members
+        self.restarts += 1;
+        (self.best, self.stalled) = (Merit::FAILED, 0);
+        Next::Restart
     }
 }

@@ -53,12 +53,12 @@ struct Walk {
     /// Unit of the temperature.
     unit: f64,
     iteration: u64,
-    accepting: Stream,
-    moving: Stream,
+    acceptance_stream: Stream,
+    step_stream: Stream,
 }
 
 /// The last temperature.
-const COLD: f64 = 1e-6;
+const FINAL_TEMPERATURE: f64 = 1e-6;
 
 impl Solver for Annealing {
     fn accepts(&self, _: &Shape) -> Result<(), String> {
@@ -70,9 +70,9 @@ impl Solver for Annealing {
         let Some(point) = usable_start(oracle, start)? else { return Ok(()) };
         let cost = penalised(&oracle.evaluate(std::slice::from_ref(&point))?[0]);
         let unit = if cost == 0.0 { 1.0 } else { cost.abs() };
-        let [accepting, moving] =
+        let [acceptance_stream, step_stream] =
             ["simulated-annealing", "simulated-annealing steps"].map(|label| oracle.stream(label));
-        self.walk = Some(Walk { point, cost, unit, iteration: 0, accepting, moving });
+        self.walk = Some(Walk { point, cost, unit, iteration: 0, acceptance_stream, step_stream });
         Ok(())
     }
 
@@ -86,12 +86,12 @@ impl Solver for Annealing {
         if walk.iteration >= self.options.max_iterations {
             return Ok(Progress::Stalled);
         }
-        let temperature = math::powf(COLD, walk.iteration as f64 / self.options.max_iterations as f64);
+        let temperature = math::powf(FINAL_TEMPERATURE, walk.iteration as f64 / self.options.max_iterations as f64);
         walk.iteration += 1;
-        let next = walk.moved(self.options.size * temperature.sqrt(), &oracle.shape().spacing);
+        let next = walk.proposal(self.options.size * temperature.sqrt(), &oracle.shape().spacing);
         let cost = penalised(&oracle.evaluate(std::slice::from_ref(&next))?[0]);
-        let chance = 1.0 / (1.0 + math::exp((cost - walk.cost) / (walk.unit * temperature)));
-        if cost < walk.cost || walk.accepting.random::<f64>() < chance {
+        let acceptance = 1.0 / (1.0 + math::exp((cost - walk.cost) / (walk.unit * temperature)));
+        if cost < walk.cost || walk.acceptance_stream.random::<f64>() < acceptance {
             (walk.point, walk.cost) = (next, cost);
         }
         Ok(Progress::Continue)
@@ -100,8 +100,8 @@ impl Solver for Annealing {
 
 impl Walk {
     /// The point after a step; on a grid it is not shorter than to the next value.
-    fn moved(&mut self, size: f64, spacing: &[f64]) -> Vec<f64> {
-        let random = &mut self.moving;
+    fn proposal(&mut self, size: f64, spacing: &[f64]) -> Vec<f64> {
+        let random = &mut self.step_stream;
         let along = |(u, spacing): (&f64, &f64)| (u + size.max(*spacing) * math::normal(random)).clamp(0.0, 1.0);
         self.point.iter().zip(spacing).map(along).collect()
     }

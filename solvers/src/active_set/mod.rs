@@ -40,17 +40,17 @@ pub struct ActiveSet {
     /// The active constraints, by index.
     active: Vec<usize>,
     /// Those of the last program.
-    likely: Vec<usize>,
+    previous_active: Vec<usize>,
     /// The multipliers of the active ones.
     multipliers: Vec<f64>,
     /// The iterate.
     x: Vec<f64>,
     /// `J'a` of the constraint that is added.
-    along: Vec<f64>,
+    projected_normal: Vec<f64>,
     /// The step of the iterate.
     step: Vec<f64>,
     /// The step of the multipliers.
-    change: Vec<f64>,
+    multiplier_step: Vec<f64>,
 }
 
 /// Relative size of what is left of a normal below which it depends on the active ones.
@@ -62,41 +62,41 @@ impl ActiveSet {
     /// all others. `false` where the constraints contradict each other, or
     /// rounding keeps the method from an end.
     pub fn solve(&mut self, l: &[f64], c: &[f64], constraints: &Constraints, first: &[usize]) -> bool {
-        self.likely.clone_from(&self.active);
-        self.likely.retain(|p| *p < constraints.bounds.len());
-        self.begin(l, c.len());
+        self.previous_active.clone_from(&self.active);
+        self.previous_active.retain(|p| *p < constraints.bounds.len());
+        self.reset(l, c.len());
         for &p in first {
-            self.project(row(constraints, p, self.n));
+            self.project_normal(row(constraints, p, self.n));
             if !self.add(p) {
                 return false;
             }
         }
-        self.minimise(c, constraints);
-        let most = 50 + 20 * (self.n + constraints.bounds.len());
+        self.minimise_over_active_set(c, constraints);
+        let max_steps = 50 + 20 * (self.n + constraints.bounds.len());
         let mut steps = 0;
         while let Some((p, mut slack)) = self.most_violated(constraints) {
             let mut multiplier = 0.0;
             loop {
                 steps += 1;
-                if steps > most {
+                if steps > max_steps {
                     return false;
                 }
                 let normal = row(constraints, p, self.n);
-                self.project(normal);
-                let curvature = self.directions();
-                let (length, drop) = self.first_to_leave();
+                self.project_normal(normal);
+                let curvature = self.step_directions();
+                let (length, drop) = self.ratio_test();
                 let full = if curvature > 0.0 { -slack / curvature } else { f64::INFINITY };
-                let taken = length.min(full);
-                if taken.is_infinite() {
+                let step_length = length.min(full);
+                if step_length.is_infinite() {
                     return false;
                 }
-                for (u, change) in self.multipliers.iter_mut().zip(&self.change) {
-                    *u -= taken * change;
+                for (u, multiplier_step) in self.multipliers.iter_mut().zip(&self.multiplier_step) {
+                    *u -= step_length * multiplier_step;
                 }
-                multiplier += taken;
+                multiplier += step_length;
                 if full.is_finite() {
                     for (x, step) in self.x.iter_mut().zip(&self.step) {
-                        *x += taken * step;
+                        *x += step_length * step;
                     }
                     slack = dot(normal, &self.x) - constraints.bounds[p];
                 }
@@ -110,7 +110,7 @@ impl ActiveSet {
                 self.drop(drop);
             }
         }
-        self.minimise(c, constraints);
+        self.minimise_over_active_set(c, constraints);
         self.x.iter().all(|x| x.is_finite())
     }
 
@@ -125,17 +125,17 @@ impl ActiveSet {
     }
 
     /// `J = L^-T`, and nothing active.
-    fn begin(&mut self, l: &[f64], n: usize) {
+    fn reset(&mut self, l: &[f64], n: usize) {
         self.n = n;
         self.active.clear();
         self.multipliers.clear();
         self.j.clear();
         self.j.resize(n * n, 0.0);
-        for buffer in [&mut self.x, &mut self.along, &mut self.step] {
+        for buffer in [&mut self.x, &mut self.projected_normal, &mut self.step] {
             buffer.clear();
             buffer.resize(n, 0.0);
         }
-        self.change.clear();
+        self.multiplier_step.clear();
         self.r.clear();
         self.r.resize(n * n, 0.0);
         // Column k of L^-T by back substitution: L' J = I.
@@ -148,32 +148,32 @@ impl ActiveSet {
     }
 
     /// `along = J'a`.
-    fn project(&mut self, normal: &[f64]) {
-        for (along, column) in self.along.iter_mut().zip(self.j.chunks_exact(self.n)) {
-            *along = dot(column, normal);
+    fn project_normal(&mut self, normal: &[f64]) {
+        for (projected_normal, column) in self.projected_normal.iter_mut().zip(self.j.chunks_exact(self.n)) {
+            *projected_normal = dot(column, normal);
         }
     }
 
     /// The steps of the iterate and of the multipliers per unit of the new one; the curvature along the first, 0 where the
     /// normal depends on the active ones.
-    fn directions(&mut self) -> f64 {
+    fn step_directions(&mut self) -> f64 {
         let (n, q) = (self.n, self.active.len());
-        self.change.clear();
-        self.change.extend_from_slice(&self.along[..q]);
+        self.multiplier_step.clear();
+        self.multiplier_step.extend_from_slice(&self.projected_normal[..q]);
         for i in (0..q).rev() {
-            self.change[i] /= self.r[i * n + i];
-            let known = self.change[i];
+            self.multiplier_step[i] /= self.r[i * n + i];
+            let known = self.multiplier_step[i];
             for k in 0..i {
-                self.change[k] -= known * self.r[i * n + k];
+                self.multiplier_step[k] -= known * self.r[i * n + k];
             }
         }
-        let free: f64 = self.along[q..].iter().map(|d| d * d).sum();
-        let all: f64 = self.along.iter().map(|d| d * d).sum();
+        let free: f64 = self.projected_normal[q..].iter().map(|d| d * d).sum();
+        let all: f64 = self.projected_normal.iter().map(|d| d * d).sum();
         if free <= DEPENDENT * DEPENDENT * all {
             return 0.0;
         }
         self.step.fill(0.0);
-        for (d, column) in self.along[q..].iter().zip(self.j.chunks_exact(n).skip(q)) {
+        for (d, column) in self.projected_normal[q..].iter().zip(self.j.chunks_exact(n).skip(q)) {
             for (step, j) in self.step.iter_mut().zip(column) {
                 *step += d * j;
             }
@@ -182,9 +182,11 @@ impl ActiveSet {
     }
 
     /// How far the multipliers can go until the first of them is 0, and which.
-    fn first_to_leave(&self) -> (f64, usize) {
-        let ratios = self.multipliers.iter().zip(&self.change).enumerate();
-        let ratios = ratios.filter(|(_, (_, change))| **change > 0.0).map(|(i, (u, change))| (u.max(0.0) / change, i));
+    fn ratio_test(&self) -> (f64, usize) {
+        let ratios = self.multipliers.iter().zip(&self.multiplier_step).enumerate();
+        let ratios = ratios
+            .filter(|(_, (_, multiplier_step))| **multiplier_step > 0.0)
+            .map(|(i, (u, multiplier_step))| (u.max(0.0) / multiplier_step, i));
         ratios.fold((f64::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best })
     }
 
@@ -195,16 +197,16 @@ impl ActiveSet {
             return false;
         }
         for k in (q + 1..n).rev() {
-            let (cos, sin, length) = rotation(self.along[k - 1], self.along[k]);
+            let (cos, sin, length) = rotation(self.projected_normal[k - 1], self.projected_normal[k]);
             if sin != 0.0 {
-                (self.along[k - 1], self.along[k]) = (length, 0.0);
+                (self.projected_normal[k - 1], self.projected_normal[k]) = (length, 0.0);
                 self.rotate(k - 1, cos, sin);
             }
         }
-        self.r[q * n..q * n + q + 1].copy_from_slice(&self.along[..=q]);
+        self.r[q * n..q * n + q + 1].copy_from_slice(&self.projected_normal[..=q]);
         self.active.push(p);
         self.multipliers.push(0.0);
-        self.along[q] != 0.0
+        self.projected_normal[q] != 0.0
     }
 
     /// Drops the active constraint at `position`.
@@ -237,20 +239,20 @@ impl ActiveSet {
 
     /// The minimum over the active constraints, and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 = -J_2'c`,
     /// `R u = y_1 + J_1'c`.
-    fn minimise(&mut self, c: &[f64], constraints: &Constraints) {
+    fn minimise_over_active_set(&mut self, c: &[f64], constraints: &Constraints) {
         let (n, q) = (self.n, self.active.len());
         self.x.fill(0.0);
         for k in 0..n {
-            let slope = dot(&self.j[k * n..(k + 1) * n], c);
+            let gradient = dot(&self.j[k * n..(k + 1) * n], c);
             let y = if k < q {
-                let known: f64 = (0..k).map(|i| self.r[k * n + i] * self.along[i]).sum();
+                let known: f64 = (0..k).map(|i| self.r[k * n + i] * self.projected_normal[i]).sum();
                 (constraints.bounds[self.active[k]] - known) / self.r[k * n + k]
             } else {
-                -slope
+                -gradient
             };
-            self.along[k] = y;
+            self.projected_normal[k] = y;
             if k < q {
-                self.multipliers[k] = y + slope;
+                self.multipliers[k] = y + gradient;
             }
             for (x, j) in self.x.iter_mut().zip(&self.j[k * n..(k + 1) * n]) {
                 *x += y * j;
@@ -269,7 +271,7 @@ impl ActiveSet {
     fn most_violated(&self, constraints: &Constraints) -> Option<(usize, f64)> {
         let largest = self.x.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
         let worst = |candidates: &mut dyn Iterator<Item = usize>| {
-            let (mut worst, mut most) = (None, -ROUNDING);
+            let (mut worst, mut max_steps) = (None, -ROUNDING);
             for p in candidates {
                 let normal = row(constraints, p, self.n);
                 let slack = dot(normal, &self.x) - constraints.bounds[p];
@@ -278,13 +280,13 @@ impl ActiveSet {
                 }
                 let size = normal.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
                 let relative = slack / (size * (1.0 + largest) + constraints.bounds[p].abs());
-                if relative < most && !self.active.contains(&p) {
-                    (worst, most) = (Some((p, slack)), relative);
+                if relative < max_steps && !self.active.contains(&p) {
+                    (worst, max_steps) = (Some((p, slack)), relative);
                 }
             }
             worst
         };
-        worst(&mut self.likely.iter().copied()).or_else(|| worst(&mut (0..constraints.bounds.len())))
+        worst(&mut self.previous_active.iter().copied()).or_else(|| worst(&mut (0..constraints.bounds.len())))
     }
 }
 

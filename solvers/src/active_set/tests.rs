@@ -14,16 +14,16 @@ fn factor(hessian: &DMatrix<f64>) -> Vec<f64> {
 fn error(method: &ActiveSet, hessian: &DMatrix<f64>, c: &[f64], constraints: &Constraints) -> f64 {
     let n = c.len();
     let x = DVector::from_column_slice(method.x());
-    let mut slope = hessian * &x + DVector::from_column_slice(c);
+    let mut gradient = hessian * &x + DVector::from_column_slice(c);
     let mut worst = 0.0_f64;
     for (p, multiplier) in method.active() {
         let normal = DVector::from_column_slice(row(constraints, p, n));
         worst = worst.max((normal.dot(&x) - constraints.bounds[p]).abs()).max(-multiplier);
-        slope -= normal * multiplier;
+        gradient -= normal * multiplier;
     }
     let slacks =
         (0..constraints.bounds.len()).map(|p| dot(row(constraints, p, n), x.as_slice()) - constraints.bounds[p]);
-    slacks.fold(worst.max(slope.amax()), |worst, slack| worst.max(-slack))
+    slacks.fold(worst.max(gradient.amax()), |worst, slack| worst.max(-slack))
 }
 
 #[test]

@@ -13,7 +13,7 @@ pub struct Plan {
     pub sigma: f64,
     /// Evaluations after which the run is broken off.
     pub evaluations: usize,
-    large: bool,
+    is_large: bool,
 }
 
 /// The bookkeeping of both regimes.
@@ -25,49 +25,49 @@ pub struct Bipop {
     sigma: f64,
     /// Runs with a doubled population.
     doublings: usize,
-    spent_large: usize,
-    spent_small: usize,
+    evaluations_large: usize,
+    evaluations_small: usize,
     /// Evaluations of the last run with a large population.
-    last_large: usize,
+    last_large_evaluations: usize,
 }
 
 impl Bipop {
     /// Before the first run, with the usual population and step.
     pub fn new(population: usize, sigma: f64) -> Self {
-        Self { population, sigma, doublings: 0, spent_large: 0, spent_small: 0, last_large: 0 }
+        Self { population, sigma, doublings: 0, evaluations_large: 0, evaluations_small: 0, last_large_evaluations: 0 }
     }
 
     /// The first run.
-    pub fn first(&self) -> Plan {
-        Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, large: true }
+    pub fn first_run(&self) -> Plan {
+        Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, is_large: true }
     }
 
     /// A run with the usual population that begins with a small step, near a point that is good already.
-    pub fn small(&self, sigma: f64) -> Plan {
-        Plan { sigma, ..self.first() }
+    pub fn small_run(&self, sigma: f64) -> Plan {
+        Plan { sigma, ..self.first_run() }
     }
 
     /// Notes what a run has cost, and plans the next; `None` after `restarts` doublings.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn next(&mut self, last: &Plan, spent: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {
+    pub fn next(&mut self, last: &Plan, used: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {
         // The first run counts for neither regime.
-        match (last.large, self.doublings) {
-            (true, 0) => self.last_large = spent,
-            (true, _) => (self.spent_large, self.last_large) = (self.spent_large + spent, spent),
-            (false, _) => self.spent_small += spent,
+        match (last.is_large, self.doublings) {
+            (true, 0) => self.last_large_evaluations = used,
+            (true, _) => (self.evaluations_large, self.last_large_evaluations) = (self.evaluations_large + used, used),
+            (false, _) => self.evaluations_small += used,
         }
-        if self.doublings > 0 && self.spent_small < self.spent_large {
+        if self.doublings > 0 && self.evaluations_small < self.evaluations_large {
             let u: f64 = random.random();
             let ratio = 0.5 * (1usize << self.doublings) as f64;
             let population = (self.population as f64 * math::powf(ratio, u * u)) as usize;
             let sigma = self.sigma * math::powf(10.0, -2.0 * random.random::<f64>());
-            return Some(Plan { population, sigma, evaluations: self.last_large / 2, large: false });
+            return Some(Plan { population, sigma, evaluations: self.last_large_evaluations / 2, is_large: false });
         }
         if self.doublings >= restarts {
             return None;
         }
         self.doublings += 1;
         let population = self.population << self.doublings;
-        Some(Plan { population, sigma: self.sigma, evaluations: usize::MAX, large: true })
+        Some(Plan { population, sigma: self.sigma, evaluations: usize::MAX, is_large: true })
     }
 }

@@ -1,10 +1,10 @@
 //! CMA-ES: samples a normal distribution, and adapts its mean, size and covariance to what was good.
 
-mod axes;
 mod bipop;
+mod coordinate_search;
 mod distribution;
-mod stop;
 mod strategy;
+mod termination;
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
 use nalgebra::DMatrix;
@@ -14,11 +14,11 @@ use serde::Deserialize;
 
 use crate::ranking::ranked;
 use crate::start::usable_start;
-use axes::Axes;
 use bipop::{Bipop, Plan};
+use coordinate_search::CoordinateSearch;
 use distribution::Distribution;
-use stop::{End, History};
 use strategy::Strategy;
+use termination::{End, History};
 
 /// Covariance matrix adaptation evolution strategy with restarts in two regimes (BIPOP): a global search without slopes
 /// that is indifferent to turned, stretched and monotonically distorted problems. A whole generation is evaluated in
@@ -77,8 +77,8 @@ struct State {
     best: Merit,
     converged: bool,
     /// The search along axes that follows the first run: under way, and whether it is still to come.
-    axes: Option<Axes>,
-    along_axes: bool,
+    coordinate_search: Option<CoordinateSearch>,
+    coordinate_search_pending: bool,
     /// Order of magnitude of the objective at the start, at most 1.
     unit: f64,
 }
@@ -90,7 +90,7 @@ struct Run {
     /// Memory for the members of a generation.
     members: Vec<Vec<f64>>,
     history: History,
-    spent: usize,
+    evaluations: usize,
     improved: bool,
 }
 
@@ -106,10 +106,10 @@ impl Solver for CmaEs {
             return Ok(());
         }
         let at = oracle.evaluate(std::slice::from_ref(&start))?.pop().expect("one point, one answer");
-        let usual = Strategy::usual_population(start.len());
-        let population = if self.options.population > 0 { self.options.population } else { usual };
+        let default = Strategy::default_population(start.len());
+        let population = if self.options.population > 0 { self.options.population } else { default };
         let restarts = Bipop::new(population, self.options.size);
-        let run = self.run(restarts.first(), start.clone(), &oracle.shape().spacing);
+        let run = self.run(restarts.first_run(), start.clone(), &oracle.shape().spacing);
         let unit = at.merit.objective.abs().min(1.0);
         let random = oracle.stream("cma-es");
         self.state = Some(State {
@@ -119,8 +119,8 @@ impl Solver for CmaEs {
             point: start,
             best: at.merit,
             converged: false,
-            axes: None,
-            along_axes: self.options.restarts > 0 && oracle.shape().dimension() > 1,
+            coordinate_search: None,
+            coordinate_search_pending: self.options.restarts > 0 && oracle.shape().dimension() > 1,
             unit,
         });
         Ok(())
@@ -131,16 +131,20 @@ impl Solver for CmaEs {
             return Ok(Progress::Converged);
         }
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
-        if let Some(axes) = &mut state.axes {
-            axes.search(oracle)?;
-            return if axes.is_over() { self.leave_axes(oracle) } else { Ok(Progress::Continue) };
+        if let Some(coordinate_search) = &mut state.coordinate_search {
+            coordinate_search.search(oracle)?;
+            return if coordinate_search.is_finished() {
+                self.finish_coordinate_search(oracle)
+            } else {
+                Ok(Progress::Continue)
+            };
         }
         let Some(end) = state.generation(oracle)? else { return Ok(Progress::Continue) };
         if state.run.improved {
             state.converged = end == End::Converged;
         }
-        if std::mem::take(&mut state.along_axes) {
-            state.axes = Some(Axes::new(state.point.clone(), state.best));
+        if std::mem::take(&mut state.coordinate_search_pending) {
+            state.coordinate_search = Some(CoordinateSearch::new(state.point.clone(), state.best));
             return Ok(Progress::Continue);
         }
         self.restart(oracle)
@@ -151,8 +155,8 @@ impl CmaEs {
     /// Begins the next run, if there is one.
     fn restart(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
-        let (last, spent) = (state.run.plan, state.run.spent);
-        let Some(plan) = state.restarts.next(&last, spent, self.options.restarts, &mut state.random) else {
+        let (last, evaluations) = (state.run.plan, state.run.evaluations);
+        let Some(plan) = state.restarts.next(&last, evaluations, self.options.restarts, &mut state.random) else {
             return Ok(if state.converged { Progress::Converged } else { Progress::Stalled });
         };
         let n = oracle.shape().dimension();
@@ -164,11 +168,13 @@ impl CmaEs {
     }
 
     /// Begins a small run where the search along axes ended; the next run where it found nothing better.
-    fn leave_axes(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+    fn finish_coordinate_search(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
-        let Some((point, merit)) = state.axes.take().and_then(Axes::found) else { return self.restart(oracle) };
+        let Some((point, merit)) = state.coordinate_search.take().and_then(CoordinateSearch::improvement) else {
+            return self.restart(oracle);
+        };
         (state.point, state.best, state.converged) = (point.clone(), merit, false);
-        let plan = state.restarts.small(axes::SIGMA);
+        let plan = state.restarts.small_run(coordinate_search::RESTART_SIGMA);
         let mut state = self.state.take().expect("it was there");
         state.run = self.run(plan, point, &oracle.shape().spacing);
         self.state = Some(state);
@@ -177,13 +183,13 @@ impl CmaEs {
 
     fn run(&self, plan: Plan, start: Vec<f64>, spacing: &[f64]) -> Run {
         // A fifth of the spacing still reaches the neighbouring value once in some generations.
-        let least = spacing.iter().map(|spacing| 0.2 * spacing).collect();
+        let min_deviation = spacing.iter().map(|spacing| 0.2 * spacing).collect();
         Run {
-            distribution: Distribution::new(start, plan.sigma, plan.population, least),
-            members: vec![vec![0.0; spacing.len()]; plan.population.max(Strategy::LEAST)],
+            distribution: Distribution::new(start, plan.sigma, plan.population, min_deviation),
+            members: vec![vec![0.0; spacing.len()]; plan.population.max(Strategy::MIN_POPULATION)],
             history: History::new(plan.sigma, self.options.tolerance),
             plan,
-            spent: 0,
+            evaluations: 0,
             improved: false,
         }
     }
@@ -194,9 +200,9 @@ impl State {
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<Option<End>, Halt> {
         let run = &mut self.run;
         let steps = run.distribution.sample(&mut self.random);
-        place(&mut run.members, &run.distribution, &steps);
+        place_members(&mut run.members, &run.distribution, &steps);
         let answers = oracle.evaluate(&run.members)?;
-        run.spent += answers.len();
+        run.evaluations += answers.len();
         let order = ranked(&answers);
         if answers[order[0]].merit.is_better_than(&self.best) {
             self.best = answers[order[0]].merit;
@@ -204,34 +210,34 @@ impl State {
             run.improved = true;
         }
         run.distribution.update(&steps, &order);
-        let values: Vec<f64> = order.iter().map(|&member| height(&answers[member])).collect();
-        let first = answers[order[0]].merit;
-        let comparable = first.is_feasible() && self.best.is_feasible();
-        let behind = if comparable { first.objective - self.best.objective } else { 0.0 };
-        let end = run.history.tell(&values, self.unit, behind, &run.distribution);
+        let values: Vec<f64> = order.iter().map(|&member| scalar_merit(&answers[member])).collect();
+        let generation_best = answers[order[0]].merit;
+        let comparable = generation_best.is_feasible() && self.best.is_feasible();
+        let deficit = if comparable { generation_best.objective - self.best.objective } else { 0.0 };
+        let end = run.history.record(&values, self.unit, deficit, &run.distribution);
         // A run that found the best point may go on for as long as it likes.
-        let over = run.spent >= run.plan.evaluations && !run.improved;
+        let over = run.evaluations >= run.plan.evaluations && !run.improved;
         Ok(end.or_else(|| over.then_some(End::Stagnated)))
     }
 }
 
 /// A number that falls as merits get better, to see whether anything still changes.
-fn height(evaluation: &Evaluation) -> f64 {
+fn scalar_merit(evaluation: &Evaluation) -> f64 {
     let Merit { objective, violation } = evaluation.merit;
     if evaluation.merit.is_feasible() { objective } else { violation.min(f64::MAX) }
 }
 
 /// Puts the members of a generation where their steps lead, reflected into the box.
-fn place(members: &mut [Vec<f64>], distribution: &Distribution, steps: &DMatrix<f64>) {
+fn place_members(members: &mut [Vec<f64>], distribution: &Distribution, steps: &DMatrix<f64>) {
     for (member, step) in members.iter_mut().zip(steps.column_iter()) {
         for ((coordinate, m), y) in member.iter_mut().zip(&distribution.mean).zip(&step) {
-            *coordinate = reflected(m + distribution.sigma * y);
+            *coordinate = reflect_into_box(m + distribution.sigma * y);
         }
     }
 }
 
 /// The coordinate in [0, 1] at which a ray that leaves the box arrives, reflected at every face it meets.
-fn reflected(u: f64) -> f64 {
+fn reflect_into_box(u: f64) -> f64 {
     let v = u.rem_euclid(2.0);
     if v <= 1.0 { v } else { (2.0 - v).max(0.0) }
 }
@@ -243,7 +249,7 @@ mod tests {
     #[test]
     fn coordinates_outside_are_reflected() {
         for (u, v) in [(0.3, 0.3), (-0.25, 0.25), (1.25, 0.75), (2.5, 0.5), (-1.5, 0.5), (1.0, 1.0), (0.0, 0.0)] {
-            assert_eq!(reflected(u), v, "{u}");
+            assert_eq!(reflect_into_box(u), v, "{u}");
         }
     }
 }

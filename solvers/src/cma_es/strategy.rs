@@ -31,18 +31,18 @@ pub struct Strategy {
 
 impl Strategy {
     /// The fewest members.
-    pub const LEAST: usize = 4;
+    pub const MIN_POPULATION: usize = 4;
 
     /// The usual number of members, `4 + 3 ln n`.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn usual_population(n: usize) -> usize {
+    pub fn default_population(n: usize) -> usize {
         4 + (3.0 * math::ln(n.max(1) as f64)) as usize
     }
 
     /// The constants.
     #[allow(clippy::cast_precision_loss)]
     pub fn new(n: usize, population: usize) -> Self {
-        let population = population.max(Self::LEAST);
+        let population = population.max(Self::MIN_POPULATION);
         let parents = population / 2;
         let nf = n as f64;
         let raw: Vec<f64> =
@@ -84,15 +84,15 @@ mod tests {
             let s = Strategy::new(n, population);
             assert!((s.weights[..s.parents].iter().sum::<f64>() - 1.0).abs() < 1e-12);
             assert!(s.weights.windows(2).all(|w| w[0] >= w[1]) && s.weights.last().unwrap() <= &0.0);
-            let kept = 1.0 - s.c_1 - s.c_mu * s.weights.iter().sum::<f64>();
-            assert!(kept >= -1e-12 && s.c_1 + s.c_mu <= 1.0 + 1e-12, "{n} {population} {kept}");
+            let remaining = 1.0 - s.c_1 - s.c_mu * s.weights.iter().sum::<f64>();
+            assert!(remaining >= -1e-12 && s.c_1 + s.c_mu <= 1.0 + 1e-12, "{n} {population} {remaining}");
         }
     }
 
     /// Values of the reference implementation's defaults for n = 10: population 10, effective number of parents 3.167.
     #[test]
     fn ten_dimensions_have_the_published_constants() {
-        let s = Strategy::new(10, Strategy::usual_population(10));
+        let s = Strategy::new(10, Strategy::default_population(10));
         assert_eq!((s.population, s.parents), (10, 5));
         assert!((s.effective - 3.1673).abs() < 1e-4, "{}", s.effective);
         assert!((s.chi - 3.0847).abs() < 1e-4, "{}", s.chi);

@@ -123,7 +123,7 @@ impl<S: Survival> Solver for Evolution<S> {
             members,
             generation: 0,
         });
-        self.keep_fittest();
+        self.select_survivors();
         Ok(())
     }
 
@@ -137,7 +137,7 @@ impl<S: Survival> Solver for Evolution<S> {
         let answers = oracle.evaluate(&state.children)?;
         state.members.points.append(&mut state.children);
         state.members.append(oracle.shape(), &answers);
-        self.keep_fittest();
+        self.select_survivors();
         Ok(Progress::Continue)
     }
 
@@ -149,13 +149,13 @@ impl<S: Survival> Solver for Evolution<S> {
 
 impl<S: Survival> Evolution<S> {
     /// Lets the fittest survive; what is left over becomes memory for children.
-    fn keep_fittest(&mut self) {
+    fn select_survivors(&mut self) {
         let Some(state) = &mut self.state else { return };
-        let chosen = self.survival.survive(&state.members, state.size, &mut state.random);
+        let survivors = self.survival.survive(&state.members, state.size, &mut state.random);
         let (all, next) = (&mut state.members, &mut state.next);
         next.objectives.clear();
         next.violations.clear();
-        for &i in chosen {
+        for &i in survivors {
             let i = i as usize;
             next.objectives.extend_from_slice(&all.objectives[i * all.m..(i + 1) * all.m]);
             next.violations.push(all.violations[i]);
@@ -167,11 +167,11 @@ impl<S: Survival> Evolution<S> {
 }
 
 /// Places of the feasible points and of the others, those by their violation.
-pub fn by_feasibility(pool: &Pool, feasible: &mut Vec<u32>, others: &mut Vec<u32>) {
+pub fn by_feasibility(pool: &Pool, feasible: &mut Vec<u32>, infeasible: &mut Vec<u32>) {
     feasible.clear();
-    others.clear();
+    infeasible.clear();
     for (i, &violation) in (0_u32..).zip(&pool.violations) {
-        if violation == 0.0 { feasible.push(i) } else { others.push(i) }
+        if violation == 0.0 { feasible.push(i) } else { infeasible.push(i) }
     }
-    others.sort_by(|&a, &b| pool.violations[a as usize].total_cmp(&pool.violations[b as usize]));
+    infeasible.sort_by(|&a, &b| pool.violations[a as usize].total_cmp(&pool.violations[b as usize]));
 }

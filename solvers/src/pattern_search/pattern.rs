@@ -4,7 +4,7 @@ use mops_core::Stream;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
-use super::points::Points;
+use super::point_buffer::PointBuffer;
 
 /// Directions of a pattern, one per column, turned at random.
 #[derive(Debug, Clone)]
@@ -14,12 +14,12 @@ pub struct Pattern {
 
 impl Pattern {
     /// Along the coordinates.
-    pub fn straight(n: usize) -> Self {
+    pub fn coordinate_axes(n: usize) -> Self {
         Self { basis: DMatrix::identity(n, n) }
     }
 
     /// Turns the pattern by a random reflection `I - 2 v v'`.
-    pub fn turn(&mut self, random: &mut Stream) {
+    pub fn rotate_randomly(&mut self, random: &mut Stream) {
         let n = self.basis.nrows();
         let v = DVector::from_fn(n, |_, _| random.random_range(-1.0..1.0));
         if v.norm_squared() > 1e-6 {
@@ -42,21 +42,21 @@ impl Pattern {
 
     /// Collects points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid
     /// away.
-    pub fn points(&self, centre: &[f64], size: f64, spacing: &[f64], points: &mut Points) {
+    pub fn points(&self, centre: &[f64], radius: f64, spacing: &[f64], points: &mut PointBuffer) {
         let n = centre.len();
         points.clear();
         for j in 0..n {
             for side in [1.0, -1.0] {
                 let at = |i: usize| {
-                    let by = if spacing[i] == 0.0 {
-                        side * size * self.basis[(i, j)]
+                    let offset = if spacing[i] == 0.0 {
+                        side * radius * self.basis[(i, j)]
                     } else if i == j {
                         // Along a grid the pattern keeps to its own coordinate, by whole steps.
-                        side * (size / spacing[i]).round().max(1.0) * spacing[i]
+                        side * (radius / spacing[i]).round().max(1.0) * spacing[i]
                     } else {
                         0.0
                     };
-                    (centre[i] + by).clamp(0.0, 1.0)
+                    (centre[i] + offset).clamp(0.0, 1.0)
                 };
                 points.push_if((0..n).map(at), |point, _| point != centre);
             }

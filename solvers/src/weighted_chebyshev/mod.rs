@@ -1,18 +1,18 @@
 //! Weighted Chebyshev: a front, point by point, each the solution of a min-max problem of its own.
 
-mod aim;
-mod gaps;
-mod known;
-mod rays;
+mod archive;
+mod rectangles;
+mod reference_directions;
+mod scalarisation;
 mod subproblem;
 
 use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use gaps::Gaps;
-use known::Place;
-use rays::Rays;
+use archive::Candidate;
+use rectangles::Rectangles;
+use reference_directions::ReferenceDirections;
 use subproblem::Subproblems;
 
 /// Points of the front of designs that no other is better than in every criterion, spread evenly, each the solution of a
@@ -78,23 +78,23 @@ struct State {
     start: Vec<f64>,
     subproblems: Subproblems,
     /// Points of the front.
-    front: Vec<Place>,
+    front: Vec<Candidate>,
     stage: Stage,
     /// Whether it was looked beyond every point.
-    looked: bool,
+    optimality_checked: bool,
 }
 
 enum Stage {
     /// The least of this criterion alone.
-    Least(usize),
+    SingleCriterion(usize),
     /// Between neighbours of two criteria.
-    Gaps(Gaps),
+    Rectangles(Rectangles),
     /// Along the rays of more criteria.
-    Rays(Rays),
+    ReferenceDirections(ReferenceDirections),
     /// The point that meets the demands best.
-    Demands,
+    MeetDemands,
     /// What is known to be better than a point of the front.
-    Better(usize),
+    ReplaceDominated(usize),
 }
 
 impl Solver for WeightedChebyshev {
@@ -120,8 +120,8 @@ impl Solver for WeightedChebyshev {
             start: start.to_vec(),
             subproblems: Subproblems::new(self.options.starts),
             front: Vec::new(),
-            stage: Stage::Least(0),
-            looked: false,
+            stage: Stage::SingleCriterion(0),
+            optimality_checked: false,
         });
         Ok(())
     }
@@ -133,64 +133,64 @@ impl Solver for WeightedChebyshev {
         }
         let points = match (self.options.points, oracle.shape().points) {
             (0, 0) => 30,
-            (0, asked) => asked,
+            (0, requested) => requested,
             (points, _) => points,
         };
         let criteria = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
         match &mut state.stage {
-            Stage::Least(k) => {
+            Stage::SingleCriterion(k) => {
                 let k = *k;
                 if k < criteria {
-                    if let Some(place) = state.subproblems.least(oracle, &state.start, k, criteria)? {
-                        state.front.push(place);
+                    if let Some(candidate) = state.subproblems.minimise_single(oracle, &state.start, k, criteria)? {
+                        state.front.push(candidate);
                     }
-                    state.stage = Stage::Least(k + 1);
+                    state.stage = Stage::SingleCriterion(k + 1);
                     return Ok(Progress::Continue);
                 }
                 if criteria == 0 {
-                    return state.subproblems.feasible(oracle, &state.start);
+                    return state.subproblems.find_feasible(oracle, &state.start);
                 }
                 if state.front.is_empty() {
                     return Ok(Progress::Stalled);
                 }
-                state.subproblems.measure(&state.front);
+                state.subproblems.set_ranges(&state.front);
                 state.stage = match criteria {
-                    1 => Stage::Better(0),
-                    2 => Stage::Gaps(Gaps::default()),
-                    _ => Stage::Rays(Rays::new(criteria, points)),
+                    1 => Stage::ReplaceDominated(0),
+                    2 => Stage::Rectangles(Rectangles::default()),
+                    _ => Stage::ReferenceDirections(ReferenceDirections::new(criteria, points)),
                 };
                 Ok(Progress::Continue)
             }
-            Stage::Gaps(gaps) => {
-                let more = gaps.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
+            Stage::Rectangles(rectangles) => {
+                let more = rectangles.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
                 if !more {
-                    state.stage = Stage::Demands;
+                    state.stage = Stage::MeetDemands;
                 }
                 Ok(Progress::Continue)
             }
-            Stage::Rays(rays) => {
-                if !rays.follow(oracle, &mut state.subproblems, &mut state.front)? {
-                    state.stage = Stage::Demands;
+            Stage::ReferenceDirections(reference_directions) => {
+                if !reference_directions.solve_next(oracle, &mut state.subproblems, &mut state.front)? {
+                    state.stage = Stage::MeetDemands;
                 }
                 Ok(Progress::Continue)
             }
-            Stage::Demands => {
-                let place = state.subproblems.demands(oracle, criteria)?;
-                insert(&mut state.front, place);
-                state.stage = Stage::Better(0);
+            Stage::MeetDemands => {
+                let candidate = state.subproblems.solve_for_demands(oracle, criteria)?;
+                insert(&mut state.front, candidate);
+                state.stage = Stage::ReplaceDominated(0);
                 Ok(Progress::Continue)
             }
-            Stage::Better(round) => {
+            Stage::ReplaceDominated(round) => {
                 *round += 1;
-                if *round <= MOST_ROUNDS && state.subproblems.better(oracle, &mut state.front)? {
+                if *round <= MAX_ROUNDS && state.subproblems.replace_dominated(oracle, &mut state.front)? {
                     return Ok(Progress::Continue);
                 }
-                if state.looked {
+                if state.optimality_checked {
                     return Ok(Progress::Converged);
                 }
-                state.looked = true;
-                state.stage = Stage::Better(0);
-                state.subproblems.look_beyond(oracle, &state.front);
+                state.optimality_checked = true;
+                state.stage = Stage::ReplaceDominated(0);
+                state.subproblems.check_optimality(oracle, &state.front);
                 Ok(Progress::Continue)
             }
         }
@@ -199,24 +199,25 @@ impl Solver for WeightedChebyshev {
     fn front(&self) -> Vec<Vec<f64>> {
         let Some(state) = &self.state else { return Vec::new() };
         // Cut short before the ends were known: all that was evaluated is worth more.
-        if matches!(state.stage, Stage::Least(_)) {
+        if matches!(state.stage, Stage::SingleCriterion(_)) {
             return Vec::new();
         }
-        state.front.iter().map(|place| place.point.clone()).collect()
+        state.front.iter().map(|candidate| candidate.point.clone()).collect()
     }
 }
 
 /// Rounds in which points known to be better replace those of the front.
-const MOST_ROUNDS: usize = 5;
+const MAX_ROUNDS: usize = 5;
 
 /// Keeps a point of the front, and no point that it is better than; whether it is one.
-fn insert(front: &mut Vec<Place>, place: Place) -> bool {
-    let range = vec![1.0; place.criteria.len()];
-    let beaten = |other: &Place| other.criteria == place.criteria || other.dominates(&place, &range, 0.0);
-    if front.iter().any(beaten) {
+fn insert(front: &mut Vec<Candidate>, candidate: Candidate) -> bool {
+    let range = vec![1.0; candidate.criteria.len()];
+    let is_dominated =
+        |other: &Candidate| other.criteria == candidate.criteria || other.dominates(&candidate, &range, 0.0);
+    if front.iter().any(is_dominated) {
         return false;
     }
-    front.retain(|other| !place.dominates(other, &range, 0.0));
-    front.push(place);
+    front.retain(|other| !candidate.dominates(other, &range, 0.0));
+    front.push(candidate);
     true
 }

@@ -3,14 +3,14 @@
 use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape, Stream};
 
 /// The oracle of one run: its best is the best of that run.
-pub struct Own<'a> {
+pub struct LocalArchive<'a> {
     /// That of all.
     pub oracle: &'a mut dyn Oracle,
     /// The best point of this run.
     pub best: &'a mut Option<Evaluation>,
 }
 
-impl Oracle for Own<'_> {
+impl Oracle for LocalArchive<'_> {
     fn shape(&self) -> &Shape {
         self.oracle.shape()
     }

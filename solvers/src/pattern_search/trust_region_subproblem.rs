@@ -4,46 +4,46 @@ use mops_core::math;
 use mops_core::{Shape, Usage};
 use nalgebra::DMatrix;
 
-use super::barrier::{Promise, violation};
-use super::models::Models;
-use crate::definite::cholesky;
+use super::barrier::{PredictedReduction, violation};
+use super::quadratic_models::QuadraticModels;
+use crate::cholesky::factorise;
 use crate::epigraph::{Direction, Subproblem};
-use crate::rows::{Multipliers, Rows};
+use crate::linearised_criteria::{LinearisedCriteria, Multipliers};
 
 /// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
-pub struct Aim<'a> {
+pub struct PenalisedObjective<'a> {
     /// Sizes and kinds.
     pub shape: &'a Shape,
     /// Factor of the objective.
-    pub unit: f64,
+    pub objective_scale: f64,
     /// Weight of the largest violation.
     pub penalty: f64,
 }
 
-impl Aim<'_> {
+impl PenalisedObjective<'_> {
     /// The penalised objective of scaled values.
-    pub fn worth(&self, scaled: &[f64]) -> f64 {
+    pub fn value(&self, scaled: &[f64]) -> f64 {
         let merit = self.shape.merit(scaled);
-        self.unit * merit.objective + self.penalty * merit.violation
+        self.objective_scale * merit.objective + self.penalty * merit.violation
     }
 
     /// The rows of the models, with given values, after a step.
-    fn rows(&self, models: &Models, y: &[f64], values: &[f64], rows: &mut Rows) {
-        rows.fill(self.shape, values, y.len(), |row, weight, sum| models.add_slope(row, y, weight, sum));
-        rows.multiply_objective(self.unit);
+    fn linearise(&self, models: &QuadraticModels, y: &[f64], values: &[f64], criteria: &mut LinearisedCriteria) {
+        criteria.fill(self.shape, values, y.len(), |row, weight, sum| models.add_gradient(row, y, weight, sum));
+        criteria.scale_objective(self.objective_scale);
     }
 
     /// The curvature of the Lagrangian.
-    fn curvature(&self, models: &Models, multipliers: &Multipliers, curvature: &mut DMatrix<f64>) {
+    fn lagrangian_hessian(&self, models: &QuadraticModels, multipliers: &Multipliers, hessian: &mut DMatrix<f64>) {
         let sum = multipliers.objectives.len() == 1;
         let (mut objective, mut inequality, mut equality) = (0, 0, 0);
-        curvature.fill(0.0);
+        hessian.fill(0.0);
         for (row, (usage, weight)) in self.shape.rows.iter().enumerate() {
             let weight = match usage {
                 Usage::Minimise => {
                     let multiplier = multipliers.objectives[if sum { 0 } else { objective }];
                     objective += 1;
-                    self.unit * weight * multiplier
+                    self.objective_scale * weight * multiplier
                 }
                 Usage::Inequality => {
                     inequality += 1;
@@ -55,42 +55,45 @@ impl Aim<'_> {
                 }
                 Usage::Monitor => continue,
             };
-            models.add_curvature(row, weight, curvature);
+            models.add_hessian(row, weight, hessian);
         }
     }
 
     /// How much more a unit of violation counts than one of the objective.
-    pub fn weight(&self) -> f64 {
-        self.penalty / self.unit
+    pub fn relative_penalty(&self) -> f64 {
+        self.penalty / self.objective_scale
     }
 
     /// What a step promises that leads from some scaled values to others.
-    pub fn promise(&self, from: &[f64], to: &[f64]) -> Promise {
+    pub fn predicted_reduction(&self, from: &[f64], to: &[f64]) -> PredictedReduction {
         let [before, after] = [from, to].map(|scaled| self.shape.merit(scaled));
-        Promise { objective: before.objective - after.objective, violation: violation(&before) - violation(&after) }
+        PredictedReduction {
+            objective: before.objective - after.objective,
+            violation: violation(&before) - violation(&after),
+        }
     }
 
     /// By how much the penalised objective falls if a promise is kept.
-    pub fn worth_of(&self, promise: &Promise) -> f64 {
-        (self.unit * promise.objective + self.penalty * promise.violation).max(0.0)
+    pub fn penalised_reduction(&self, predicted: &PredictedReduction) -> f64 {
+        (self.objective_scale * predicted.objective + self.penalty * predicted.violation).max(0.0)
     }
 }
 
 /// The search for the least of the models' penalised objective, with its memory, which is used again from step to step.
 #[derive(Default)]
-pub struct Least {
+pub struct TrustRegionSubproblem {
     /// The step that was found.
     y: Vec<f64>,
     /// The values of all rows after it.
     values: Vec<f64>,
     /// Another step, and the values after it.
-    there: Vec<f64>,
-    values_there: Vec<f64>,
+    trial: Vec<f64>,
+    trial_values: Vec<f64>,
     /// The first step and its values, while others are looked at.
     first: [Vec<f64>; 2],
-    rows: Rows,
-    rows_there: Rows,
-    corrected: Rows,
+    criteria: LinearisedCriteria,
+    trial_criteria: LinearisedCriteria,
+    corrected: LinearisedCriteria,
     hessian: DMatrix<f64>,
     factor: Vec<f64>,
     multipliers: Multipliers,
@@ -101,7 +104,7 @@ pub struct Least {
     subproblem: Subproblem,
 }
 
-impl Least {
+impl TrustRegionSubproblem {
     /// The step that was found.
     pub fn step(&self) -> &[f64] {
         &self.y
@@ -116,30 +119,36 @@ impl Least {
     /// that grows until the violation falls by most of what the models let it fall. `false` where no step lessens it.
     ///
     /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
-    pub fn find(&mut self, aim: &mut Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
-        let mut found = self.search(aim, models, low, high);
-        let mut left = self.violation(aim.shape);
-        if left == 0.0 {
+    pub fn solve(
+        &mut self,
+        objective: &mut PenalisedObjective,
+        models: &QuadraticModels,
+        low: &[f64],
+        high: &[f64],
+    ) -> bool {
+        let mut found = self.minimise(objective, models, low, high);
+        let mut remaining = self.violation(objective.shape);
+        if remaining == 0.0 {
             return found;
         }
-        self.swap_first();
-        self.search(&Aim { penalty: LARGEST_PENALTY, ..*aim }, models, low, high);
-        let least = self.violation(aim.shape);
-        let before = violation(&aim.shape.merit(models.constants()));
-        let wanted = least + 0.1 * (before - least).max(0.0);
-        if left <= wanted || aim.penalty >= LARGEST_PENALTY {
-            self.swap_first();
+        self.swap_with_first();
+        self.minimise(&PenalisedObjective { penalty: LARGEST_PENALTY, ..*objective }, models, low, high);
+        let smallest = self.violation(objective.shape);
+        let before = violation(&objective.shape.merit(models.constants()));
+        let target = smallest + 0.1 * (before - smallest).max(0.0);
+        if remaining <= target || objective.penalty >= LARGEST_PENALTY {
+            self.swap_with_first();
             return found;
         }
-        while left > wanted && aim.penalty < LARGEST_PENALTY {
-            aim.penalty *= 10.0;
-            found = self.search(aim, models, low, high);
-            left = self.violation(aim.shape);
+        while remaining > target && objective.penalty < LARGEST_PENALTY {
+            objective.penalty *= 10.0;
+            found = self.minimise(objective, models, low, high);
+            remaining = self.violation(objective.shape);
         }
         found
     }
 
-    fn swap_first(&mut self) {
+    fn swap_with_first(&mut self) {
         std::mem::swap(&mut self.y, &mut self.first[0]);
         std::mem::swap(&mut self.values, &mut self.first[1]);
     }
@@ -149,13 +158,19 @@ impl Least {
         violation(&shape.merit(&self.values))
     }
 
-    /// As [`Least::find`], from `y = 0`, by sequential quadratic programming on the models, in a trust region of its own and
+    /// As [`TrustRegionSubproblem::solve`], from `y = 0`, by sequential quadratic programming on the models, in a trust region of its own and
     /// with second-order corrections.
-    fn search(&mut self, aim: &Aim, models: &Models, low: &[f64], high: &[f64]) -> bool {
+    fn minimise(
+        &mut self,
+        objective: &PenalisedObjective,
+        models: &QuadraticModels,
+        low: &[f64],
+        high: &[f64],
+    ) -> bool {
         let n = low.len();
-        let Self { y, values, there, values_there, rows, rows_there, corrected, hessian, factor, .. } = self;
+        let Self { y, values, trial, trial_values, criteria, trial_criteria, corrected, hessian, factor, .. } = self;
         let Self { multipliers, low: inner_low, high: inner_high, subproblem, .. } = self;
-        let [direction, again] = &mut self.directions;
+        let [direction, correction] = &mut self.directions;
         if hessian.nrows() != n {
             *hessian = DMatrix::zeros(n, n);
         }
@@ -163,61 +178,64 @@ impl Least {
         y.resize(n, 0.0);
         values.clear();
         values.extend_from_slice(models.constants());
-        let begin = aim.worth(values);
-        let mut worth = begin;
-        aim.rows(models, y, values, rows);
-        on_top(rows, multipliers);
-        let (mut reach, mut failures) = (1.0_f64, 0);
+        let initial_value = objective.value(values);
+        let mut value = initial_value;
+        objective.linearise(models, y, values, criteria);
+        initial_multipliers(criteria, multipliers);
+        let (mut radius, mut failures) = (1.0_f64, 0);
         for _ in 0..INNER_ITERATIONS {
-            aim.curvature(models, multipliers, hessian);
+            objective.lagrangian_hessian(models, multipliers, hessian);
             make_convex(hessian, factor);
             inner_low.clear();
-            inner_low.extend(low.iter().zip(&*y).map(|(low, y)| (low - y).clamp(-reach, 0.0)));
+            inner_low.extend(low.iter().zip(&*y).map(|(low, y)| (low - y).clamp(-radius, 0.0)));
             inner_high.clear();
-            inner_high.extend(high.iter().zip(&*y).map(|(high, y)| (high - y).clamp(0.0, reach)));
+            inner_high.extend(high.iter().zip(&*y).map(|(high, y)| (high - y).clamp(0.0, radius)));
             let mut try_step = |y: &[f64], step: &[f64], values: &mut Vec<f64>| {
-                there.clear();
-                there.extend(y.iter().zip(step).map(|(y, d)| y + d));
-                models.values(there, values);
-                aim.worth(values)
+                trial.clear();
+                trial.extend(y.iter().zip(step).map(|(y, d)| y + d));
+                models.values(trial, values);
+                objective.value(values)
             };
-            if subproblem.solve(rows, hessian, [inner_low, inner_high], aim.penalty, direction).is_none() {
+            if subproblem.solve(criteria, hessian, [inner_low, inner_high], objective.penalty, direction).is_none() {
                 break;
             }
             let length = direction.step.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
             if length == 0.0 {
                 break;
             }
-            let mut found = try_step(y, &direction.step, values_there);
-            if found >= worth {
-                rows_there.evaluate(aim.shape, values_there);
-                rows_there.multiply_objective(aim.unit);
-                corrected.correct(rows, rows_there, &direction.step);
-                if subproblem.solve(corrected, hessian, [inner_low, inner_high], aim.penalty, again).is_some() {
-                    found = try_step(y, &again.step, values_there);
+            let mut found = try_step(y, &direction.step, trial_values);
+            if found >= value {
+                trial_criteria.evaluate(objective.shape, trial_values);
+                trial_criteria.scale_objective(objective.objective_scale);
+                corrected.assign_second_order_correction(criteria, trial_criteria, &direction.step);
+                if subproblem
+                    .solve(corrected, hessian, [inner_low, inner_high], objective.penalty, correction)
+                    .is_some()
+                {
+                    found = try_step(y, &correction.step, trial_values);
                 }
             }
             // Even where the step failed, its multipliers tell more of the curvature.
             std::mem::swap(multipliers, &mut direction.multipliers);
-            if found >= worth {
+            if found >= value {
                 failures += 1;
-                reach = 0.3 * length.min(reach);
+                radius = 0.3 * length.min(radius);
                 if failures > INNER_FAILURES {
                     break;
                 }
                 continue;
             }
-            let gained = worth - found;
-            worth = found;
-            std::mem::swap(y, there);
-            std::mem::swap(values, values_there);
-            if gained < 1e-3 * (begin - worth) {
+            let decrease = value - found;
+            value = found;
+            std::mem::swap(y, trial);
+            std::mem::swap(values, trial_values);
+            if decrease < 1e-3 * (initial_value - value) {
                 break;
             }
-            reach = 2.0 * length.max(reach);
-            aim.rows(models, y, values, rows);
+            radius = 2.0 * length.max(radius);
+            objective.linearise(models, y, values, criteria);
         }
-        worth < begin
+        value < initial_value
     }
 }
 
@@ -231,24 +249,24 @@ const INNER_ITERATIONS: usize = 30;
 const INNER_FAILURES: usize = 8;
 
 /// At first the largest row has all the weight.
-fn on_top(rows: &Rows, multipliers: &mut Multipliers) {
-    let top = rows.objective();
-    let count = rows.objectives.iter().filter(|row| row.value >= top).count();
+fn initial_multipliers(criteria: &LinearisedCriteria, multipliers: &mut Multipliers) {
+    let maximum = criteria.objective();
+    let count = criteria.objectives.iter().filter(|row| row.value >= maximum).count();
     #[allow(clippy::cast_precision_loss)]
     let share = 1.0 / count.max(1) as f64;
     multipliers.objectives.clear();
-    multipliers.objectives.extend(rows.objectives.iter().map(|row| if row.value >= top { share } else { 0.0 }));
+    multipliers.objectives.extend(criteria.objectives.iter().map(|row| if row.value >= maximum { share } else { 0.0 }));
     multipliers.inequalities.clear();
-    multipliers.inequalities.resize(rows.inequalities.len(), 0.0);
+    multipliers.inequalities.resize(criteria.inequalities.len(), 0.0);
     multipliers.equalities.clear();
-    multipliers.equalities.resize(rows.equalities.len(), 0.0);
+    multipliers.equalities.resize(criteria.equalities.len(), 0.0);
 }
 
 /// The first multiple of the identity that is added to a matrix that is not positive definite, relative to its norm.
-const ADDED: f64 = 1e-3;
+const FIRST_SHIFT: f64 = 1e-3;
 
 /// What the smallest eigenvalue is to exceed, relative to the largest entry.
-const POSITIVE: f64 = 1e-8;
+const MIN_EIGENVALUE: f64 = 1e-8;
 
 /// Makes a symmetric matrix positive definite, where it is not, by a multiple of the identity; one that is 0 or not finite
 /// becomes a small multiple itself.
@@ -266,24 +284,24 @@ fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
         return;
     }
     // In units of the largest entry, so that nothing overflows: no eigenvalue is below -n.
-    let least = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
-    let first = ADDED * matrix.iter().map(|h| math::powi(h / size, 2)).sum::<f64>().sqrt();
-    let mut added = if least > -POSITIVE { 0.0 } else { first - least };
+    let smallest = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
+    let first = FIRST_SHIFT * matrix.iter().map(|h| math::powi(h / size, 2)).sum::<f64>().sqrt();
+    let mut shift = if smallest > -MIN_EIGENVALUE { 0.0 } else { first - smallest };
     loop {
         factor.clear();
         factor.extend(matrix.iter().map(|h| h / size));
-        (0..n).for_each(|i| factor[i * n + i] += added - POSITIVE);
-        if cholesky(factor, n, n) {
-            (0..n).for_each(|i| matrix[(i, i)] += added * size);
+        (0..n).for_each(|i| factor[i * n + i] += shift - MIN_EIGENVALUE);
+        if factorise(factor, n, n) {
+            (0..n).for_each(|i| matrix[(i, i)] += shift * size);
             return;
         }
-        added = if added == 0.0 { 2.0 * POSITIVE } else { first.max(2.0 * added) };
+        shift = if shift == 0.0 { 2.0 * MIN_EIGENVALUE } else { first.max(2.0 * shift) };
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::models::tests::through;
+    use super::super::quadratic_models::tests::through;
     use super::*;
 
     #[test]
@@ -291,11 +309,16 @@ mod tests {
         // y^2 and (y - 1)^2 meet at 1/2.
         let models = through(&[[0.0], [1.0], [-1.0]], |y| vec![y[0] * y[0], math::powi(y[0] - 1.0, 2)]);
         let shape = Shape { spacing: vec![0.0], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
-        let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
-        let mut least = Least::default();
-        assert!(least.find(&mut aim, &models, &[-1.0], &[1.0]));
-        let promise = aim.worth_of(&aim.promise(models.constants(), least.values()));
-        assert!((least.step()[0] - 0.5).abs() < 1e-3 && (promise - 0.75).abs() < 1e-3, "{:?} {promise}", least.step());
+        let mut objective = PenalisedObjective { shape: &shape, objective_scale: 1.0, penalty: 10.0 };
+        let mut subproblem = TrustRegionSubproblem::default();
+        assert!(subproblem.solve(&mut objective, &models, &[-1.0], &[1.0]));
+        let predicted_reduction =
+            objective.penalised_reduction(&objective.predicted_reduction(models.constants(), subproblem.values()));
+        assert!(
+            (subproblem.step()[0] - 0.5).abs() < 1e-3 && (predicted_reduction - 0.75).abs() < 1e-3,
+            "{:?} {predicted_reduction}",
+            subproblem.step()
+        );
     }
 
     #[test]
@@ -306,10 +329,10 @@ mod tests {
         let models = through(&steps, |y| f(&[y[0], y[1] + 1.0]));
         let usages = vec![(Usage::Minimise, 1.0), (Usage::Inequality, 1.0)];
         let shape = Shape { spacing: vec![0.0; 2], rows: usages, ..Shape::default() };
-        let mut aim = Aim { shape: &shape, unit: 1.0, penalty: 10.0 };
-        let mut least = Least::default();
-        assert!(least.find(&mut aim, &models, &[-1.0; 2], &[1.0; 2]));
-        let y = least.step();
+        let mut objective = PenalisedObjective { shape: &shape, objective_scale: 1.0, penalty: 10.0 };
+        let mut subproblem = TrustRegionSubproblem::default();
+        assert!(subproblem.solve(&mut objective, &models, &[-1.0; 2], &[1.0; 2]));
+        let y = subproblem.step();
         assert!(y[0] > 0.15 && f(&[y[0], y[1] + 1.0])[1] < 1.0 + 1e-3, "{y:?}");
     }
 
@@ -325,9 +348,9 @@ mod tests {
         for size in [1.0, 1e-300, 1e300] {
             let mut matrix = &indefinite * size;
             make_convex(&mut matrix, &mut factor);
-            let added = matrix / size - &indefinite;
-            assert!(added[(0, 0)] > 1.0 && added[(0, 0)] <= 2.1, "{added}");
-            assert!((&added - DMatrix::identity(2, 2) * added[(0, 0)]).amax() < 1e-12);
+            let shift = matrix / size - &indefinite;
+            assert!(shift[(0, 0)] > 1.0 && shift[(0, 0)] <= 2.1, "{shift}");
+            assert!((&shift - DMatrix::identity(2, 2) * shift[(0, 0)]).amax() < 1e-12);
         }
         let mut flat = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 0.0]);
         make_convex(&mut flat, &mut factor);

@@ -2,12 +2,12 @@
 
 /// Points, in memory that is used again.
 #[derive(Debug, Default)]
-pub struct Points {
-    all: Vec<Vec<f64>>,
+pub struct PointBuffer {
+    points: Vec<Vec<f64>>,
     count: usize,
 }
 
-impl Points {
+impl PointBuffer {
     /// Forgets all.
     pub fn clear(&mut self) {
         self.count = 0;
@@ -15,10 +15,10 @@ impl Points {
 
     /// Adds a point with given coordinates.
     pub fn push(&mut self, coordinates: impl Iterator<Item = f64>) {
-        if self.count == self.all.len() {
-            self.all.push(Vec::new());
+        if self.count == self.points.len() {
+            self.points.push(Vec::new());
         }
-        let point = &mut self.all[self.count];
+        let point = &mut self.points[self.count];
         point.clear();
         point.extend(coordinates);
         self.count += 1;
@@ -28,17 +28,17 @@ impl Points {
     pub fn push_if(
         &mut self,
         coordinates: impl Iterator<Item = f64>,
-        is_wanted: impl FnOnce(&[f64], &[Vec<f64>]) -> bool,
+        is_accepted: impl FnOnce(&[f64], &[Vec<f64>]) -> bool,
     ) {
         self.push(coordinates);
-        let (last, before) = self.all[..self.count].split_last().expect("one was added");
-        if !is_wanted(last, before) {
+        let (last, previous) = self.points[..self.count].split_last().expect("one was added");
+        if !is_accepted(last, previous) {
             self.count -= 1;
         }
     }
 
     pub fn as_slice(&self) -> &[Vec<f64>] {
-        &self.all[..self.count]
+        &self.points[..self.count]
     }
 
     pub fn len(&self) -> usize {
@@ -52,10 +52,10 @@ mod tests {
 
     #[test]
     fn a_list_forgets_what_was_in_it() {
-        let mut points = Points::default();
+        let mut points = PointBuffer::default();
         points.push([1.0, 2.0].into_iter());
-        points.push_if([1.0, 2.0].into_iter(), |point, before| point != before[0]);
-        points.push_if([3.0].into_iter(), |point, before| point != before[0]);
+        points.push_if([1.0, 2.0].into_iter(), |point, previous| point != previous[0]);
+        points.push_if([3.0].into_iter(), |point, previous| point != previous[0]);
         assert_eq!(points.as_slice(), [vec![1.0, 2.0], vec![3.0]]);
         points.clear();
         points.push([4.0].into_iter());

@@ -16,7 +16,7 @@ pub(crate) struct Cost<'a> {
 struct State<'a> {
     oracle: &'a mut dyn Oracle,
     halt: Option<Halt>,
-    unit: Option<f64>,
+    objective_scale: Option<f64>,
 }
 
 /// What a point costs once the run is over: argmin ends at the target cost, and not all of its solvers take an error.
@@ -24,13 +24,13 @@ const HALTED: f64 = f64::NEG_INFINITY;
 
 impl<'a> Cost<'a> {
     /// `unit` brings the objective to the order of 1; it is found from the first value where absent.
-    pub fn new(oracle: &'a mut dyn Oracle, unit: Option<f64>) -> Self {
-        Self { state: Mutex::new(State { oracle, halt: None, unit }) }
+    pub fn new(oracle: &'a mut dyn Oracle, objective_scale: Option<f64>) -> Self {
+        Self { state: Mutex::new(State { oracle, halt: None, objective_scale }) }
     }
 
     /// The factor of the objective.
-    pub fn unit(&self) -> Option<f64> {
-        self.state.lock().expect("nobody panics holding the lock").unit
+    pub fn objective_scale(&self) -> Option<f64> {
+        self.state.lock().expect("nobody panics holding the lock").objective_scale
     }
 
     /// Why the oracle stopped answering, if it did.
@@ -54,10 +54,11 @@ impl CostFunction for &Cost<'_> {
             Ok(answers) => {
                 let cost = penalised(&answers[0]);
                 // argmin's tolerances are absolute: bring the objective to the order of 1.
-                if state.unit.is_none() && cost.is_finite() && cost != 0.0 {
-                    state.unit = Some(if (1e-3..1e3).contains(&cost.abs()) { 1.0 } else { 1.0 / cost.abs() });
+                if state.objective_scale.is_none() && cost.is_finite() && cost != 0.0 {
+                    state.objective_scale =
+                        Some(if (1e-3..1e3).contains(&cost.abs()) { 1.0 } else { 1.0 / cost.abs() });
                 }
-                Ok(cost * state.unit.unwrap_or(1.0) + 10.0 * outside)
+                Ok(cost * state.objective_scale.unwrap_or(1.0) + 10.0 * outside)
             }
             Err(halt) => {
                 state.halt = Some(halt);

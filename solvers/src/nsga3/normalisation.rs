@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601, section IV C.
 #[derive(Debug, Clone, Default)]
-pub struct Scale {
+pub struct Normalisation {
     ideal: Vec<f64>,
     nadir: Vec<f64>,
     /// The worst of every objective ever seen.
@@ -14,7 +14,7 @@ pub struct Scale {
     extremes: Vec<Vec<f64>>,
 }
 
-impl Scale {
+impl Normalisation {
     /// Of `m` objectives, before any point.
     pub fn new(m: usize) -> Self {
         Self {
@@ -37,12 +37,12 @@ impl Scale {
         // Extreme along an axis: the least of what the achievement function of that axis gives.
         let extremes: Vec<Vec<f64>> = (0..m)
             .map(|axis| {
-                let height = |row: &[f64]| {
+                let achievement = |row: &[f64]| {
                     let weight = |k: usize| if k == axis { 1.0 } else { 1e6 };
                     (0..m).map(|k| (row[k] - self.ideal[k]) * weight(k)).fold(0.0, f64::max)
                 };
                 let all = self.extremes.iter().map(Vec::as_slice).chain(front.iter().copied());
-                all.min_by(|a, b| height(a).total_cmp(&height(b))).map(<[f64]>::to_vec).unwrap_or_default()
+                all.min_by(|a, b| achievement(a).total_cmp(&achievement(b))).map(<[f64]>::to_vec).unwrap_or_default()
             })
             .collect();
         self.extremes = extremes;

@@ -6,42 +6,42 @@ use crate::active_set::dot;
 
 /// A function's value and slope.
 #[derive(Debug, Default)]
-pub struct Linear {
+pub struct LinearModel {
     /// Value.
     pub value: f64,
     /// Slope along every coordinate.
-    pub slope: Vec<f64>,
+    pub gradient: Vec<f64>,
 }
 
 // N.B.: a derived `clone_from` asks for memory anew.
-impl Clone for Linear {
+impl Clone for LinearModel {
     fn clone(&self) -> Self {
-        Self { value: self.value, slope: self.slope.clone() }
+        Self { value: self.value, gradient: self.gradient.clone() }
     }
 
     fn clone_from(&mut self, other: &Self) {
         self.value = other.value;
-        self.slope.clone_from(&other.slope);
+        self.gradient.clone_from(&other.gradient);
     }
 }
 
 /// The rows of a problem at a point, sorted by what they are for. They are filled again from point to point: memory once asked
 /// for is kept.
 #[derive(Debug, Default)]
-pub struct Rows {
+pub struct LinearisedCriteria {
     /// To be minimised: the largest of them. One row, their sum, where the objective is a sum.
-    pub objectives: Vec<Linear>,
+    pub objectives: Vec<LinearModel>,
     /// At most 0.
-    pub inequalities: Vec<Linear>,
+    pub inequalities: Vec<LinearModel>,
     /// Equal to 0.
-    pub equalities: Vec<Linear>,
+    pub equalities: Vec<LinearModel>,
 }
 
-impl Clone for Rows {
+impl Clone for LinearisedCriteria {
     fn clone(&self) -> Self {
-        let mut rows = Self::default();
-        rows.clone_from(self);
-        rows
+        let mut criteria = Self::default();
+        criteria.clone_from(self);
+        criteria
     }
 
     fn clone_from(&mut self, other: &Self) {
@@ -51,19 +51,19 @@ impl Clone for Rows {
     }
 }
 
-impl Rows {
+impl LinearisedCriteria {
     /// The rows of a linearisation.
-    pub fn of(shape: &Shape, at: &Linearisation) -> Self {
-        let mut rows = Self::default();
-        rows.linearise(shape, at);
-        rows
+    pub fn from_linearisation(shape: &Shape, at: &Linearisation) -> Self {
+        let mut criteria = Self::default();
+        criteria.linearise(shape, at);
+        criteria
     }
 
     /// The rows of given scaled values, without slopes.
-    pub fn of_values(shape: &Shape, scaled: &[f64]) -> Self {
-        let mut rows = Self::default();
-        rows.evaluate(shape, scaled);
-        rows
+    pub fn from_values(shape: &Shape, scaled: &[f64]) -> Self {
+        let mut criteria = Self::default();
+        criteria.evaluate(shape, scaled);
+        criteria
     }
 
     /// Becomes the rows of a linearisation.
@@ -82,44 +82,44 @@ impl Rows {
     /// Becomes the rows of given scaled values, with slopes of length `n`: `add` adds the slope of a row, times a weight, to
     /// what it is given.
     pub fn fill(&mut self, shape: &Shape, scaled: &[f64], n: usize, mut add: impl FnMut(usize, f64, &mut [f64])) {
-        let joined = shape.objective == Objective::Sum;
-        let mut counts = [0; 3];
+        let is_sum = shape.objective == Objective::Sum;
+        let mut lengths = [0; 3];
         for (i, ((usage, weight), value)) in shape.rows.iter().zip(scaled).enumerate() {
-            let (group, weight, rows) = match usage {
+            let (group, weight, criteria) = match usage {
                 Usage::Minimise => (0, *weight, &mut self.objectives),
                 Usage::Inequality => (1, 1.0, &mut self.inequalities),
                 Usage::Equality => (2, 1.0, &mut self.equalities),
                 Usage::Monitor => continue,
             };
-            if group > 0 || !joined || counts[0] == 0 {
-                clear(rows, counts[group], n);
-                counts[group] += 1;
+            if group > 0 || !is_sum || lengths[0] == 0 {
+                reset(criteria, lengths[group], n);
+                lengths[group] += 1;
             }
-            let row = &mut rows[counts[group] - 1];
+            let row = &mut criteria[lengths[group] - 1];
             row.value += weight * value - if group > 0 { 1.0 } else { 0.0 };
-            add(i, weight, &mut row.slope);
+            add(i, weight, &mut row.gradient);
         }
-        if counts[0] == 0 {
-            clear(&mut self.objectives, 0, n);
-            counts[0] = 1;
+        if lengths[0] == 0 {
+            reset(&mut self.objectives, 0, n);
+            lengths[0] = 1;
         }
-        self.objectives.truncate(counts[0]);
-        self.inequalities.truncate(counts[1]);
-        self.equalities.truncate(counts[2]);
+        self.objectives.truncate(lengths[0]);
+        self.inequalities.truncate(lengths[1]);
+        self.equalities.truncate(lengths[2]);
     }
 
     /// A factor that brings the objective to the order of 1, where it is far from it: scaled values are near 1 unless
     /// the demands are far from what can be had.
-    pub fn unit(&self) -> f64 {
+    pub fn objective_scale(&self) -> f64 {
         let largest = self.objectives.iter().map(|row| row.value.abs()).fold(0.0, f64::max);
         if (1e-3..1e3).contains(&largest) || largest == 0.0 { 1.0 } else { 1.0 / largest }
     }
 
     /// Takes the objective in other units.
-    pub fn multiply_objective(&mut self, factor: f64) {
+    pub fn scale_objective(&mut self, factor: f64) {
         for row in &mut self.objectives {
             row.value *= factor;
-            row.slope.iter_mut().for_each(|s| *s *= factor);
+            row.gradient.iter_mut().for_each(|s| *s *= factor);
         }
     }
 
@@ -135,17 +135,17 @@ impl Rows {
     }
 
     /// The slope of the Lagrangian for the given multipliers, into `slope`.
-    pub fn lagrangian_slope(&self, multipliers: &Multipliers, slope: &mut Vec<f64>) {
-        slope.clear();
-        slope.resize(self.objectives[0].slope.len(), 0.0);
+    pub fn lagrangian_gradient(&self, multipliers: &Multipliers, gradient: &mut Vec<f64>) {
+        gradient.clear();
+        gradient.resize(self.objectives[0].gradient.len(), 0.0);
         let parts = [
             (&self.objectives, &multipliers.objectives),
             (&self.inequalities, &multipliers.inequalities),
             (&self.equalities, &multipliers.equalities),
         ];
-        for (rows, multipliers) in parts {
-            for (row, multiplier) in rows.iter().zip(multipliers) {
-                for (sum, s) in slope.iter_mut().zip(&row.slope) {
+        for (criteria, multipliers) in parts {
+            for (row, multiplier) in criteria.iter().zip(multipliers) {
+                for (sum, s) in gradient.iter_mut().zip(&row.gradient) {
                     *sum += multiplier * s;
                 }
             }
@@ -154,18 +154,24 @@ impl Rows {
 
     /// Becomes the rows of a point `here`, with those of other points as they extend to it; none above the row here, so that no
     /// piece contradicts what is known. `back` is room for the way from a point to here.
-    pub fn gather(&mut self, rows: &Self, here: &[f64], pieces: &[(Vec<f64>, Self)], back: &mut Vec<f64>) {
-        let groups = [(&mut self.objectives, &rows.objectives), (&mut self.inequalities, &rows.inequalities)];
-        for (all, rows) in groups {
-            all.resize_with(rows.len() * (1 + pieces.len()), Linear::default);
-            all[..rows.len()].clone_from_slice(rows);
+    pub fn assign_with_cuts(
+        &mut self,
+        criteria: &Self,
+        here: &[f64],
+        cuts: &[(Vec<f64>, Self)],
+        offset: &mut Vec<f64>,
+    ) {
+        let groups = [(&mut self.objectives, &criteria.objectives), (&mut self.inequalities, &criteria.inequalities)];
+        for (all, criteria) in groups {
+            all.resize_with(criteria.len() * (1 + cuts.len()), LinearModel::default);
+            all[..criteria.len()].clone_from_slice(criteria);
         }
-        self.equalities.clone_from(&rows.equalities);
-        for (k, (there, piece)) in pieces.iter().enumerate() {
-            back.clear();
-            back.extend(here.iter().zip(there).map(|(here, there)| here - there));
-            extend(&mut self.objectives, &rows.objectives, &piece.objectives, (k, back));
-            extend(&mut self.inequalities, &rows.inequalities, &piece.inequalities, (k, back));
+        self.equalities.clone_from(&criteria.equalities);
+        for (k, (there, cut)) in cuts.iter().enumerate() {
+            offset.clear();
+            offset.extend(here.iter().zip(there).map(|(here, there)| here - there));
+            append_cuts(&mut self.objectives, &criteria.objectives, &cut.objectives, (k, offset));
+            append_cuts(&mut self.inequalities, &criteria.inequalities, &cut.inequalities, (k, offset));
         }
     }
 
@@ -173,10 +179,10 @@ impl Rows {
     /// `step`.
     ///
     /// Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition (2006), section 18.3.
-    pub fn correct(&mut self, here: &Self, there: &Self, step: &[f64]) {
+    pub fn assign_second_order_correction(&mut self, here: &Self, there: &Self, step: &[f64]) {
         self.clone_from(here);
-        let correct = |rows: &mut [Linear], there: &[Linear]| {
-            rows.iter_mut().zip(there).for_each(|(row, there)| row.value = there.value - dot(&row.slope, step));
+        let correct = |criteria: &mut [LinearModel], there: &[LinearModel]| {
+            criteria.iter_mut().zip(there).for_each(|(row, there)| row.value = there.value - dot(&row.gradient, step));
         };
         correct(&mut self.objectives, &there.objectives);
         correct(&mut self.inequalities, &there.inequalities);
@@ -185,23 +191,23 @@ impl Rows {
 }
 
 /// Puts the pieces of one more point, the `k`-th, after the rows.
-fn extend(all: &mut [Linear], rows: &[Linear], pieces: &[Linear], (k, back): (usize, &[f64])) {
-    let begin = (k + 1) * rows.len();
-    for ((row, piece), highest) in all[begin..].iter_mut().zip(pieces).zip(rows) {
-        row.clone_from(piece);
-        row.value = (piece.value + dot(&piece.slope, back)).min(highest.value);
+fn append_cuts(all: &mut [LinearModel], criteria: &[LinearModel], cuts: &[LinearModel], (k, offset): (usize, &[f64])) {
+    let begin = (k + 1) * criteria.len();
+    for ((row, cut), upper_bound) in all[begin..].iter_mut().zip(cuts).zip(criteria) {
+        row.clone_from(cut);
+        row.value = (cut.value + dot(&cut.gradient, offset)).min(upper_bound.value);
     }
 }
 
 /// Makes the row at `index`, which may be the first beyond the last, a function that is 0.
-fn clear(rows: &mut Vec<Linear>, index: usize, n: usize) {
-    if index == rows.len() {
-        rows.push(Linear::default());
+fn reset(criteria: &mut Vec<LinearModel>, index: usize, n: usize) {
+    if index == criteria.len() {
+        criteria.push(LinearModel::default());
     }
-    let row = &mut rows[index];
+    let row = &mut criteria[index];
     row.value = 0.0;
-    row.slope.clear();
-    row.slope.resize(n, 0.0);
+    row.gradient.clear();
+    row.gradient.resize(n, 0.0);
 }
 
 /// What the rows weigh at the solution.
@@ -217,7 +223,7 @@ pub struct Multipliers {
 
 impl Multipliers {
     /// The sum of those of constraints.
-    pub fn of_constraints(&self) -> f64 {
+    pub fn constraint_sum(&self) -> f64 {
         self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
     }
 }
@@ -227,13 +233,13 @@ mod tests {
     use super::*;
 
     fn shape(objective: Objective, usages: &[Usage]) -> Shape {
-        let rows = usages.iter().map(|usage| (*usage, 2.0)).collect();
-        Shape { spacing: vec![0.0; 4], rows, objective, ..Shape::default() }
+        let criteria = usages.iter().map(|usage| (*usage, 2.0)).collect();
+        Shape { spacing: vec![0.0; 4], rows: criteria, objective, ..Shape::default() }
     }
 
-    fn filled(rows: &mut Rows, shape: &Shape) {
+    fn fill(criteria: &mut LinearisedCriteria, shape: &Shape) {
         let scaled: Vec<f64> = (1_u8..).map(f64::from).take(shape.rows.len()).collect();
-        rows.fill(shape, &scaled, 4, |i, weight, sum| sum.iter_mut().for_each(|s| *s += weight * scaled[i]));
+        criteria.fill(shape, &scaled, 4, |i, weight, sum| sum.iter_mut().for_each(|s| *s += weight * scaled[i]));
     }
 
     #[test]
@@ -245,40 +251,40 @@ mod tests {
             shape(Objective::Max, &[Monitor]),
             shape(Objective::Max, &[Inequality, Inequality]),
         ];
-        let mut rows = Rows::default();
+        let mut criteria = LinearisedCriteria::default();
         for shape in &shapes {
-            filled(&mut rows, shape);
-            let mut fresh = Rows::default();
-            filled(&mut fresh, shape);
-            assert_eq!(format!("{rows:?}"), format!("{fresh:?}"));
+            fill(&mut criteria, shape);
+            let mut fresh = LinearisedCriteria::default();
+            fill(&mut fresh, shape);
+            assert_eq!(format!("{criteria:?}"), format!("{fresh:?}"));
         }
-        filled(&mut rows, &shapes[1]);
+        fill(&mut criteria, &shapes[1]);
         assert_eq!(
-            (rows.objectives.len(), rows.objectives[0].value, &rows.objectives[0].slope),
+            (criteria.objectives.len(), criteria.objectives[0].value, &criteria.objectives[0].gradient),
             (1, 14.0, &vec![14.0; 4])
         );
-        assert_eq!((rows.inequalities.len(), rows.equalities.len(), rows.equalities[0].value), (0, 1, 2.0));
-        filled(&mut rows, &shapes[2]);
-        assert_eq!((rows.objectives.len(), rows.objectives[0].value), (1, 0.0));
+        assert_eq!((criteria.inequalities.len(), criteria.equalities.len(), criteria.equalities[0].value), (0, 1, 2.0));
+        fill(&mut criteria, &shapes[2]);
+        assert_eq!((criteria.objectives.len(), criteria.objectives[0].value), (1, 0.0));
     }
 
     #[test]
     fn pieces_extend_to_here_and_stay_below_the_row() {
-        let line = |value: f64, slope: [f64; 4]| Rows {
-            objectives: vec![Linear { value, slope: slope.to_vec() }],
-            ..Rows::default()
+        let line = |value: f64, gradient: [f64; 4]| LinearisedCriteria {
+            objectives: vec![LinearModel { value, gradient: gradient.to_vec() }],
+            ..LinearisedCriteria::default()
         };
         let here = line(1.0, [0.0; 4]);
         let steep = (vec![0.0; 4], line(0.0, [1.0, 2.0, 3.0, 4.0]));
         let flat = (vec![1.0, 0.0, 0.0, 0.0], line(0.5, [0.0, 0.1, 0.1, 0.1]));
-        let (mut all, mut back) = (Rows::default(), Vec::new());
-        all.gather(&here, &[1.0; 4], &[steep.clone(), flat.clone()], &mut back);
+        let (mut all, mut offset) = (LinearisedCriteria::default(), Vec::new());
+        all.assign_with_cuts(&here, &[1.0; 4], &[steep.clone(), flat.clone()], &mut offset);
         let values: Vec<f64> = all.objectives.iter().map(|row| row.value).collect();
         assert_eq!(values[..2], [1.0, 1.0]);
         assert!((values[2] - 0.8).abs() < 1e-15);
-        all.gather(&here, &[1.0; 4], &[flat], &mut back);
+        all.assign_with_cuts(&here, &[1.0; 4], &[flat], &mut offset);
         assert_eq!((all.objectives.len(), all.objectives[1].value), (2, values[2]));
-        all.gather(&here, &[1.0; 4], &[], &mut back);
+        all.assign_with_cuts(&here, &[1.0; 4], &[], &mut offset);
         assert_eq!(all.objectives.len(), 1);
     }
 }

@@ -5,31 +5,31 @@ use nalgebra::{Cholesky, DMatrix, Dyn};
 
 /// Factors a symmetric matrix of size `n`, of which `fill` gives the lower triangle over zeros, and hands the factor on; `None`
 /// where the matrix is not positive definite. The memory is used again, unless that is so.
-pub fn factored<T>(
-    memory: &mut Vec<f64>,
+pub fn with_cholesky<T>(
+    buffer: &mut Vec<f64>,
     n: usize,
     fill: impl FnOnce(&mut DMatrix<f64>),
-    then: impl FnOnce(&Cholesky<f64, Dyn>) -> T,
+    use_factor: impl FnOnce(&Cholesky<f64, Dyn>) -> T,
 ) -> Option<T> {
-    let mut entries = std::mem::take(memory);
+    let mut entries = std::mem::take(buffer);
     entries.clear();
     entries.resize(n * n, 0.0);
     let mut matrix = DMatrix::from_vec(n, n, entries);
     fill(&mut matrix);
     let factor = Cholesky::new(matrix)?;
-    let answer = then(&factor);
-    *memory = factor.unpack_dirty().data.into();
+    let answer = use_factor(&factor);
+    *buffer = factor.unpack_dirty().data.into();
     Some(answer)
 }
 
 /// Turns the lower triangle of a positive definite matrix of size `n` into its Cholesky factor; columns lie `stride` apart.
 /// `false` where the matrix is not positive definite.
-pub fn cholesky(l: &mut [f64], n: usize, stride: usize) -> bool {
+pub fn factorise(l: &mut [f64], n: usize, stride: usize) -> bool {
     for k in 0..n {
         for i in k..n {
-            let known: f64 = (0..k).map(|m| l[m * stride + i] * l[m * stride + k]).sum();
-            let left = l[k * stride + i] - known;
-            l[k * stride + i] = if i > k { left / l[k * stride + k] } else { left.sqrt() };
+            let sum: f64 = (0..k).map(|m| l[m * stride + i] * l[m * stride + k]).sum();
+            let rest = l[k * stride + i] - sum;
+            l[k * stride + i] = if i > k { rest / l[k * stride + k] } else { rest.sqrt() };
         }
         if !(l[k * stride + k] > 0.0 && l[k * stride + k].is_finite()) {
             return false;
@@ -45,17 +45,17 @@ mod tests {
     #[test]
     fn both_factors_are_the_same() {
         let entries = [4.0, 2.0, 0.4, 2.0, 3.0, 1.0, 0.4, 1.0, 5.0];
-        let mut memory = Vec::new();
+        let mut buffer = Vec::new();
         let matrix = DMatrix::from_row_slice(3, 3, &entries);
-        let l = factored(&mut memory, 3, |m| m.copy_from(&matrix), |factor| factor.l()).unwrap();
-        let mut own = entries;
-        assert!(cholesky(&mut own, 3, 3));
+        let l = with_cholesky(&mut buffer, 3, |m| m.copy_from(&matrix), |factor| factor.l()).unwrap();
+        let mut in_place = entries;
+        assert!(factorise(&mut in_place, 3, 3));
         for k in 0..3 {
-            assert!((k..3).all(|i| (own[3 * k + i] - l[(i, k)]).abs() < 1e-15));
+            assert!((k..3).all(|i| (in_place[3 * k + i] - l[(i, k)]).abs() < 1e-15));
         }
-        let small = factored(&mut memory, 1, |m| m[(0, 0)] = 9.0, |factor| factor.l()).unwrap();
+        let small = with_cholesky(&mut buffer, 1, |m| m[(0, 0)] = 9.0, |factor| factor.l()).unwrap();
         assert_eq!(small[(0, 0)], 3.0);
-        assert!(factored(&mut memory, 2, |m| m[(0, 0)] = 1.0, |_| ()).is_none());
-        assert!(!cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2) && !cholesky(&mut [f64::NAN], 1, 1));
+        assert!(with_cholesky(&mut buffer, 2, |m| m[(0, 0)] = 1.0, |_| ()).is_none());
+        assert!(!factorise(&mut [1.0, 2.0, 2.0, 1.0], 2, 2) && !factorise(&mut [f64::NAN], 1, 1));
     }
 }

@@ -2,36 +2,36 @@
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
-use super::known::Known;
+use super::sample_set::SampleSet;
 use crate::active_set::dot;
-use crate::definite::factored;
+use crate::cholesky::with_cholesky;
 use mops_core::math;
 
 /// What a unit of squared misfit costs, in units of squared curvature over the trust region.
-const MISS: f64 = 1e-4;
+const RIDGE: f64 = 1e-4;
 
 /// Models `c + g'y + y'H y / 2` of all rows in the steps `y = (x - centre) / radius`. They are fitted again and again; memory
 /// once asked for is kept.
 #[derive(Debug, Default)]
-pub struct Models {
+pub struct QuadraticModels {
     n: usize,
-    rows: usize,
+    criteria: usize,
     /// Whether the last points determined them.
-    are_fitted: bool,
+    is_fitted: bool,
     /// The unit of steps.
     radius: f64,
     /// `c` of every row.
     constants: Vec<f64>,
     /// `g` of every row, one after the other.
-    slopes: Vec<f64>,
+    gradients: Vec<f64>,
     /// `H` of every row, one after the other.
-    curvatures: Vec<f64>,
-    room: Room,
+    hessians: Vec<f64>,
+    workspace: Workspace,
 }
 
 /// What is needed while models are fitted.
 #[derive(Debug, Default)]
-struct Room {
+struct Workspace {
     /// The steps to the points, one after the other.
     steps: Vec<f64>,
     /// `X = [1 y]`, by columns.
@@ -44,18 +44,18 @@ struct Room {
     schur: Vec<f64>,
 }
 
-impl Models {
+impl QuadraticModels {
     /// Models of so many rows without any curvature.
-    pub fn new(n: usize, rows: usize) -> Self {
+    pub fn new(n: usize, criteria: usize) -> Self {
         Self {
             n,
-            rows,
-            are_fitted: false,
+            criteria,
+            is_fitted: false,
             radius: 1.0,
-            constants: vec![0.0; rows],
-            slopes: vec![0.0; rows * n],
-            curvatures: vec![0.0; rows * n * n],
-            room: Room::default(),
+            constants: vec![0.0; criteria],
+            gradients: vec![0.0; criteria * n],
+            hessians: vec![0.0; criteria * n * n],
+            workspace: Workspace::default(),
         }
     }
 
@@ -69,20 +69,20 @@ impl Models {
     ///
     /// Source: A. R. Conn, K. Scheinberg, L. N. Vicente, Introduction to Derivative-Free Optimization (SIAM 2009), section
     /// 5.3; least change: M. J. D. Powell, Mathematical Programming 100 (2004) 183-215.
-    pub fn fit(&mut self, known: &Known, near: &[(f64, usize)], centre: &[f64], radius: f64) -> bool {
-        let (n, rows, count) = (self.n, self.rows, near.len());
-        let unit = math::powi(radius / self.radius, 2);
-        self.curvatures.iter_mut().for_each(|h| *h *= unit);
+    pub fn fit(&mut self, samples: &SampleSet, neighbours: &[(f64, usize)], centre: &[f64], radius: f64) -> bool {
+        let (n, criteria, count) = (self.n, self.criteria, neighbours.len());
+        let rescaling = math::powi(radius / self.radius, 2);
+        self.hessians.iter_mut().for_each(|h| *h *= rescaling);
         self.radius = radius;
-        self.are_fitted = false;
+        self.is_fitted = false;
         if count <= n {
             return false;
         }
-        self.room.steps.clear();
-        for (_, i) in near {
-            self.room.steps.extend(known.point(*i).iter().zip(centre).map(|(a, b)| (a - b) / radius));
+        self.workspace.steps.clear();
+        for (_, i) in neighbours {
+            self.workspace.steps.extend(samples.point(*i).iter().zip(centre).map(|(a, b)| (a - b) / radius));
         }
-        let Room { steps, linear, solved, planes, system, schur } = &mut self.room;
+        let Workspace { steps, linear, solved, planes, system, schur } = &mut self.workspace;
         let step = |i: usize| &steps[i * n..(i + 1) * n];
         linear.clear();
         linear.resize(count, 1.0);
@@ -90,11 +90,14 @@ impl Models {
             linear.extend((0..count).map(|i| step(i)[k]));
         }
         solved.clone_from(linear);
-        let first = known.values(near[0].1);
-        for row in 0..rows {
-            let h = &self.curvatures[row * n * n..(row + 1) * n * n];
+        let first = samples.values(neighbours[0].1);
+        for row in 0..criteria {
+            let h = &self.hessians[row * n * n..(row + 1) * n * n];
             solved.extend(
-                near.iter().enumerate().map(|(i, (_, j))| known.values(*j)[row] - first[row] - 0.5 * form(h, step(i))),
+                neighbours
+                    .iter()
+                    .enumerate()
+                    .map(|(i, (_, j))| samples.values(*j)[row] - first[row] - 0.5 * quadratic_form(h, step(i))),
             );
         }
         let fill = |matrix: &mut DMatrix<f64>| {
@@ -102,47 +105,47 @@ impl Models {
                 for j in 0..=i {
                     matrix[(i, j)] = 0.5 * math::powi(dot(step(i), step(j)), 2);
                 }
-                matrix[(i, i)] += MISS;
+                matrix[(i, i)] += RIDGE;
             }
         };
-        let all = n + 1 + rows;
-        let factor = factored(system, count, fill, |factor| {
-            factor.solve_mut(&mut DMatrixViewMut::from_slice(solved, count, all));
+        let columns = n + 1 + criteria;
+        let factor = with_cholesky(system, count, fill, |factor| {
+            factor.solve_mut(&mut DMatrixViewMut::from_slice(solved, count, columns));
         });
         if factor.is_none() {
             return false;
         }
         let column = |k: usize| &linear[k * count..(k + 1) * count];
-        let of_solved = |k: usize| &solved[k * count..(k + 1) * count];
+        let solved_column = |k: usize| &solved[k * count..(k + 1) * count];
         planes.clear();
-        for row in 0..rows {
-            planes.extend((0..=n).map(|k| dot(column(k), of_solved(n + 1 + row))));
+        for row in 0..criteria {
+            planes.extend((0..=n).map(|k| dot(column(k), solved_column(n + 1 + row))));
         }
         let fill = |matrix: &mut DMatrix<f64>| {
             for i in 0..=n {
                 for j in 0..=i {
-                    matrix[(i, j)] = dot(column(i), of_solved(j));
+                    matrix[(i, j)] = dot(column(i), solved_column(j));
                 }
             }
         };
-        let factor = factored(schur, n + 1, fill, |factor| {
-            factor.solve_mut(&mut DMatrixViewMut::from_slice(planes, n + 1, rows));
+        let factor = with_cholesky(schur, n + 1, fill, |factor| {
+            factor.solve_mut(&mut DMatrixViewMut::from_slice(planes, n + 1, criteria));
         });
         if factor.is_none() {
             return false;
         }
-        let (of_linear, of_values) = solved.split_at_mut((n + 1) * count);
-        let of_linear = DMatrixView::from_slice(of_linear, count, n + 1);
-        let mut multipliers = DMatrixViewMut::from_slice(of_values, count, rows);
-        multipliers.gemm(-1.0, &of_linear, &DMatrixView::from_slice(planes, n + 1, rows), 1.0);
+        let (linear_part, value_part) = solved.split_at_mut((n + 1) * count);
+        let linear_part = DMatrixView::from_slice(linear_part, count, n + 1);
+        let mut multipliers = DMatrixViewMut::from_slice(value_part, count, criteria);
+        multipliers.gemm(-1.0, &linear_part, &DMatrixView::from_slice(planes, n + 1, criteria), 1.0);
         if !planes.iter().chain(multipliers.iter()).all(|v| v.is_finite()) {
             return false;
         }
-        for row in 0..rows {
-            let found = &planes[row * (n + 1)..(row + 1) * (n + 1)];
-            self.constants[row] = first[row] + found[0];
-            self.slopes[row * n..(row + 1) * n].copy_from_slice(&found[1..]);
-            let h = &mut self.curvatures[row * n * n..(row + 1) * n * n];
+        for row in 0..criteria {
+            let plane = &planes[row * (n + 1)..(row + 1) * (n + 1)];
+            self.constants[row] = first[row] + plane[0];
+            self.gradients[row * n..(row + 1) * n].copy_from_slice(&plane[1..]);
+            let h = &mut self.hessians[row * n * n..(row + 1) * n * n];
             for (i, multiplier) in multipliers.column(row).iter().enumerate() {
                 let y = step(i);
                 for (column, y_j) in h.chunks_exact_mut(n).zip(y) {
@@ -150,18 +153,18 @@ impl Models {
                 }
             }
         }
-        self.are_fitted = true;
+        self.is_fitted = true;
         true
     }
 
     /// Whether the last points determined them.
-    pub fn are_fitted(&self) -> bool {
-        self.are_fitted
+    pub fn is_fitted(&self) -> bool {
+        self.is_fitted
     }
 
     /// The steps to the points that the models go through.
     pub fn steps(&self) -> impl Iterator<Item = &[f64]> {
-        self.room.steps.chunks_exact(self.n)
+        self.workspace.steps.chunks_exact(self.n)
     }
 
     /// Values of all rows without a step.
@@ -171,39 +174,40 @@ impl Models {
 
     /// Values of all rows after a step.
     pub fn values(&self, y: &[f64], values: &mut Vec<f64>) {
-        let value = |row: usize| self.constants[row] + dot(self.slope(row), y) + 0.5 * form(self.curvature(row), y);
+        let value =
+            |row: usize| self.constants[row] + dot(self.gradient(row), y) + 0.5 * quadratic_form(self.hessian(row), y);
         values.clear();
-        values.extend((0..self.rows).map(value));
+        values.extend((0..self.criteria).map(value));
     }
 
     /// Adds the slope of a row after a step, times a weight.
-    pub fn add_slope(&self, row: usize, y: &[f64], weight: f64, sum: &mut [f64]) {
+    pub fn add_gradient(&self, row: usize, y: &[f64], weight: f64, sum: &mut [f64]) {
         // Curvatures are symmetric.
-        let columns = self.curvature(row).chunks_exact(self.n);
-        for ((sum, slope), column) in sum.iter_mut().zip(self.slope(row)).zip(columns) {
-            *sum += weight * (slope + dot(column, y));
+        let columns = self.hessian(row).chunks_exact(self.n);
+        for ((sum, gradient), column) in sum.iter_mut().zip(self.gradient(row)).zip(columns) {
+            *sum += weight * (gradient + dot(column, y));
         }
     }
 
     /// Adds the curvature of a row, times a weight.
-    pub fn add_curvature(&self, row: usize, weight: f64, sum: &mut DMatrix<f64>) {
+    pub fn add_hessian(&self, row: usize, weight: f64, sum: &mut DMatrix<f64>) {
         if weight != 0.0 {
-            sum.iter_mut().zip(self.curvature(row)).for_each(|(sum, h)| *sum += weight * h);
+            sum.iter_mut().zip(self.hessian(row)).for_each(|(sum, h)| *sum += weight * h);
         }
     }
 
-    fn slope(&self, row: usize) -> &[f64] {
-        &self.slopes[row * self.n..(row + 1) * self.n]
+    fn gradient(&self, row: usize) -> &[f64] {
+        &self.gradients[row * self.n..(row + 1) * self.n]
     }
 
-    fn curvature(&self, row: usize) -> &[f64] {
+    fn hessian(&self, row: usize) -> &[f64] {
         let size = self.n * self.n;
-        &self.curvatures[row * size..(row + 1) * size]
+        &self.hessians[row * size..(row + 1) * size]
     }
 }
 
 /// `y'H y`.
-fn form(h: &[f64], y: &[f64]) -> f64 {
+fn quadratic_form(h: &[f64], y: &[f64]) -> f64 {
     h.chunks_exact(y.len()).zip(y).map(|(column, y_j)| y_j * dot(column, y)).sum()
 }
 
@@ -212,17 +216,17 @@ pub(super) mod tests {
     use super::*;
 
     /// Models in steps from 0, of radius 1, through values of rows at given steps.
-    pub fn through<const N: usize>(steps: &[[f64; N]], f: impl Fn(&[f64; N]) -> Vec<f64>) -> Models {
-        let rows = f(&steps[0]).len();
-        let mut known = Known::new(N, rows);
-        steps.iter().for_each(|y| known.remember(y, &f(y)));
-        let near: Vec<(f64, usize)> = (0..steps.len()).map(|i| (0.0, i)).collect();
-        let mut models = Models::new(N, rows);
-        assert!(models.fit(&known, &near, &[0.0; N], 1.0));
+    pub fn through<const N: usize>(steps: &[[f64; N]], f: impl Fn(&[f64; N]) -> Vec<f64>) -> QuadraticModels {
+        let criteria = f(&steps[0]).len();
+        let mut samples = SampleSet::new(N, criteria);
+        steps.iter().for_each(|y| samples.insert(y, &f(y)));
+        let neighbours: Vec<(f64, usize)> = (0..steps.len()).map(|i| (0.0, i)).collect();
+        let mut models = QuadraticModels::new(N, criteria);
+        assert!(models.fit(&samples, &neighbours, &[0.0; N], 1.0));
         models
     }
 
-    fn value(models: &Models, y: &[f64]) -> f64 {
+    fn value(models: &QuadraticModels, y: &[f64]) -> f64 {
         let mut values = Vec::new();
         models.values(y, &mut values);
         values[0]
@@ -234,10 +238,10 @@ pub(super) mod tests {
         let models = through(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.7, 0.6]], f);
         let y = [0.3, -0.8];
         assert!((value(&models, &y) - f(&y)[0]).abs() < 1e-3);
-        let mut slope = [0.0; 2];
-        models.add_slope(0, &y, 1.0, &mut slope);
-        assert!((slope[0] - (2.0 + 6.0 * 0.3 - 0.8)).abs() < 1e-3);
-        assert!((slope[1] - (-1.0 + 0.3 + 0.8)).abs() < 1e-3);
+        let mut gradient = [0.0; 2];
+        models.add_gradient(0, &y, 1.0, &mut gradient);
+        assert!((gradient[0] - (2.0 + 6.0 * 0.3 - 0.8)).abs() < 1e-3);
+        assert!((gradient[1] - (-1.0 + 0.3 + 0.8)).abs() < 1e-3);
     }
 
     #[test]
@@ -248,23 +252,23 @@ pub(super) mod tests {
 
     #[test]
     fn points_on_a_line_determine_no_plane() {
-        let mut known = Known::new(2, 1);
-        [[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]].iter().for_each(|y| known.remember(y, &[y[0]]));
-        let near = [(0.0, 0), (0.5, 1), (1.0, 2)];
-        assert!(!Models::new(2, 1).fit(&known, &near, &[0.0, 0.0], 1.0));
-        assert!(!Models::new(2, 1).fit(&known, &near[..2], &[0.0, 0.0], 1.0));
+        let mut samples = SampleSet::new(2, 1);
+        [[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]].iter().for_each(|y| samples.insert(y, &[y[0]]));
+        let neighbours = [(0.0, 0), (0.5, 1), (1.0, 2)];
+        assert!(!QuadraticModels::new(2, 1).fit(&samples, &neighbours, &[0.0, 0.0], 1.0));
+        assert!(!QuadraticModels::new(2, 1).fit(&samples, &neighbours[..2], &[0.0, 0.0], 1.0));
     }
 
     #[test]
     fn curvature_is_kept_where_few_points_tell_of_it_whatever_the_radius() {
         let f = |y: &[f64; 1]| vec![3.0 * y[0] * y[0]];
         let mut models = through(&[[0.0], [1.0], [-1.0]], f);
-        let mut known = Known::new(1, 1);
-        [[0.5], [0.6]].iter().for_each(|y| known.remember(y, &f(y)));
-        assert!(models.fit(&known, &[(0.0, 0), (0.0, 1)], &[0.5], 0.1));
-        let mut curvature = DMatrix::zeros(1, 1);
-        models.add_curvature(0, 1.0, &mut curvature);
-        assert!((curvature[(0, 0)] - 0.06).abs() < 1e-4, "{curvature}");
+        let mut samples = SampleSet::new(1, 1);
+        [[0.5], [0.6]].iter().for_each(|y| samples.insert(y, &f(y)));
+        assert!(models.fit(&samples, &[(0.0, 0), (0.0, 1)], &[0.5], 0.1));
+        let mut hessian = DMatrix::zeros(1, 1);
+        models.add_hessian(0, 1.0, &mut hessian);
+        assert!((hessian[(0, 0)] - 0.06).abs() < 1e-4, "{hessian}");
         assert!((value(&models, &[2.0]) - 3.0 * 0.7 * 0.7).abs() < 1e-3);
     }
 }

@@ -2,73 +2,73 @@
 
 use mops_core::{Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Shape, Stream, Usage};
 
-use super::known::Known;
+use super::archive::Archive;
 
 /// What a subproblem does with a criterion `f`, the weighted scaled value of a row to be minimised.
 #[derive(Debug, Clone, Copy)]
 pub enum Role {
     /// `(f - from) / per` is minimised.
-    Minimised { from: f64, per: f64 },
+    Minimised { reference: f64, scale: f64 },
     /// `(f - limit) / per` is at most 0.
-    AtMost { limit: f64, per: f64 },
+    Limited { limit: f64, scale: f64 },
     /// It has no say.
-    Free,
+    Ignored,
 }
 
 impl Role {
     /// The scaled value that stands for it: factor and offset.
-    fn line(self) -> (f64, f64) {
+    fn coefficients(self) -> (f64, f64) {
         match self {
-            Self::Minimised { from, per } => (1.0 / per, -from / per),
-            Self::AtMost { limit, per } => (1.0 / per, 1.0 - limit / per),
-            Self::Free => (0.0, 0.0),
+            Self::Minimised { reference, scale } => (1.0 / scale, -reference / scale),
+            Self::Limited { limit, scale } => (1.0 / scale, 1.0 - limit / scale),
+            Self::Ignored => (0.0, 0.0),
         }
     }
 
     fn usage(self) -> Usage {
         match self {
             Self::Minimised { .. } => Usage::Minimise,
-            Self::AtMost { .. } => Usage::Inequality,
-            Self::Free => Usage::Monitor,
+            Self::Limited { .. } => Usage::Inequality,
+            Self::Ignored => Usage::Monitor,
         }
     }
 }
 
 /// A subproblem: a role for every criterion, in the order of the rows; the constraints stay what they are.
 #[derive(Debug, Clone)]
-pub struct Aim {
+pub struct Scalarisation {
     /// The roles.
     pub roles: Vec<Role>,
     /// How what is minimised becomes one number.
     pub objective: Objective,
 }
 
-impl Aim {
+impl Scalarisation {
     /// The largest of the criteria, measured from `low` in units of `range`: the weighted Chebyshev distance.
     pub fn chebyshev(low: &[f64], range: &[f64]) -> Self {
-        let role = |(&from, &per): (&f64, &f64)| Role::Minimised { from, per };
+        let role = |(&reference, &scale): (&f64, &f64)| Role::Minimised { reference, scale };
         Self { roles: low.iter().zip(range).map(role).collect(), objective: Objective::Max }
     }
 
     /// What each criterion counts as, in units of the subproblem.
-    pub fn heights(&self, criteria: &[f64]) -> Vec<f64> {
-        let height = |(role, f): (&Role, &f64)| {
-            let (factor, offset) = role.line();
+    pub fn scalarised_values(&self, criteria: &[f64]) -> Vec<f64> {
+        let scalarised_value = |(role, f): (&Role, &f64)| {
+            let (factor, offset) = role.coefficients();
             factor * f + offset
         };
-        self.roles.iter().zip(criteria).map(height).collect()
+        self.roles.iter().zip(criteria).map(scalarised_value).collect()
     }
 
     /// What the criteria are worth; the violation is that of the criteria alone.
     pub fn merit(&self, criteria: &[f64]) -> Merit {
         let (mut violation, mut worst, mut sum) = (0.0_f64, f64::NEG_INFINITY, 0.0);
         for (role, f) in self.roles.iter().zip(criteria) {
-            let (factor, offset) = role.line();
+            let (factor, offset) = role.coefficients();
             let value = factor * f + offset;
             match role {
                 Role::Minimised { .. } => (worst, sum) = (worst.max(value), sum + value),
-                Role::AtMost { .. } => violation = violation.max(value - 1.0),
-                Role::Free => {}
+                Role::Limited { .. } => violation = violation.max(value - 1.0),
+                Role::Ignored => {}
             }
         }
         Merit { violation, objective: if self.objective == Objective::Sum { sum } else { worst } }
@@ -84,16 +84,16 @@ impl Aim {
     }
 
     /// Factor and offset of every row.
-    fn lines(&self, of: &Shape) -> Vec<(f64, f64)> {
+    fn coefficients(&self, of: &Shape) -> Vec<(f64, f64)> {
         let mut roles = self.roles.iter();
-        let mut line = |(usage, weight): &(Usage, f64)| match usage {
+        let mut coefficients = |(usage, weight): &(Usage, f64)| match usage {
             Usage::Minimise => {
-                let (factor, offset) = roles.next().expect("a role for every criterion").line();
+                let (factor, offset) = roles.next().expect("a role for every criterion").coefficients();
                 (factor * weight, offset)
             }
             _ => (1.0, 0.0),
         };
-        of.rows.iter().map(&mut line).collect()
+        of.rows.iter().map(&mut coefficients).collect()
     }
 }
 
@@ -101,23 +101,23 @@ impl Aim {
 const ROUNDING: f64 = 1e-14;
 
 /// The problem as a subproblem has it; what is evaluated is remembered.
-pub struct View<'a> {
+pub struct ScalarisedProblem<'a> {
     oracle: &'a mut dyn Oracle,
-    known: &'a mut Known,
+    archive: &'a mut Archive,
     shape: Shape,
-    lines: Vec<(f64, f64)>,
+    coefficients: Vec<(f64, f64)>,
     best: Option<Evaluation>,
 }
 
-impl<'a> View<'a> {
-    pub fn new(oracle: &'a mut dyn Oracle, known: &'a mut Known, aim: &Aim) -> Self {
-        let (shape, lines) = (aim.shape(oracle.shape()), aim.lines(oracle.shape()));
-        Self { oracle, known, shape, lines, best: None }
+impl<'a> ScalarisedProblem<'a> {
+    pub fn new(oracle: &'a mut dyn Oracle, archive: &'a mut Archive, scalarisation: &Scalarisation) -> Self {
+        let (shape, coefficients) = (scalarisation.shape(oracle.shape()), scalarisation.coefficients(oracle.shape()));
+        Self { oracle, archive, shape, coefficients, best: None }
     }
 
-    fn seen(&self, mut evaluation: Evaluation) -> Evaluation {
+    fn scalarise(&self, mut evaluation: Evaluation) -> Evaluation {
         if let Some(scaled) = &mut evaluation.scaled {
-            scaled.iter_mut().zip(&self.lines).for_each(|(s, (factor, offset))| *s = factor * *s + offset);
+            scaled.iter_mut().zip(&self.coefficients).for_each(|(s, (factor, offset))| *s = factor * *s + offset);
             evaluation.merit = self.shape.merit(scaled);
         }
         evaluation.residuals.clear();
@@ -127,7 +127,7 @@ impl<'a> View<'a> {
     /// The points with coordinates on the bounds that they are meant to lie on: a step to a bound leaves over what rounding
     /// leaves over, and a criterion that is steepest there (a root, say) has slopes a little beside it that describe nothing.
     fn on_bounds(point: &[f64]) -> Vec<f64> {
-        let end = |&u: &f64| {
+        let snap = |&u: &f64| {
             if u < ROUNDING {
                 0.0
             } else if u > 1.0 - ROUNDING {
@@ -136,26 +136,26 @@ impl<'a> View<'a> {
                 u
             }
         };
-        point.iter().map(end).collect()
+        point.iter().map(snap).collect()
     }
 
-    fn keep(&mut self, evaluation: &Evaluation) {
+    fn record_best(&mut self, evaluation: &Evaluation) {
         if self.best.as_ref().is_none_or(|best| evaluation.merit.is_better_than(&best.merit)) {
             self.best = Some(evaluation.clone());
         }
     }
 }
 
-impl Oracle for View<'_> {
+impl Oracle for ScalarisedProblem<'_> {
     fn shape(&self) -> &Shape {
         &self.shape
     }
 
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt> {
         let answers = self.oracle.evaluate(&points.iter().map(|point| Self::on_bounds(point)).collect::<Vec<_>>())?;
-        self.known.take(self.oracle.shape(), &answers);
-        let answers: Vec<Evaluation> = answers.into_iter().map(|answer| self.seen(answer)).collect();
-        answers.iter().for_each(|answer| self.keep(answer));
+        self.archive.record(self.oracle.shape(), &answers);
+        let answers: Vec<Evaluation> = answers.into_iter().map(|answer| self.scalarise(answer)).collect();
+        answers.iter().for_each(|answer| self.record_best(answer));
         Ok(answers)
     }
 
@@ -163,12 +163,12 @@ impl Oracle for View<'_> {
         let Some(Linearisation { at, mut rows, .. }) = self.oracle.linearise(&Self::on_bounds(point), reach)? else {
             return Ok(None);
         };
-        self.known.take(self.oracle.shape(), std::slice::from_ref(&at));
-        for (row, (factor, _)) in rows.iter_mut().zip(&self.lines) {
-            row.iter_mut().for_each(|slope| *slope *= factor);
+        self.archive.record(self.oracle.shape(), std::slice::from_ref(&at));
+        for (row, (factor, _)) in rows.iter_mut().zip(&self.coefficients) {
+            row.iter_mut().for_each(|gradient| *gradient *= factor);
         }
-        let at = self.seen(at);
-        self.keep(&at);
+        let at = self.scalarise(at);
+        self.record_best(&at);
         Ok(Some(Linearisation { at, rows, residuals: vec![Vec::new(); point.len()] }))
     }
 

@@ -13,7 +13,7 @@ pub struct History {
     median: Vec<f64>,
     /// Best of the last generations.
     recent: VecDeque<f64>,
-    first_sigma: f64,
+    initial_sigma: f64,
     tolerance: f64,
 }
 
@@ -31,8 +31,8 @@ pub enum End {
 
 impl History {
     /// Of a run that has not begun; `tolerance` is relative to the objective.
-    pub fn new(first_sigma: f64, tolerance: f64) -> Self {
-        Self { best: Vec::new(), median: Vec::new(), recent: VecDeque::new(), first_sigma, tolerance }
+    pub fn new(initial_sigma: f64, tolerance: f64) -> Self {
+        Self { best: Vec::new(), median: Vec::new(), recent: VecDeque::new(), initial_sigma, tolerance }
     }
 
     /// Takes a generation's values, the best first, and says whether the run is over. `unit` is the order of magnitude of
@@ -44,8 +44,8 @@ impl History {
     ///
     /// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009) 2389-2396.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn tell(&mut self, values: &[f64], unit: f64, behind: f64, at: &Distribution) -> Option<End> {
-        let (n, population) = (at.mean.len() as f64, values.len() as f64);
+    pub fn record(&mut self, values: &[f64], unit: f64, deficit: f64, distribution: &Distribution) -> Option<End> {
+        let (n, population) = (distribution.mean.len() as f64, values.len() as f64);
         let (best, median) = (values[0], values[values.len() / 2]);
         self.best.push(best);
         self.median.push(median);
@@ -58,49 +58,51 @@ impl History {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
             high - low
         };
-        let flat = self.tolerance * best.abs().max(unit);
+        let threshold = self.tolerance * best.abs().max(unit);
         if self.recent.len() == window {
             let spread = range(&mut self.recent.iter().copied());
             let spread = spread.max(range(&mut values.iter().copied()));
-            if spread <= flat || self.has_repeated(window) {
+            if spread <= threshold || self.is_constant(window) {
                 return Some(End::Converged);
             }
-            if spread <= WORSE_BASIN * behind {
+            if spread <= WORSE_BASIN * deficit {
                 return Some(End::Stagnated);
             }
         }
-        if at.reach() < 1e-11 * self.first_sigma {
+        if distribution.largest_extent() < 1e-11 * self.initial_sigma {
             return Some(End::Converged);
         }
         let longest = 100.0 + 50.0 * math::powi(n + 3.0, 2) / population.sqrt();
-        let degenerate = at.condition() > 1e14 || at.reach() > 1e4 * self.first_sigma || at.is_below_rounding();
-        let over = degenerate || self.stagnates(n, population) || at.generation as f64 > longest;
-        over.then_some(End::Stagnated)
+        let degenerate = distribution.condition() > 1e14
+            || distribution.largest_extent() > 1e4 * self.initial_sigma
+            || distribution.is_below_rounding();
+        let is_finished = degenerate || self.is_stagnating(n, population) || distribution.generation as f64 > longest;
+        is_finished.then_some(End::Stagnated)
     }
 
     /// Whether the best values of the last generations are all the same.
-    fn has_repeated(&self, window: usize) -> bool {
+    fn is_constant(&self, window: usize) -> bool {
         self.recent.len() == window && self.recent.iter().all(|value| *value == self.recent[0])
     }
 
     /// Whether the medians of the newest third of a long window are no better than those of the oldest.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn stagnates(&self, n: f64, population: f64) -> bool {
+    fn is_stagnating(&self, n: f64, population: f64) -> bool {
         let generations = self.best.len();
         let window = ((120.0 + 30.0 * n / population) as usize).max(generations / 5).min(20_000);
         if generations < window + 1 {
             return false;
         }
-        let middle = |values: &[f64]| {
+        let median_of = |values: &[f64]| {
             let mut sorted = values.to_vec();
             sorted.sort_by(f64::total_cmp);
             sorted[sorted.len() / 2]
         };
-        let part = (window * 3 / 10).max(1);
-        let no_better = |values: &[f64]| {
+        let part_length = (window * 3 / 10).max(1);
+        let has_no_improvement = |values: &[f64]| {
             let window = &values[generations - window..];
-            middle(&window[window.len() - part..]) >= middle(&window[..part])
+            median_of(&window[window.len() - part_length..]) >= median_of(&window[..part_length])
         };
-        no_better(&self.best) && no_better(&self.median)
+        has_no_improvement(&self.best) && has_no_improvement(&self.median)
     }
 }
