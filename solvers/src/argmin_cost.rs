@@ -1,4 +1,4 @@
-//! argmin's solvers on a mops problem: the oracle as its cost function.
+//! Cost function for argmin's solvers, evaluated through the oracle.
 
 use std::sync::Mutex;
 
@@ -7,8 +7,8 @@ use mops_core::{Halt, Oracle};
 
 use crate::penalty::penalised;
 
-/// The penalised objective over the whole space: points outside the box cost their distance to it on top of the value at
-/// the nearest point inside, so that solvers without bounds stay near.
+/// Penalised objective over the whole space. Outside the box, the cost is the value at the nearest point inside plus a
+/// penalty on the distance to it; so solvers without bounds stay near the box.
 pub(crate) struct Cost<'a> {
     state: Mutex<State<'a>>,
 }
@@ -19,23 +19,24 @@ struct State<'a> {
     objective_scale: Option<f64>,
 }
 
-/// What a point costs once the run is over: argmin ends at the target cost, and not all of its solvers take an error.
+/// Cost of every point after the end of the run. argmin stops at the target cost; not all of its solvers handle errors.
 const HALTED: f64 = f64::NEG_INFINITY;
 
 impl<'a> Cost<'a> {
-    /// `unit` brings the objective to the order of 1; it is found from the first value where absent.
+    /// Creates the cost function. `objective_scale` brings the objective to the order of 1; if absent, the first value
+    /// defines it.
     pub fn new(oracle: &'a mut dyn Oracle, objective_scale: Option<f64>) -> Self {
         Self { state: Mutex::new(State { oracle, halt: None, objective_scale }) }
     }
 
-    /// The factor of the objective.
+    /// Returns the scale factor of the objective.
     pub fn objective_scale(&self) -> Option<f64> {
-        self.state.lock().expect("nobody panics holding the lock").objective_scale
+        self.state.lock().expect("no thread panics while holding the lock").objective_scale
     }
 
-    /// Why the oracle stopped answering, if it did.
+    /// Returns the reason why the run ended, if it did.
     pub fn halt(&self) -> Option<Halt> {
-        self.state.lock().expect("nobody panics holding the lock").halt
+        self.state.lock().expect("no thread panics while holding the lock").halt
     }
 }
 
@@ -46,14 +47,14 @@ impl CostFunction for &Cost<'_> {
     fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
         let inside: Vec<f64> = point.iter().map(|u| u.clamp(0.0, 1.0)).collect();
         let outside: f64 = point.iter().zip(&inside).map(|(a, b)| (a - b).abs()).sum();
-        let mut state = self.state.lock().expect("nobody panics holding the lock");
+        let mut state = self.state.lock().expect("no thread panics while holding the lock");
         if state.halt.is_some() {
             return Ok(HALTED);
         }
         match state.oracle.evaluate(&[inside]) {
             Ok(answers) => {
                 let cost = penalised(&answers[0]);
-                // argmin's tolerances are absolute: bring the objective to the order of 1.
+                // argmin's tolerances are absolute: scale the objective to the order of 1.
                 if state.objective_scale.is_none() && cost.is_finite() && cost != 0.0 {
                     state.objective_scale =
                         Some(if (1e-3..1e3).contains(&cost.abs()) { 1.0 } else { 1.0 / cost.abs() });

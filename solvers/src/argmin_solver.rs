@@ -8,15 +8,15 @@ use mops_core::{
     stream,
 };
 
-/// A solver of mops as argmin's `Solver`, for problems with a [`CostFunction`] of real numbers, over a box.
+/// Solver of mops as argmin's `Solver`, for problems with a [`CostFunction`] of real variables in a box.
 ///
-/// An iteration of the executor is a [`Solver::step`], which may take many points. Where the cost is not finite, the point
-/// has failed: it is worse than every other. No point is asked for twice. Slopes come from differences.
+/// An iteration of the executor is one [`Solver::step`], which may evaluate many points. A point whose cost is not
+/// finite has failed and ranks below every other point. No point is evaluated twice. Gradients are finite differences.
 ///
 /// ```
 /// use argmin::core::{CostFunction, Error, Executor, State};
-/// use mops_solvers::cma_es::CmaEsOptions;
 /// use mops_solvers::argmin_solver::ArgminSolver;
+/// use mops_solvers::cma_es::CmaEsOptions;
 ///
 /// struct Rosenbrock;
 /// impl CostFunction for Rosenbrock {
@@ -38,28 +38,28 @@ pub struct ArgminSolver {
     data: ProblemData,
 }
 
-/// What is known of the problem.
+/// Problem data and cached cost values.
 struct ProblemData {
     bounds: Vec<[f64; 2]>,
     shape: Shape,
     seed: u64,
-    /// Points that may be evaluated.
+    /// Maximum number of evaluated points.
     evaluations: usize,
     noise: f64,
     best: Option<Evaluation>,
     cache: HashMap<Vec<u64>, f64>,
-    /// What the cost function complained of.
+    /// Error returned by the cost function, if any.
     error: Option<Error>,
 }
 
 impl ArgminSolver {
-    /// A solver with its options, between a smallest and a largest value of every variable.
+    /// Creates a solver from its options and the lower and upper bound of every variable.
     ///
     /// # Panics
-    /// A bound that is not finite, or a smallest value above the largest.
+    /// If a bound is not finite, or a lower bound exceeds its upper bound.
     pub fn new<S: SolverOptions>(options: &S, bounds: &[[f64; 2]]) -> Self {
         let is_valid = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
-        assert!(bounds.iter().all(is_valid), "a box has finite bounds, the smallest value first");
+        assert!(bounds.iter().all(is_valid), "every bound must be finite, and no lower bound may exceed its upper bound");
         let shape = Shape { spacing: vec![0.0; bounds.len()], rows: vec![(Usage::Minimise, 1.0)], ..Shape::default() };
         let data = ProblemData {
             bounds: bounds.to_vec(),
@@ -74,28 +74,28 @@ impl ArgminSolver {
         Self { solver: options.build(), kind: S::KIND, data }
     }
 
-    /// Under another seed than 1.
+    /// Sets the random seed (default: 1).
     #[must_use]
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.data.seed = seed;
         self
     }
 
-    /// Ends after so many evaluations of the cost.
+    /// Limits the number of cost evaluations.
     #[must_use]
     pub fn with_evaluations(mut self, evaluations: usize) -> Self {
         self.data.evaluations = evaluations;
         self
     }
 
-    /// For costs that are exact to `noise`, relative to their size; 1e-14 where nothing is said.
+    /// Sets the relative noise level of the cost, from which the difference step follows (default: 1e-14).
     #[must_use]
     pub fn with_noise(mut self, noise: f64) -> Self {
         self.data.noise = noise;
         self
     }
 
-    /// The state with the best point so far.
+    /// Returns the state with the best point so far.
     fn with_best(&self, state: IterState<Vec<f64>, (), (), (), (), f64>) -> IterState<Vec<f64>, (), (), (), (), f64> {
         match &self.data.best {
             Some(best) => state.param(best.tuners.clone()).cost(best.merit.objective),
@@ -103,11 +103,11 @@ impl ArgminSolver {
         }
     }
 
-    /// Why it is over: an error of the cost function's, or the budget.
+    /// Returns the reason for termination: an error of the cost function, or the budget.
     fn termination(&mut self) -> Result<TerminationReason, Error> {
         match self.data.error.take() {
             Some(error) => Err(error),
-            None => Ok(TerminationReason::SolverExit("all evaluations are spent".into())),
+            None => Ok(TerminationReason::SolverExit("evaluation budget exhausted".into())),
         }
     }
 }
@@ -121,9 +121,9 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> argmin::core::Solver<O, St
 
     fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
         self.solver.accepts(&self.data.shape).map_err(Error::msg)?;
-        let start = state.take_param().ok_or_else(|| Error::msg("a start is needed: `configure(|s| s.param(..))`"))?;
+        let start = state.take_param().ok_or_else(|| Error::msg("no initial guess; add `configure(|s| s.param(..))`"))?;
         if start.len() != self.data.bounds.len() {
-            return Err(Error::msg(format!("{} variables, but {} bounds", start.len(), self.data.bounds.len())));
+            return Err(Error::msg(format!("expected one pair of bounds per variable, found {} variables and {} pairs of bounds", start.len(), self.data.bounds.len())));
         }
         let start = self.data.point_of(&start);
         self.data.best = None;
@@ -143,7 +143,7 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> argmin::core::Solver<O, St
             Ok(Progress::Continue) => state,
             Ok(Progress::Converged) => state.terminate_with(TerminationReason::SolverConverged),
             Ok(Progress::Stalled) => {
-                state.terminate_with(TerminationReason::SolverExit("no improvement any more".into()))
+                state.terminate_with(TerminationReason::SolverExit("no further improvement".into()))
             }
             Err(_) => state.terminate_with(self.termination()?),
         };
@@ -165,7 +165,7 @@ impl ProblemData {
     }
 }
 
-/// An argmin problem that answers a solver of mops.
+/// Oracle of a mops solver, backed by an argmin problem.
 struct ArgminOracle<'a, O> {
     problem: &'a mut Problem<O>,
     data: &'a mut ProblemData,
@@ -173,7 +173,7 @@ struct ArgminOracle<'a, O> {
 
 impl<O: CostFunction<Param = Vec<f64>, Output = f64>> ArgminOracle<'_, O> {
     fn cost(&mut self, values: &Vec<f64>) -> Result<f64, Halt> {
-        // Minus zero is zero.
+        // Adding 0.0 maps -0.0 to 0.0.
         let key: Vec<u64> = values.iter().map(|x| (x + 0.0).to_bits()).collect();
         if let Some(&cost) = self.data.cache.get(&key) {
             return Ok(cost);
@@ -234,7 +234,7 @@ mod tests {
     use crate::pattern_search::PatternSearchOptions;
     use crate::sqp::SqpOptions;
 
-    /// `(x - 1)^2 + 2 (y + 3)^2`: in the box `[-2, 5]^2` least at (1, -2), where it is 2. Not defined for `x > 3`.
+    /// `(x - 1)^2 + 2 (y + 3)^2`, undefined for `x > 3`. In the box `[-2, 5]^2` the minimum is 2, at (1, -2).
     struct Bowl;
     impl CostFunction for Bowl {
         type Param = Vec<f64>;
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn solvers_of_mops_end_at_the_bound_that_the_minimum_lies_at() {
+    fn solvers_find_a_minimum_on_a_bound() {
         for (x, count) in [
             minimise(&SqpOptions::default()),
             minimise(&PatternSearchOptions::default()),
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_of_the_cost_function_is_that_of_the_run() {
+    fn an_error_of_the_cost_function_ends_the_run() {
         struct Broken;
         impl CostFunction for Broken {
             type Param = Vec<f64>;

@@ -1,4 +1,4 @@
-//! The solver for those who do not choose one.
+//! Default solver, which chooses a method for the problem.
 
 use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
@@ -16,20 +16,25 @@ use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
-/// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp`. One criterion without constraints is looked at along one to three lines near the start: where
-/// it is noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`, with a
-/// pattern search from the study's own start as a second opinion on where that leads. Each begins at several starts: the
-/// study's own, and the best points of a sample of the box. Where the objective is no sum of squares a pattern
-/// search goes on from the best point after all starts, and, but where it was found smooth, from the end of the first run,
-/// because an optimum may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
-/// best point until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is
-/// `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria
-/// and `nsga3` for more.
+/// Chooses a method from the properties of the problem.
+///
+/// - Sum of squares: `levenberg-marquardt`, restarted around the best point until nothing changes.
+/// - Tuners with whole numbers or lists: `pattern-search`.
+/// - One criterion without constraints: noise and kinks (non-differentiable points) are detected from values along one
+///   to three lines near the initial guess. With noise: `pattern-search`. Smooth: BFGS with a line search, then `sqp`;
+///   a pattern search from the same initial guess may find a better basin. With kinks: `sqp`.
+/// - All other problems with one objective: `sqp`.
+/// - A front (`objective = "each"`): `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers
+///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
+///
+/// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
+/// points of a sample of the box. Unless the objective is a sum of squares, a pattern search then continues from the
+/// best point. Unless the criterion is smooth, a pattern search also continues from the end of the first run. An
+/// optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
-    /// Number of starts, the study's own included.
+    /// Number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
@@ -55,31 +60,31 @@ struct Auto {
 }
 
 enum Stage {
-    /// Where every criterion counts for itself.
+    /// Search for a front.
     Front(Box<dyn Solver>),
-    /// From several starts.
+    /// Multistart of the chosen method.
     Global(Multistart),
-    /// From the best point on, without slopes.
+    /// Derivative-free search from the best point.
     Polish(Box<dyn Solver>, Status),
-    /// From several starts around the best point.
+    /// Multistart around the best point.
     LocalRestarts(Multistart, Status),
 }
 
-/// What is known when a stage begins.
+/// State of the search at the start of a stage.
 #[derive(Debug, Clone, Copy)]
 struct Status {
-    /// Whether a stage before met a test of an optimum.
+    /// True if a previous stage has converged.
     converged: bool,
-    /// Whether two starts have led to the same optimum.
+    /// True if two starting points have led to the same optimum.
     confirmed: bool,
-    /// The objective when the last rounds around the best point began.
+    /// Objective at the start of the last multistart around the best point.
     previous_objective: f64,
 }
 
-/// Relative change of the objective that is none.
+/// Relative change of the objective that is regarded as zero.
 const NEGLIGIBLE_CHANGE: f64 = 1e-4;
 
-/// Half the widths of the box around the best point, in turn.
+/// Half-widths of the box around the best point, used in turn.
 const RESTART_RADII: &[f64] = &[0.05, 0.02, 0.005];
 
 impl Solver for Auto {
@@ -173,7 +178,7 @@ impl Auto {
         self.methods.extend(new);
     }
 
-    /// A pattern search from the best point.
+    /// Starts a pattern search from the best point.
     fn polish(&mut self, oracle: &mut dyn Oracle, status: Status) -> Result<Progress, Halt> {
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
         let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
@@ -183,7 +188,7 @@ impl Auto {
         Ok(Progress::Continue)
     }
 
-    /// The end, or, where no two starts have led to the same optimum, rounds around the best point.
+    /// Ends the search, or starts a multistart around the best point if no optimum has been found twice.
     fn finish_or_restart(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -210,7 +215,7 @@ impl Auto {
     }
 }
 
-/// Whether the best objective is less than `before` by more than nothing.
+/// Returns true if the best objective has decreased from `previous_objective` by more than the negligible change.
 fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
     oracle.best().is_some_and(|best| {
         previous_objective.is_infinite()
@@ -218,7 +223,8 @@ fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
     })
 }
 
-/// Few criteria are followed along their front; crowding spreads two objectives evenly, reference directions more of them.
+/// Chooses the solver for a front: `weighted-chebyshev` for few criteria, otherwise `nsga2` (crowding) for two criteria
+/// and `nsga3` (reference directions) for more.
 fn front_solver(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
     let chebyshev = WeightedChebyshevOptions::default().build();
@@ -232,7 +238,7 @@ fn front_solver(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     }
 }
 
-/// What runs from several starts, and what from the study's own where that is something else.
+/// Local solver of a multistart, and a different solver for the initial guess of the study if there is one.
 struct Choice {
     first: Option<Box<dyn Solver>>,
     local: Box<dyn Solver>,
@@ -245,11 +251,11 @@ impl Choice {
     }
 }
 
-/// The local solver of a problem.
+/// Chooses the local solver of a problem.
 fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     let shape = oracle.shape().clone();
     let pattern = || Choice::new(PatternSearchOptions::default().build(), &[PatternSearchOptions::KIND]);
-    // The starts are counted here, not in the chosen solver.
+    // This solver counts the starting points itself.
     let least_squares = LevenbergMarquardtOptions::default().local();
     if least_squares.accepts(&shape).is_ok() {
         return Ok(Choice::new(least_squares, &[LevenbergMarquardtOptions::KIND]));
@@ -258,7 +264,7 @@ fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     if sqp.accepts(&shape).is_err() || start.is_empty() {
         return Ok(pattern());
     }
-    // Where there are several rows a kink is mostly one between them; they are not looked at.
+    // With several criteria most kinks lie where two criteria intersect, which `sqp` handles: no noise detection.
     let quasi_newton = Box::new(QuasiNewton::default());
     if quasi_newton.accepts(&shape).is_err() {
         return Ok(Choice::new(sqp, &[SqpOptions::KIND]));

@@ -1,24 +1,24 @@
-//! Two solvers, one after the other.
+//! Chaining of two solvers.
 
 use mops_core::{Halt, Oracle, Progress, Shape, Solver};
 
-/// A solver that goes on from the best point where another one stalls, or ends.
+/// Solver that hands over to a second solver, at the best point, when the first one ends.
 pub struct Chain {
     first: Box<dyn Solver>,
     second: Box<dyn Solver>,
-    /// Whether the second one goes on where the first has converged too.
+    /// True if the second solver also runs after the first one has converged.
     unconditional: bool,
-    /// Whether the second one goes on.
+    /// True while the second solver runs.
     second_is_active: bool,
 }
 
 impl Chain {
-    /// The first, then the other.
+    /// Chains two solvers; the second one runs only if the first one stalls.
     pub fn on_stall(first: Box<dyn Solver>, second: Box<dyn Solver>) -> Self {
         Self { first, second, unconditional: false, second_is_active: false }
     }
 
-    /// The first to its end, however that is, then the other.
+    /// Chains two solvers; the second one runs after any end of the first one.
     pub fn always(first: Box<dyn Solver>, second: Box<dyn Solver>) -> Self {
         Self { unconditional: true, ..Self::on_stall(first, second) }
     }

@@ -1,10 +1,12 @@
-//! Factors of positive definite matrices: nalgebra's for large systems, and one that keeps its memory where a matrix turns out
-//! not to be positive definite.
+//! Cholesky factorisation: by nalgebra for large systems, and in place for repeated attempts on matrices that may be
+//! indefinite.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Factors a symmetric matrix of size `n`, of which `fill` gives the lower triangle over zeros, and hands the factor on; `None`
-/// where the matrix is not positive definite. The memory is used again, unless that is so.
+/// Factorises a symmetric matrix of size `n` and passes the factor to `use_factor`.
+///
+/// `fill` writes the lower triangle into a zero matrix. Returns `None` if the matrix is not positive definite; `buffer`
+/// is then lost, otherwise it is reused.
 pub fn with_cholesky<T>(
     buffer: &mut Vec<f64>,
     n: usize,
@@ -22,8 +24,8 @@ pub fn with_cholesky<T>(
     Some(answer)
 }
 
-/// Turns the lower triangle of a positive definite matrix of size `n` into its Cholesky factor; columns lie `stride` apart.
-/// `false` where the matrix is not positive definite.
+/// Replaces the lower triangle of a matrix of size `n` by its Cholesky factor; `stride` is the distance between
+/// columns. Returns false if the matrix is not positive definite.
 pub fn factorise(l: &mut [f64], n: usize, stride: usize) -> bool {
     for k in 0..n {
         for i in k..n {
@@ -43,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_factors_are_the_same() {
+    fn both_factorisations_agree() {
         let entries = [4.0, 2.0, 0.4, 2.0, 3.0, 1.0, 0.4, 1.0, 5.0];
         let mut buffer = Vec::new();
         let matrix = DMatrix::from_row_slice(3, 3, &entries);

@@ -1,4 +1,4 @@
-//! Solvers of mops: one file each, behind one seam ([`mops_core::Solver`]).
+//! Solvers of mops, one file each, behind the trait [`mops_core::Solver`].
 
 mod active_set;
 mod argmin_cost;
@@ -39,7 +39,7 @@ use mops_core::SolverKind;
 
 pub use pareto::{Certificate, certificate, certify};
 
-/// Every kind of solver, the default first. A new one is a file, and a line here.
+/// Returns every kind of solver, the default first. A new kind is one file and one line here.
 pub fn kinds() -> Vec<SolverKind> {
     vec![
         SolverKind::of::<auto::AutoOptions>(),

@@ -1,12 +1,14 @@
-//! A dual active-set method for strictly convex quadratic programs.
+//! Dual active-set method for strictly convex quadratic programs.
 //!
 //! ```text
 //! min over x   1/2 x'Hx + c'x    subject to   a_i x >= b_i
 //! ```
-//! Every iterate is the minimum over its active constraints, with multipliers that are not negative; a violated constraint
-//! is added at a time, and those whose multiplier falls to 0 on the way are dropped. With `H = L L'`, `J = L^-T Q` and the
-//! triangle `R` from the normals `N` of the active constraints, `L^-1 N = Q [R; 0]`: both are updated by plane rotations. The
-//! last iterate is computed anew from its active set, so that no rounding of the way there stays in it.
+//! Every iterate is the minimiser over its active constraints, with non-negative multipliers. One violated constraint
+//! is added at a time; constraints whose multiplier reaches 0 during the step are dropped.
+//!
+//! With `H = L L'` and the normals `N` of the active constraints, `L^-1 N = Q [R; 0]` and `J = L^-T Q`. Plane rotations
+//! update `J` and the upper triangular `R`. The last iterate is recomputed from its active set to remove accumulated
+//! rounding errors.
 //!
 //! Source: D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly convex quadratic programs,
 //! Mathematical Programming 27 (1983) 1-33.
@@ -14,53 +16,54 @@
 /// Linear constraints `a_i x >= b_i`.
 #[derive(Debug, Default)]
 pub struct Constraints {
-    /// The rows `a_i`, one after the other.
+    /// Normals `a_i`, concatenated.
     pub normals: Vec<f64>,
-    /// The numbers `b_i`.
+    /// Right-hand sides `b_i`.
     pub bounds: Vec<f64>,
 }
 
 impl Constraints {
-    /// Forgets all of them.
+    /// Removes all constraints.
     pub fn clear(&mut self) {
         self.normals.clear();
         self.bounds.clear();
     }
 }
 
-/// The method, with its memory, which is used again from program to program.
+/// Solver for quadratic programs; reuses its memory from one program to the next.
 #[derive(Debug, Default)]
 pub struct ActiveSet {
     /// Number of variables.
     n: usize,
-    /// `J`, by columns.
+    /// Matrix `J`, column-major.
     j: Vec<f64>,
-    /// `R`, by columns.
+    /// Matrix `R`, column-major.
     r: Vec<f64>,
-    /// The active constraints, by index.
+    /// Indices of the active constraints.
     active: Vec<usize>,
-    /// Those of the last program.
+    /// Indices of the constraints active in the previous program (warm start).
     previous_active: Vec<usize>,
-    /// The multipliers of the active ones.
+    /// Multipliers of the active constraints.
     multipliers: Vec<f64>,
-    /// The iterate.
+    /// Iterate.
     x: Vec<f64>,
-    /// `J'a` of the constraint that is added.
+    /// Projection `J'a` of the constraint to be added.
     projected_normal: Vec<f64>,
-    /// The step of the iterate.
+    /// Step of the iterate.
     step: Vec<f64>,
-    /// The step of the multipliers.
+    /// Step of the multipliers.
     multiplier_step: Vec<f64>,
 }
 
-/// Relative size of what is left of a normal below which it depends on the active ones.
+/// Relative norm of the projected normal below which the normal is linearly dependent on the active ones.
 const DEPENDENT: f64 = 1e-13;
 
 impl ActiveSet {
-    /// Solves a program whose Hessian has the Cholesky factor `l`, by columns; `first` are constraints that are active with
-    /// multipliers above 0 at the minimum over them, or none. Constraints that were active the last time are looked at before
-    /// all others. `false` where the constraints contradict each other, or
-    /// rounding keeps the method from an end.
+    /// Solves a program whose Hessian has the Cholesky factor `l` (column-major).
+    ///
+    /// `first` lists constraints that are active with positive multipliers at the minimum over them; it may be empty.
+    /// Constraints active in the previous program are tested for violation before all others. Returns false if the
+    /// constraints are inconsistent or if rounding errors prevent convergence.
     pub fn solve(&mut self, l: &[f64], c: &[f64], constraints: &Constraints, first: &[usize]) -> bool {
         self.previous_active.clone_from(&self.active);
         self.previous_active.retain(|p| *p < constraints.bounds.len());
@@ -114,17 +117,17 @@ impl ActiveSet {
         self.x.iter().all(|x| x.is_finite())
     }
 
-    /// The solution.
+    /// Returns the solution.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
 
-    /// The active constraints, by index, with their multipliers.
+    /// Iterates over the indices and multipliers of the active constraints.
     pub fn active(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.active.iter().copied().zip(self.multipliers.iter().copied())
     }
 
-    /// `J = L^-T`, and nothing active.
+    /// Resets the method to `J = L^-T` and an empty active set.
     fn reset(&mut self, l: &[f64], n: usize) {
         self.n = n;
         self.active.clear();
@@ -147,15 +150,15 @@ impl ActiveSet {
         }
     }
 
-    /// `along = J'a`.
+    /// Computes the projected normal `J'a`.
     fn project_normal(&mut self, normal: &[f64]) {
         for (projected_normal, column) in self.projected_normal.iter_mut().zip(self.j.chunks_exact(self.n)) {
             *projected_normal = dot(column, normal);
         }
     }
 
-    /// The steps of the iterate and of the multipliers per unit of the new one; the curvature along the first, 0 where the
-    /// normal depends on the active ones.
+    /// Computes the steps of the iterate and of the multipliers per unit of the new multiplier. Returns the curvature
+    /// along the step of the iterate: 0 if the normal is linearly dependent on the active ones.
     fn step_directions(&mut self) -> f64 {
         let (n, q) = (self.n, self.active.len());
         self.multiplier_step.clear();
@@ -181,7 +184,7 @@ impl ActiveSet {
         free
     }
 
-    /// How far the multipliers can go until the first of them is 0, and which.
+    /// Returns the largest step that keeps all multipliers non-negative, and the position of the blocking constraint.
     fn ratio_test(&self) -> (f64, usize) {
         let ratios = self.multipliers.iter().zip(&self.multiplier_step).enumerate();
         let ratios = ratios
@@ -190,7 +193,7 @@ impl ActiveSet {
         ratios.fold((f64::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best })
     }
 
-    /// Adds the constraint that was projected; `false` where rounding leaves nothing of it.
+    /// Adds the projected constraint; returns false if rounding errors cancel its normal.
     fn add(&mut self, p: usize) -> bool {
         let (n, q) = (self.n, self.active.len());
         if q == n {
@@ -237,8 +240,8 @@ impl ActiveSet {
         }
     }
 
-    /// The minimum over the active constraints, and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 = -J_2'c`,
-    /// `R u = y_1 + J_1'c`.
+    /// Computes the minimiser over the active constraints and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 =
+    /// -J_2'c`, `R u = y_1 + J_1'c`.
     fn minimise_over_active_set(&mut self, c: &[f64], constraints: &Constraints) {
         let (n, q) = (self.n, self.active.len());
         self.x.fill(0.0);
@@ -267,7 +270,8 @@ impl ActiveSet {
         }
     }
 
-    /// A violated constraint and its slack: the worst of the likely ones, else the worst of all.
+    /// Returns the most violated constraint and its slack: among those active in the previous program, otherwise among
+    /// all.
     fn most_violated(&self, constraints: &Constraints) -> Option<(usize, f64)> {
         let largest = self.x.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
         let worst = |candidates: &mut dyn Iterator<Item = usize>| {
@@ -290,14 +294,14 @@ impl ActiveSet {
     }
 }
 
-/// Violation that is none, relative to the terms of a constraint.
+/// Violation regarded as zero, relative to the terms of a constraint.
 const ROUNDING: f64 = 1e-12;
 
 fn row(constraints: &Constraints, p: usize, n: usize) -> &[f64] {
     &constraints.normals[p * n..(p + 1) * n]
 }
 
-/// The inner product, in four sums, which do not wait for one another.
+/// Inner product with four independent partial sums, which the processor can compute in parallel.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
     let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
@@ -310,7 +314,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Cosine and sine of the rotation that takes `(a, b)` to `(length, 0)`.
+/// Cosine and sine of the rotation that maps `(a, b)` to `(length, 0)`, and the length.
 fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
     if b == 0.0 {
         return (1.0, 0.0, a);
