@@ -59,7 +59,10 @@ impl ArgminSolver {
     /// If a bound is not finite, or a lower bound exceeds its upper bound.
     pub fn new<S: SolverOptions>(options: &S, bounds: &[[f64; 2]]) -> Self {
         let is_valid = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
-        assert!(bounds.iter().all(is_valid), "every bound must be finite, and no lower bound may exceed its upper bound");
+        assert!(
+            bounds.iter().all(is_valid),
+            "every bound must be finite, and no lower bound may exceed its upper bound"
+        );
         let shape = Shape { spacing: vec![0.0; bounds.len()], rows: vec![(Usage::Minimise, 1.0)], ..Shape::default() };
         let data = ProblemData {
             bounds: bounds.to_vec(),
@@ -121,9 +124,14 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> argmin::core::Solver<O, St
 
     fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
         self.solver.accepts(&self.data.shape).map_err(Error::msg)?;
-        let start = state.take_param().ok_or_else(|| Error::msg("no initial guess; add `configure(|s| s.param(..))`"))?;
+        let start =
+            state.take_param().ok_or_else(|| Error::msg("no initial guess; add `configure(|s| s.param(..))`"))?;
         if start.len() != self.data.bounds.len() {
-            return Err(Error::msg(format!("expected one pair of bounds per variable, found {} variables and {} pairs of bounds", start.len(), self.data.bounds.len())));
+            return Err(Error::msg(format!(
+                "expected one pair of bounds per variable, found {} variables and {} pairs of bounds",
+                start.len(),
+                self.data.bounds.len()
+            )));
         }
         let start = self.data.point_of(&start);
         self.data.best = None;

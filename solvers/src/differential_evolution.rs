@@ -1,4 +1,4 @@
-//! Differential evolution that adapts its own factors (SHADE).
+//! Differential evolution with adaptive parameters (SHADE).
 
 use mops_core::math;
 use mops_core::{Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
@@ -9,25 +9,27 @@ use serde::Deserialize;
 use crate::population::{Next, Population, RestartRule, StagnationMonitor};
 use crate::ranking::compare;
 
-/// Differential evolution with factors that adapt to what has succeeded (SHADE): a global search without slopes, strong
-/// where tuners act separately. A whole generation is evaluated in parallel; it begins again with new members once the old
-/// ones are all alike, or nothing improves. It sees one number per point, the maximum, and the largest violation.
+/// Differential evolution with success-history based parameter adaptation (SHADE). A derivative-free global search,
+/// strong on separable problems.
 ///
-/// Source: R. Tanabe, A. Fukunaga, Success-history based parameter adaptation for differential evolution, IEEE CEC (2013)
-/// 71-78, with the memory of six of their L-SHADE, IEEE CEC (2014) 1658-1665.
+/// A whole generation is evaluated in parallel. The population is resampled once its members have converged or nothing
+/// improves. The method uses two numbers per point: the objective and the largest violation.
+///
+/// Source: R. Tanabe, A. Fukunaga, Success-history based parameter adaptation for differential evolution, IEEE CEC
+/// (2013) 71-78, with a memory of six entries as in L-SHADE, IEEE CEC (2014) 1658-1665.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct DifferentialEvolutionOptions {
-    /// Number of members; 0 for ten per tuner, at least 20 and at most 100.
+    /// Population size; 0 for ten per tuner, at least 20 and at most 100.
     #[schemars(range(max = 1_000_000))]
     pub population: usize,
-    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    /// The population has converged when the values of its members differ by less than this, relative to the objective.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Generations without a better point after which the members are drawn anew.
+    /// Number of generations without improvement after which the population is resampled.
     #[schemars(range(min = 1))]
     pub patience: usize,
-    /// Number of times that the members are drawn anew.
+    /// Maximum number of times that the population is resampled.
     pub restarts: usize,
 }
 
@@ -45,7 +47,7 @@ impl SolverOptions for DifferentialEvolutionOptions {
     }
 }
 
-/// The solver of the kind `differential-evolution`.
+/// Solver of the kind `differential-evolution`.
 struct DifferentialEvolution {
     options: DifferentialEvolutionOptions,
     state: Option<State>,
@@ -54,9 +56,9 @@ struct DifferentialEvolution {
 struct State {
     random: Stream,
     population: Population,
-    /// Memory for the mixtures that challenge the members.
+    /// Buffer for the trial vectors.
     trials: Vec<Vec<f64>>,
-    /// Members that were replaced by better ones.
+    /// Archive of parents replaced by better trial vectors.
     archive: Vec<Vec<f64>>,
     history: SuccessHistory,
     stagnation: StagnationMonitor,
@@ -106,7 +108,7 @@ impl DifferentialEvolution {
 }
 
 impl State {
-    /// Every member is challenged by a mixture of others.
+    /// Evaluates one trial vector per member and selects the survivors.
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
         let size = self.population.len();
         let order = self.population.order();
@@ -125,7 +127,7 @@ impl State {
             if comparison.is_gt() {
                 continue;
             }
-            // From here on the trial is the parent.
+            // After this swap, `trial` contains the parent.
             std::mem::swap(&mut self.population.points[member], trial);
             self.population.merits[member] = merit;
             if comparison.is_lt() {
@@ -143,8 +145,8 @@ impl State {
         Ok(())
     }
 
-    /// Writes `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`, to `trial`: `x_p` is one of the best tenth or two, `x_2` may be a member that
-    /// was replaced.
+    /// Writes `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`, to `trial`. `x_p` is drawn from the best members: a
+    /// random share of up to 20 %, at least two. `x_2` may come from the archive.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn mutate_and_cross(&mut self, trial: &mut [f64], member: usize, order: &[usize], [factor, rate]: [f64; 2]) {
         let size = self.population.len();
@@ -172,7 +174,7 @@ impl State {
                 return x[j];
             }
             let mutant = x[j] + factor * (points[best][j] - x[j] + points[first][j] - other[j]);
-            // Halfway to the face it would cross.
+            // Midpoint between the parent and the violated face.
             if mutant < 0.0 {
                 0.5 * x[j]
             } else if mutant > 1.0 {
@@ -185,7 +187,7 @@ impl State {
     }
 }
 
-/// How much better a merit is.
+/// Returns the improvement of a merit.
 fn improvement(before: &Merit, after: &Merit) -> f64 {
     let improvement = if after.is_feasible() && before.is_feasible() {
         before.objective - after.objective
@@ -195,7 +197,7 @@ fn improvement(before: &Merit, after: &Merit) -> f64 {
     if improvement.is_finite() && improvement > 0.0 { improvement } else { f64::MIN_POSITIVE }
 }
 
-/// Factors and crossover rates that succeeded.
+/// Means of the successful scale factors and crossover rates.
 #[derive(Debug, Clone)]
 struct SuccessHistory {
     means: [[f64; 2]; 6],
@@ -209,7 +211,7 @@ impl SuccessHistory {
 
     fn draw(&self, random: &mut Stream) -> [f64; 2] {
         let [factor, rate] = self.means[random.random_range(0..self.means.len())];
-        // Of the Cauchy distribution around `factor`, and of the normal one around `rate`.
+        // Cauchy distribution around `factor`, normal distribution around `rate`.
         let factor = loop {
             let drawn = factor + 0.1 * math::tan(std::f64::consts::PI * random.random::<f64>());
             if drawn > 0.0 {
@@ -220,7 +222,7 @@ impl SuccessHistory {
         [factor, rate.clamp(0.0, 1.0)]
     }
 
-    /// The weighted Lehmer mean of the factors, the weighted mean of the rates.
+    /// Stores the weighted Lehmer mean of the successful factors and the weighted mean of the successful rates.
     fn update(&mut self, successes: &[([f64; 2], f64)]) {
         let largest = successes.iter().map(|(_, improvement)| *improvement).fold(0.0, f64::max);
         if successes.is_empty() || largest <= 0.0 {

@@ -1,14 +1,14 @@
-//! The quadratic subproblem of a min-max problem in its smooth (epigraph) form, with elastic constraints.
+//! Quadratic subproblem of a min-max problem in its smooth (epigraph) form, with elastic constraints.
 //!
-//! With values and slopes of the rows at a point, find the step `d` that solves
+//! Given values and gradients of the criteria at a point, the subproblem for the step `d` is
 //! ```text
 //! min over d, t, e   1/2 d'Bd + t + penalty e
-//! subject to         f_i + g_i d <= t         every objective row
+//! subject to         f_i + g_i d <= t         every objective
 //!                    c_j + a_j d <= e         every inequality
 //!                    |h_k + b_k d| <= e       every equality
 //!                    low <= d <= high,  e >= 0
 //! ```
-//! It has a solution whatever the rows: where the linearised constraints contradict each other, `e` stays positive.
+//! A solution always exists: if the linearised constraints are inconsistent, `e` stays positive.
 
 use nalgebra::DMatrix;
 
@@ -16,23 +16,23 @@ use crate::active_set::{ActiveSet, Constraints, dot};
 use crate::cholesky::factorise;
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria, Multipliers};
 
-/// The solution of the subproblem.
+/// Solution of the subproblem.
 #[derive(Debug, Clone, Default)]
 pub struct Direction {
-    /// The step.
+    /// Step.
     pub step: Vec<f64>,
-    /// The largest linearised objective row after it.
+    /// Largest linearised objective after the step.
     pub level: f64,
-    /// The largest linearised violation after it.
+    /// Largest linearised violation after the step.
     pub violation: f64,
-    /// What the rows weigh.
+    /// Multipliers of the criteria.
     pub multipliers: Multipliers,
 }
 
-/// The subproblem, with its memory, which is used again from step to step.
+/// Solver for the subproblem; reuses its memory from one step to the next.
 ///
-/// Level and elastic violation have no curvature of their own. They get one that is small beside all others, about the level
-/// here and about no violation, so that it does nothing at a solution.
+/// The level `t` and the elastic violation `e` have no curvature of their own. A small curvature is added, centred at
+/// the present level and at zero violation, so that it has no influence at a solution.
 #[derive(Debug, Default)]
 pub struct Subproblem {
     method: ActiveSet,
@@ -44,11 +44,11 @@ pub struct Subproblem {
 }
 
 impl Subproblem {
-    /// Curvature of level and violation, relative to what the objective can fall by.
+    /// Curvature of level and violation, relative to the possible decrease of the objective.
     const CURVATURE: f64 = 1e-7;
 
-    /// Finds the solution with steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding
-    /// keeps the method from an end.
+    /// Computes the step between `low` and `high`. Returns `None` if the Hessian is not positive definite or rounding
+    /// errors prevent convergence.
     #[must_use]
     pub fn solve(
         &mut self,
@@ -79,8 +79,8 @@ impl Subproblem {
         Some(())
     }
 
-    /// The rows as constraints on step, level and violation, in the order of `rows`, then the box, then no violation; the
-    /// index of the largest objective row.
+    /// Writes the criteria as constraints on step, level and violation: first the criteria in their order, then the
+    /// box, then `e >= 0`. Returns the index of the largest objective.
     fn assemble_constraints(&mut self, criteria: &LinearisedCriteria, level: f64, low: &[f64], high: &[f64]) -> usize {
         self.constraints.clear();
         for row in &criteria.objectives {
@@ -113,7 +113,7 @@ impl Subproblem {
         self.constraints.bounds.push(bound);
     }
 
-    /// The Cholesky factor of the Hessian and of the small curvatures.
+    /// Computes the Cholesky factor of the Hessian, extended by the small curvatures.
     fn factor(&mut self, hessian: &DMatrix<f64>, gradient: &[f64]) -> Option<()> {
         let n = gradient.len();
         let size = n + 2;
@@ -126,7 +126,7 @@ impl Subproblem {
         if !factorise(l, n, size) {
             return None;
         }
-        // What the first row falls by without the others: |L^-1 g|^2.
+        // Predicted decrease of one objective alone: |L^-1 g|^2.
         let y = &mut self.gradient;
         y.clear();
         y.extend_from_slice(gradient);
@@ -139,7 +139,7 @@ impl Subproblem {
         Some(())
     }
 
-    /// What the rows weigh at the solution.
+    /// Reads the multipliers of the criteria at the solution.
     fn read_multipliers(&mut self, criteria: &LinearisedCriteria, multipliers: &mut Multipliers) {
         let (f, c, h) = (criteria.objectives.len(), criteria.inequalities.len(), criteria.equalities.len());
         let all = &mut self.weights;
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn two_crossing_lines_meet_in_the_middle() {
-        // max(1 + d, 1 - 2 d) without curvature: d = 0 is the best; max(1 + d, 4 - 2 d): d = 1, level 2.
+        // Without curvature, max(1 + d, 4 - 2 d) has its minimum 2 at d = 1.
         let criteria = LinearisedCriteria {
             objectives: vec![linear(1.0, &[1.0]), linear(4.0, &[-2.0])],
             inequalities: vec![],
@@ -199,8 +199,8 @@ mod tests {
     }
 
     #[test]
-    fn contradicting_constraints_are_violated_as_little_as_can_be() {
-        // d <= -1 and d >= 1 cannot hold: the best is d = 0, violated by 1.
+    fn inconsistent_constraints_have_the_least_possible_violation() {
+        // d <= -1 and d >= 1 are inconsistent: the best step is d = 0, with violation 1.
         let criteria = LinearisedCriteria {
             objectives: vec![linear(0.0, &[0.1])],
             inequalities: vec![linear(1.0, &[1.0]), linear(1.0, &[-1.0])],
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equality_is_met_where_it_can_be() {
+    fn a_consistent_equality_is_satisfied() {
         let criteria = LinearisedCriteria {
             objectives: vec![linear(0.0, &[1.0, 1.0])],
             inequalities: vec![],

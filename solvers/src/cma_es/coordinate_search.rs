@@ -1,27 +1,27 @@
-//! A search along every axis by itself: where tuners act apart from each other, it finds the best of many basins at once.
+//! Line searches along the coordinate axes, which find the best of many basins of a separable problem.
 
 use mops_core::{Halt, Merit, Oracle};
 
 use crate::ranking::compare;
 
-/// Places along an axis that are looked at, both ends among them.
+/// Number of grid points on an axis, including both ends.
 const GRID_POINTS: u16 = 201;
 
-/// Minima among them that are looked at closely, and how often.
+/// Number of grid minima that are refined, and number of refinement steps.
 const MINIMA: usize = 8;
 const REFINEMENTS: usize = 8;
 
-/// Share of the wider side of a bracket at which its next place is where a parabola tells none. Source: R. P. Brent, Algorithms
-/// for Minimization Without Derivatives (1973), section 5.4: the golden section.
+/// Position of the next point within the wider side of a bracket if no parabola can be fitted (golden section). Source:
+/// R. P. Brent, Algorithms for Minimization Without Derivatives (1973), section 5.4.
 const GOLDEN: f64 = 0.381_966_011_250_105;
 
-/// First standard deviation of a run that begins where the search ended.
+/// Initial standard deviation of a run that starts at the end of the coordinate search.
 pub const RESTART_SIGMA: f64 = 0.005;
 
-/// The search, an axis at a time, from a point.
+/// Search along one axis at a time, from a starting point.
 ///
-/// Source of restarts beside it: I. Loshchilov, M. Schoenauer, M. Sebag, Bi-population CMA-ES algorithms with surrogate models
-/// and line searches, GECCO companion (2013) 1177-1184.
+/// Source of its combination with restarts: I. Loshchilov, M. Schoenauer, M. Sebag, Bi-population CMA-ES algorithms
+/// with surrogate models and line searches, GECCO companion (2013) 1177-1184.
 #[derive(Debug, Clone)]
 pub struct CoordinateSearch {
     point: Vec<f64>,
@@ -30,29 +30,29 @@ pub struct CoordinateSearch {
     improved: bool,
 }
 
-/// Three places on an axis, of which the middle one is best.
+/// Three positions on an axis; the middle one is the best.
 struct Bracket {
     positions: [f64; 3],
     merits: [Merit; 3],
 }
 
 impl CoordinateSearch {
-    /// Before the first axis, at a point.
+    /// Creates the search at a point, before the first axis.
     pub fn new(point: Vec<f64>, merit: Merit) -> Self {
         Self { point, merit, next: 0, improved: false }
     }
 
-    /// Whether every axis was searched.
+    /// Returns true once every axis has been searched.
     pub fn is_finished(&self) -> bool {
         self.next == self.point.len()
     }
 
-    /// The best point and its merit, where these are better than those it began with.
+    /// Returns the best point and its merit if they improve on the starting point.
     pub fn improvement(self) -> Option<(Vec<f64>, Merit)> {
         self.improved.then_some((self.point, self.merit))
     }
 
-    /// Searches the next axis, with the other coordinates as they are best.
+    /// Searches the next axis, with the other coordinates at their best values so far.
     pub fn search(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
         let axis = self.next;
         self.next += 1;
@@ -72,7 +72,7 @@ impl CoordinateSearch {
         Ok(())
     }
 
-    /// Evaluates places on an axis, and keeps the best point of all.
+    /// Evaluates positions on an axis and records the best point.
     fn evaluate_on_axis(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -95,7 +95,7 @@ impl CoordinateSearch {
     }
 }
 
-/// Places along an axis whose values are so far apart, 0 where it has any.
+/// Returns grid positions on an axis; `spacing` is the distance between the values of the tuner, 0 if it is continuous.
 fn positions(spacing: f64) -> Vec<f64> {
     let mut values = 2;
     while values < GRID_POINTS && f64::from(values - 1) * spacing < 1.0 {
@@ -104,7 +104,7 @@ fn positions(spacing: f64) -> Vec<f64> {
     (0..values).map(|i| f64::from(i) / f64::from(values - 1)).collect()
 }
 
-/// Brackets around the places that are no worse than both neighbours.
+/// Returns brackets around the positions that are no worse than both neighbours.
 fn brackets(positions: &[f64], merits: &[Merit]) -> Vec<Bracket> {
     let all = positions.windows(3).zip(merits.windows(3));
     let is_least = |merits: &[Merit]| !merits[0].is_better_than(&merits[1]) && merits[1].is_better_than(&merits[2]);
@@ -118,7 +118,8 @@ impl Bracket {
         Self { positions, merits }
     }
 
-    /// Where to look next: the vertex of a parabola, or where that is no guide, in the wider side.
+    /// Returns the next position: the vertex of a parabola, or a golden-section point of the wider side if the vertex
+    /// is unusable.
     fn next(&self) -> f64 {
         let [a, b, c] = self.positions;
         let wider = if c - b > b - a { b + GOLDEN * (c - b) } else { b - GOLDEN * (b - a) };
@@ -132,11 +133,11 @@ impl Bracket {
         if vertex > a + margin && vertex < c - margin && (vertex - b).abs() > margin { vertex } else { wider }
     }
 
-    /// Takes in what a place between the ends is worth.
+    /// Updates the bracket with the merit of a position inside it.
     fn update(&mut self, position: f64, merit: Merit) {
         let right = usize::from(position > self.positions[1]);
         if merit.is_better_than(&self.merits[1]) {
-            // The middle becomes an end.
+            // The middle position becomes an end.
             let end = if right == 1 { 0 } else { 2 };
             (self.positions[end], self.merits[end]) = (self.positions[1], self.merits[1]);
             (self.positions[1], self.merits[1]) = (position, merit);
@@ -152,13 +153,13 @@ mod tests {
     use mops_core::math;
 
     #[test]
-    fn a_grid_is_looked_at_where_it_has_values() {
+    fn a_grid_is_searched_at_its_values() {
         assert_eq!(positions(0.25), [0.0, 0.25, 0.5, 0.75, 1.0]);
         assert_eq!((positions(0.0).len(), positions(1.0)), (usize::from(GRID_POINTS), vec![0.0, 1.0]));
     }
 
     #[test]
-    fn a_bracket_closes_on_the_least_of_a_curve() {
+    fn a_bracket_converges_to_the_minimum_of_a_curve() {
         let curve = |u: f64| math::powi(u - 0.3, 2) + 0.2 * math::powi(u - 0.3, 3) + math::powi(u - 0.3, 4);
         let merit = |u: f64| Merit { violation: 0.0, objective: curve(u) };
         let positions = [0.1, 0.25, 0.6];

@@ -1,4 +1,4 @@
-//! The normal distribution of CMA-ES, and how a ranked generation moves it.
+//! Normal distribution of CMA-ES and its update from a ranked generation.
 
 use mops_core::Stream;
 use mops_core::math;
@@ -6,32 +6,32 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::strategy::Strategy;
 
-/// The distribution `N(mean, sigma^2 C)` with `C = B D^2 B'`, its evolution paths and its constants.
+/// Distribution `N(mean, sigma^2 C)` with `C = B D^2 B'`, its evolution paths and constants.
 #[derive(Debug, Clone)]
 pub struct Distribution {
-    /// Constants.
+    /// Strategy constants.
     pub strategy: Strategy,
-    /// Centre; it may lie outside the box.
+    /// Mean; it may lie outside the box.
     pub mean: DVector<f64>,
     /// Overall standard deviation.
     pub sigma: f64,
-    /// Generations so far.
+    /// Number of generations so far.
     pub generation: usize,
     covariance: DMatrix<f64>,
-    /// Eigenvectors of the covariance, one per column.
+    /// Eigenvectors `B` of the covariance matrix, one per column.
     eigenvectors: DMatrix<f64>,
-    /// Roots of the eigenvalues.
+    /// Square roots `D` of the eigenvalues.
     deviations: DVector<f64>,
     path_sigma: DVector<f64>,
     path_c: DVector<f64>,
     /// Generation of the last eigendecomposition.
     decomposed_at: usize,
-    /// Smallest standard deviation of every coordinate: a grid must stay within reach.
+    /// Minimum standard deviation of every coordinate, so that steps still reach the next value of a grid.
     min_deviation: Vec<f64>,
 }
 
 impl Distribution {
-    /// A round distribution; `least` is the smallest standard deviation of every coordinate.
+    /// Creates an isotropic distribution; `min_deviation` is the minimum standard deviation of every coordinate.
     pub fn new(mean: Vec<f64>, sigma: f64, population: usize, min_deviation: Vec<f64>) -> Self {
         let n = mean.len();
         Self {
@@ -49,7 +49,7 @@ impl Distribution {
         }
     }
 
-    /// Steps `y = B D z` of a generation, one per column; a member is `mean + sigma y`.
+    /// Samples the steps `y = B D z` of a generation, one per column; a member is `mean + sigma y`.
     pub fn sample(&self, random: &mut Stream) -> DMatrix<f64> {
         let mut z = DMatrix::from_fn(self.mean.len(), self.strategy.population, |_, _| math::normal(random));
         for mut column in z.column_iter_mut() {
@@ -58,9 +58,10 @@ impl Distribution {
         &self.eigenvectors * z
     }
 
-    /// Moves the distribution by a generation's steps; `order` has the members' indices, the best first.
+    /// Updates the distribution with a generation's steps; `order` lists the indices of the members, the best first.
     ///
-    /// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772, equations 38 to 47 (with negative weights).
+    /// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772, equations 38 to 47 (with negative
+    /// weights).
     #[allow(clippy::cast_precision_loss)]
     pub fn update(&mut self, steps: &DMatrix<f64>, order: &[usize]) {
         let Strategy { parents, effective, c_sigma, d_sigma, c_c, c_1, c_mu, chi, .. } = self.strategy;
@@ -91,7 +92,7 @@ impl Distribution {
         self.covariance.ger(c_1, &self.path_c, &self.path_c, 1.0);
         for (&weight, &member) in self.strategy.weights.iter().zip(order) {
             let step = steps.column(member);
-            // The square of the length of `C^(-1/2) y`.
+            // The squared norm of `C^(-1/2) y`.
             let along =
                 self.eigenvectors.column_iter().zip(&self.deviations).map(|(axis, length)| axis.dot(&step) / length);
             let square = || along.map(|z| z * z).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -105,7 +106,7 @@ impl Distribution {
         }
     }
 
-    /// `C^(-1/2) y`.
+    /// Computes `C^(-1/2) y`.
     fn whiten(&self, y: &DVector<f64>) -> DVector<f64> {
         let mut along = self.eigenvectors.tr_mul(y);
         along.component_div_assign(&self.deviations);
@@ -138,18 +139,20 @@ impl Distribution {
         self.eigenvectors = eigen.eigenvectors;
     }
 
-    /// Ratio of the largest to the smallest eigenvalue of the covariance.
+    /// Returns the condition number of the covariance matrix.
     pub fn condition(&self) -> f64 {
         math::powi(self.deviations.max() / self.deviations.min(), 2)
     }
 
-    /// The largest standard deviation of a coordinate, and length of a path, whichever is larger.
+    /// Returns the larger of two extents: the largest standard deviation of a coordinate, and `sigma` times the largest
+    /// entry of the evolution path of the covariance.
     pub fn largest_extent(&self) -> f64 {
         let spread = self.covariance.diagonal().map(f64::sqrt).max();
         self.sigma * spread.max(self.path_c.amax())
     }
 
-    /// Whether a tenth of a standard deviation along an axis, or a fifth along a coordinate, changes no bit of the mean.
+    /// Returns true if a tenth of a standard deviation along a principal axis, or a fifth along a coordinate, leaves
+    /// the mean unchanged in floating-point arithmetic.
     pub fn is_below_rounding(&self) -> bool {
         let axis = self.generation % self.mean.len();
         let step = self.eigenvectors.column(axis) * (0.1 * self.sigma * self.deviations[axis]);

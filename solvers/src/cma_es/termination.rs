@@ -1,4 +1,4 @@
-//! When a run of CMA-ES ends and the next begins.
+//! Termination of a run of CMA-ES.
 
 use std::collections::VecDeque;
 
@@ -8,41 +8,43 @@ use mops_core::math;
 /// Objective values of the generations of a run.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// Best and median of every generation.
+    /// Best and median value of every generation.
     best: Vec<f64>,
     median: Vec<f64>,
-    /// Best of the last generations.
+    /// Best values of the last generations.
     recent: VecDeque<f64>,
     initial_sigma: f64,
     tolerance: f64,
 }
 
-/// A run ends when its values differ by less than this share of what it lies behind the best known point.
+/// Spread of the values, relative to the deficit to the best known point, below which a run ends.
 const WORSE_BASIN: f64 = 1e-2;
 
-/// Why a run ended.
+/// Reason for the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     /// Values or points no longer differ.
     Converged,
-    /// Nothing improves, or the distribution is degenerate.
+    /// No improvement, or a degenerate distribution.
     Stagnated,
 }
 
 impl History {
-    /// Of a run that has not begun; `tolerance` is relative to the objective.
+    /// Creates the empty history of a run; `tolerance` is relative to the objective.
     pub fn new(initial_sigma: f64, tolerance: f64) -> Self {
         Self { best: Vec::new(), median: Vec::new(), recent: VecDeque::new(), initial_sigma, tolerance }
     }
 
-    /// Takes a generation's values, the best first, and says whether the run is over. `unit` is the order of magnitude of
-    /// the objective below which differences count absolutely, `behind` how far the generation lies above the best point of
-    /// the runs before.
+    /// Records the values of a generation, best first, and returns the reason if the run has ended.
     ///
-    /// N.B.: a run whose values no longer differ by a hundredth of what it lies behind has found a worse basin, and ends;
-    /// the paper lets it converge.
+    /// `unit` is the order of magnitude of the objective; below it, differences count absolutely. `deficit` is the
+    /// distance of the generation's best value to the best known value.
     ///
-    /// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009) 2389-2396.
+    /// N.B.: a run whose values differ by less than a hundredth of the deficit has found a worse basin and ends. The
+    /// paper lets such a run converge.
+    ///
+    /// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009)
+    /// 2389-2396.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn record(&mut self, values: &[f64], unit: f64, deficit: f64, distribution: &Distribution) -> Option<End> {
         let (n, population) = (distribution.mean.len() as f64, values.len() as f64);
@@ -80,12 +82,12 @@ impl History {
         is_finished.then_some(End::Stagnated)
     }
 
-    /// Whether the best values of the last generations are all the same.
+    /// Returns true if the best values of the last generations are identical.
     fn is_constant(&self, window: usize) -> bool {
         self.recent.len() == window && self.recent.iter().all(|value| *value == self.recent[0])
     }
 
-    /// Whether the medians of the newest third of a long window are no better than those of the oldest.
+    /// Returns true if, over a long window, the medians of the newest 30 % are no better than those of the oldest 30 %.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn is_stagnating(&self, n: f64, population: f64) -> bool {
         let generations = self.best.len();
