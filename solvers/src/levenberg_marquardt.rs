@@ -1,4 +1,4 @@
-//! The Levenberg-Marquardt method for sums of squares, with bounds and several starts.
+//! Levenberg-Marquardt method for sums of squares, with bounds and multistart.
 
 use mops_core::math;
 use mops_core::{Halt, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
@@ -9,26 +9,28 @@ use serde::Deserialize;
 use crate::multistart::Multistart;
 use crate::start::usable_start;
 
-/// The Levenberg-Marquardt method: for calibrations, whose objective is a sum of squares of residuals `r`.
+/// Levenberg-Marquardt method for calibration, where the objective is a sum of squares of residuals `r`.
 /// ```text
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
-/// Bounds are kept by an active set: tuners at a bound that the step would leave are held, and the rest solved again.
-/// Runs from the study's start, then from the best points of a sample of the box, then from points around the best one
-/// found, in rounds until two of them improve it by less than a thousandth.
+/// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
+/// recomputed.
 ///
-/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by
-/// H. B. Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
+/// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
+/// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
+///
+/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by H. B.
+/// Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LevenbergMarquardtOptions {
-    /// Stop when a step promises less than this part of the sum of squares.
+    /// Predicted relative decrease of the sum of squares below which the iteration stops.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Number of starts, the study's own included.
+    /// Number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
-    /// Largest number of iterations from each start.
+    /// Maximum number of iterations per starting point.
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
@@ -49,13 +51,13 @@ impl SolverOptions for LevenbergMarquardtOptions {
 }
 
 impl LevenbergMarquardtOptions {
-    /// The method itself, without further starts.
+    /// Builds the method without multistart.
     pub fn local(&self) -> Box<dyn Solver> {
         Box::new(Local { options: self.clone(), state: None })
     }
 }
 
-/// The solver of the kind `levenberg-marquardt`.
+/// Solver of the kind `levenberg-marquardt`.
 struct LevenbergMarquardt {
     starts: Multistart,
 }
@@ -76,21 +78,21 @@ impl Solver for LevenbergMarquardt {
 
 fn accepts(shape: &Shape) -> Result<(), String> {
     if shape.residuals == 0 {
-        return Err("`levenberg-marquardt` needs a sum of squares: objective = \"sum\" with `fit` or `normalised-error` criteria and simulations that succeed at the start; take `sqp`".into());
+        return Err("`levenberg-marquardt` needs a sum of squares: objective = \"sum\" with `fit` or `normalised-error` criteria and simulations that succeed at the initial guess; otherwise use `sqp`".into());
     }
     if shape.has_constraints() {
-        return Err("`levenberg-marquardt` treats bounds, but no other constraints; take `sqp`".into());
+        return Err("`levenberg-marquardt` supports bounds, but no other constraints; use `sqp`".into());
     }
     if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
         return Err(
-            "`levenberg-marquardt` follows slopes and cannot treat whole numbers or lists; take `pattern-search`"
+            "`levenberg-marquardt` needs gradients, but a tuner has whole numbers or a list of values; use `pattern-search`"
                 .into(),
         );
     }
     Ok(())
 }
 
-/// The method from one start.
+/// Levenberg-Marquardt iteration from one starting point.
 struct Local {
     options: LevenbergMarquardtOptions,
     state: Option<State>,
@@ -100,12 +102,12 @@ struct State {
     iterate: Linearisation,
     jacobian: DMatrix<f64>,
     residuals: DVector<f64>,
-    /// Squares of the scale of every coordinate.
+    /// Squared scale of every coordinate.
     scale: DVector<f64>,
     damping: f64,
     damping_growth: f64,
     iterations: usize,
-    /// Steps in a row that brought almost nothing.
+    /// Number of successive steps with negligible decrease.
     stalled_steps: usize,
 }
 
@@ -179,9 +181,10 @@ fn matrices(at: &Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
-    /// More's test: at an optimum the residuals are orthogonal to every column of the Jacobian that can move.
+    /// Applies More's test: at an optimum the residuals are orthogonal to every column of the Jacobian of a free
+    /// coordinate.
     fn termination(&self) -> Progress {
-        /// Largest cosine that counts as orthogonal: the accuracy of slopes by differences.
+        /// Largest cosine regarded as orthogonal: the accuracy of finite-difference gradients.
         const ORTHOGONAL: f64 = 1e-3;
         let norm = self.residuals.norm();
         let cosine = |j: usize| {
@@ -195,7 +198,7 @@ impl State {
         if largest <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
     }
 
-    /// The damped step inside the box: coordinates that would leave it are held at their bound, one more at a time.
+    /// Computes the damped step in the box: coordinates that would leave it are fixed at their bounds, one per pass.
     fn bounded_step(&self) -> Option<DVector<f64>> {
         let point = &self.iterate.at.point;
         let n = point.len();

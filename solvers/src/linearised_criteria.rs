@@ -1,19 +1,19 @@
-//! The rows of a problem at a point: values and slopes, sorted by what they are for.
+//! Criteria linearised at a point, grouped by usage.
 
 use mops_core::{Linearisation, Objective, Shape, Usage};
 
 use crate::active_set::dot;
 
-/// A function's value and slope.
+/// Value and gradient of a function.
 #[derive(Debug, Default)]
 pub struct LinearModel {
     /// Value.
     pub value: f64,
-    /// Slope along every coordinate.
+    /// Gradient; empty if only the value is known.
     pub gradient: Vec<f64>,
 }
 
-// N.B.: a derived `clone_from` asks for memory anew.
+// N.B.: a derived `clone_from` allocates new memory.
 impl Clone for LinearModel {
     fn clone(&self) -> Self {
         Self { value: self.value, gradient: self.gradient.clone() }
@@ -25,15 +25,14 @@ impl Clone for LinearModel {
     }
 }
 
-/// The rows of a problem at a point, sorted by what they are for. They are filled again from point to point: memory once asked
-/// for is kept.
+/// Criteria of a problem, linearised at a point and grouped by usage. Memory is reused from one point to the next.
 #[derive(Debug, Default)]
 pub struct LinearisedCriteria {
-    /// To be minimised: the largest of them. One row, their sum, where the objective is a sum.
+    /// Functions whose maximum is minimised; a single function, the sum, if the objective is a sum.
     pub objectives: Vec<LinearModel>,
-    /// At most 0.
+    /// Inequality constraints, satisfied if at most 0.
     pub inequalities: Vec<LinearModel>,
-    /// Equal to 0.
+    /// Equality constraints, satisfied if 0.
     pub equalities: Vec<LinearModel>,
 }
 
@@ -52,21 +51,21 @@ impl Clone for LinearisedCriteria {
 }
 
 impl LinearisedCriteria {
-    /// The rows of a linearisation.
+    /// Creates the criteria of a linearisation.
     pub fn from_linearisation(shape: &Shape, at: &Linearisation) -> Self {
         let mut criteria = Self::default();
         criteria.linearise(shape, at);
         criteria
     }
 
-    /// The rows of given scaled values, without slopes.
+    /// Creates criteria from scaled values, without gradients.
     pub fn from_values(shape: &Shape, scaled: &[f64]) -> Self {
         let mut criteria = Self::default();
         criteria.evaluate(shape, scaled);
         criteria
     }
 
-    /// Becomes the rows of a linearisation.
+    /// Sets values and gradients from a linearisation.
     pub fn linearise(&mut self, shape: &Shape, at: &Linearisation) {
         let scaled = at.at.scaled.as_ref().expect("a point that was linearised has values");
         self.fill(shape, scaled, shape.dimension(), |row, weight, sum| {
@@ -74,13 +73,13 @@ impl LinearisedCriteria {
         });
     }
 
-    /// Becomes the rows of given scaled values, without slopes.
+    /// Sets values from scaled values, without gradients.
     pub fn evaluate(&mut self, shape: &Shape, scaled: &[f64]) {
         self.fill(shape, scaled, 0, |_, _, _| {});
     }
 
-    /// Becomes the rows of given scaled values, with slopes of length `n`: `add` adds the slope of a row, times a weight, to
-    /// what it is given.
+    /// Sets values from scaled values, and gradients of length `n`. `add` adds the gradient of a criterion, times a
+    /// weight, to its last argument.
     pub fn fill(&mut self, shape: &Shape, scaled: &[f64], n: usize, mut add: impl FnMut(usize, f64, &mut [f64])) {
         let is_sum = shape.objective == Objective::Sum;
         let mut lengths = [0; 3];
@@ -108,14 +107,14 @@ impl LinearisedCriteria {
         self.equalities.truncate(lengths[2]);
     }
 
-    /// A factor that brings the objective to the order of 1, where it is far from it: scaled values are near 1 unless
-    /// the demands are far from what can be had.
+    /// Returns a factor that brings the objective to the order of 1; 1 if its magnitude is 0 or between 1e-3 and 1e3. Scaled
+    /// values are of order 1 unless the demands are far from what is achievable.
     pub fn objective_scale(&self) -> f64 {
         let largest = self.objectives.iter().map(|row| row.value.abs()).fold(0.0, f64::max);
         if (1e-3..1e3).contains(&largest) || largest == 0.0 { 1.0 } else { 1.0 / largest }
     }
 
-    /// Takes the objective in other units.
+    /// Multiplies the objective by a factor.
     pub fn scale_objective(&mut self, factor: f64) {
         for row in &mut self.objectives {
             row.value *= factor;
@@ -123,18 +122,18 @@ impl LinearisedCriteria {
         }
     }
 
-    /// The objective: the largest of its rows.
+    /// Returns the objective: the largest of its functions.
     pub fn objective(&self) -> f64 {
         self.objectives.iter().map(|row| row.value).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The largest violation of a constraint; 0 if all hold.
+    /// Returns the largest constraint violation; 0 if all constraints are satisfied.
     pub fn violation(&self) -> f64 {
         let inequality = self.inequalities.iter().map(|row| row.value).fold(0.0, f64::max);
         self.equalities.iter().map(|row| row.value.abs()).fold(inequality, f64::max)
     }
 
-    /// The slope of the Lagrangian for the given multipliers, into `slope`.
+    /// Computes the gradient of the Lagrangian for given multipliers.
     pub fn lagrangian_gradient(&self, multipliers: &Multipliers, gradient: &mut Vec<f64>) {
         gradient.clear();
         gradient.resize(self.objectives[0].gradient.len(), 0.0);
@@ -152,8 +151,10 @@ impl LinearisedCriteria {
         }
     }
 
-    /// Becomes the rows of a point `here`, with those of other points as they extend to it; none above the row here, so that no
-    /// piece contradicts what is known. `back` is room for the way from a point to here.
+    /// Sets the criteria at `here`, followed by linear models from other points (cuts) extrapolated to `here`.
+    ///
+    /// A cut is lowered to the value at `here` if it exceeds it, so that no cut contradicts the known value. `offset`
+    /// is a buffer.
     pub fn assign_with_cuts(
         &mut self,
         criteria: &Self,
@@ -175,8 +176,8 @@ impl LinearisedCriteria {
         }
     }
 
-    /// Becomes the rows of a second-order correction: the slopes of `here`, with the values of `there` minus those slopes along
-    /// `step`.
+    /// Sets the criteria of a second-order correction: the gradients at `here`, and the values at `there` minus those
+    /// gradients times `step`.
     ///
     /// Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition (2006), section 18.3.
     pub fn assign_second_order_correction(&mut self, here: &Self, there: &Self, step: &[f64]) {
@@ -190,7 +191,7 @@ impl LinearisedCriteria {
     }
 }
 
-/// Puts the pieces of one more point, the `k`-th, after the rows.
+/// Writes the cuts of the `k`-th point behind the criteria.
 fn append_cuts(all: &mut [LinearModel], criteria: &[LinearModel], cuts: &[LinearModel], (k, offset): (usize, &[f64])) {
     let begin = (k + 1) * criteria.len();
     for ((row, cut), upper_bound) in all[begin..].iter_mut().zip(cuts).zip(criteria) {
@@ -199,7 +200,7 @@ fn append_cuts(all: &mut [LinearModel], criteria: &[LinearModel], cuts: &[Linear
     }
 }
 
-/// Makes the row at `index`, which may be the first beyond the last, a function that is 0.
+/// Sets the function at `index` to zero; appends it if `index` is the length of the list.
 fn reset(criteria: &mut Vec<LinearModel>, index: usize, n: usize) {
     if index == criteria.len() {
         criteria.push(LinearModel::default());
@@ -210,19 +211,19 @@ fn reset(criteria: &mut Vec<LinearModel>, index: usize, n: usize) {
     row.gradient.resize(n, 0.0);
 }
 
-/// What the rows weigh at the solution.
+/// Lagrange multipliers of the criteria at a solution.
 #[derive(Debug, Clone, Default)]
 pub struct Multipliers {
-    /// Of the objective rows; they sum to 1.
+    /// Multipliers of the objectives; their sum is 1.
     pub objectives: Vec<f64>,
-    /// Of the inequalities.
+    /// Multipliers of the inequalities.
     pub inequalities: Vec<f64>,
-    /// Of the equalities, signed.
+    /// Multipliers of the equalities, with sign.
     pub equalities: Vec<f64>,
 }
 
 impl Multipliers {
-    /// The sum of those of constraints.
+    /// Returns the sum of the absolute multipliers of the constraints.
     pub fn constraint_sum(&self) -> f64 {
         self.inequalities.iter().chain(&self.equalities).map(|m| m.abs()).sum()
     }
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_filling_forgets_the_first() {
+    fn filling_again_overwrites_all_values() {
         use Usage::{Equality, Inequality, Minimise, Monitor};
         let shapes = [
             shape(Objective::Max, &[Minimise, Inequality, Minimise, Equality, Inequality, Monitor]),
@@ -269,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_extend_to_here_and_stay_below_the_row() {
+    fn cuts_are_extrapolated_and_do_not_exceed_the_value() {
         let line = |value: f64, gradient: [f64; 4]| LinearisedCriteria {
             objectives: vec![LinearModel { value, gradient: gradient.to_vec() }],
             ..LinearisedCriteria::default()

@@ -1,4 +1,4 @@
-//! Two solvers of different kinds from one start, the first to rough accuracy until the other has been heard.
+//! Combination of a quasi-Newton method and a pattern search from the same starting point.
 
 use mops_core::math;
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
@@ -9,8 +9,11 @@ use crate::pattern_search::PatternSearchOptions;
 use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
 
-/// For one smooth row: BFGS to rough accuracy; then a pattern search from the same start, whose models of a wider neighbourhood
-/// may lead to another basin, until it comes near to where slopes have led; then BFGS again, from the better end.
+/// Multimethod solver for one smooth criterion.
+///
+/// BFGS first converges to a coarse tolerance. A pattern search then runs from the same starting point. Its models
+/// cover a wider neighbourhood and may lead to another basin; it stops near the point that BFGS found. BFGS finally
+/// continues from the better of both points.
 pub struct Multimethod {
     quasi_newton: QuasiNewton,
     start: Vec<f64>,
@@ -18,31 +21,31 @@ pub struct Multimethod {
 }
 
 enum Stage {
-    /// Slopes, to rough accuracy.
+    /// BFGS to a coarse tolerance.
     Coarse,
-    /// The other from the start.
+    /// Pattern search from the starting point.
     Alternative(Box<Alternative>),
-    /// Slopes on from where they ended.
+    /// BFGS continued to full accuracy.
     Fine,
-    /// Another solver from the best point on.
+    /// Other solver, started at the best point.
     Final(Box<dyn Solver>),
 }
 
-/// A pattern search beside an end that is known.
+/// Pattern search as an alternative to a known result.
 struct Alternative {
     pattern: Box<dyn Solver>,
-    /// Where slopes ended.
+    /// Result of BFGS.
     end: Evaluation,
-    /// The best that it has seen itself.
+    /// Best point of the pattern search.
     local_best: Option<Evaluation>,
 }
 
-/// Share of the way from the start to an end within which another point is on the way to the same. Of the 53 problems of
-/// `mops bench more-wild` as many are solved with 0.05.
+/// Distance from the BFGS result below which the pattern search approaches the same basin, relative to the distance
+/// between the starting point and that result. Of the 53 problems of `mops bench more-wild`, 0.05 solves as many.
 const CLOSE: f64 = 0.3;
 
-/// Factor of the pattern's size where nothing in it is better: coarse, since the search is to look elsewhere, not to be
-/// accurate. Of the same 53 problems 51 are solved to 1e-5 with it, 50 with 0.5, which misses a lower minimum.
+/// Shrink factor of the pattern: coarse, because the search has to explore rather than be accurate. Of the same 53
+/// problems, 51 are solved to 1e-5; 0.5 solves 50 and misses a lower minimum.
 const SHRINK: f64 = 0.25;
 
 impl Default for Multimethod {
@@ -51,7 +54,7 @@ impl Default for Multimethod {
     }
 }
 
-/// What goes on where slopes meet kinks.
+/// Builds the solver that continues at kinks.
 fn nonsmooth_solver() -> Box<dyn Solver> {
     SqpOptions::default().build()
 }

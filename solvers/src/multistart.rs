@@ -1,41 +1,43 @@
-//! Runs a local solver from several starts, one after the other: the study's own first, then the best of a sample of the
-//! box, then, if wanted, around the best point found, again and again until nothing changes.
+//! Multistart of a local solver.
+//!
+//! The runs follow one another: from the initial guess of the study, from the best points of a sample of the box and,
+//! if enabled, from points around the best one until nothing changes.
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Solver};
 
 use crate::local_archive::LocalArchive;
 use crate::start::{best_of, latin_hypercube};
 
-/// A local solver with a list of starts.
+/// Local solver with a list of starting points.
 pub struct Multistart {
     local: Box<dyn Solver>,
-    /// What runs from the study's own start in its place.
+    /// Solver for the initial guess of the study, if different from the local solver.
     initial_solver: Option<Box<dyn Solver>>,
-    /// What goes on from where the first run ends.
+    /// Solver that continues from the end of the first run.
     continuation_solver: Option<Box<dyn Solver>>,
-    /// Whose turn it is.
+    /// Solver that is running.
     phase: Phase,
-    /// Starts after the first.
+    /// Number of starting points after the first.
     extra_starts: usize,
-    /// Starts that are left, the next one last; `None` before the first run has ended.
+    /// Remaining starting points, the next one last; `None` before the first run has ended.
     queue: Option<Vec<Vec<f64>>>,
-    /// How the run ended that found the best point, and what that is worth.
+    /// Merit of the best point, and the result of the run that found it.
     best: Option<(Merit, Progress)>,
-    /// Whether to go on around the best point.
+    /// True if runs around the best point follow.
     local_restarts: bool,
-    /// Half the widths of the box around the best point, in turn: as many rounds may find nothing.
+    /// Half-widths of the box around the best point, used in turn. Rounds without gain are limited to the same number.
     radii: &'static [f64],
-    /// Relative change of the objective that is something.
+    /// Smallest relative decrease of the objective that counts as a gain.
     min_gain: f64,
-    /// Rounds around the best point that were begun, rounds in a row that found nothing, and the objective before.
+    /// Number of rounds around the best point, number of successive rounds without gain, and the last objective.
     restart_round: RestartRound,
-    /// The best that the present run has seen itself.
+    /// Best point of the present run.
     run_best: Option<Evaluation>,
-    /// The same of the runs that have ended.
+    /// Best merits of the completed runs.
     final_merits: Vec<Merit>,
 }
 
-/// Which solver runs.
+/// Solver that is running.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Initial,
@@ -43,7 +45,7 @@ enum Phase {
     Sampled,
 }
 
-/// A round of restarts around the best point.
+/// State of the rounds of restarts around the best point.
 #[derive(Debug, Clone, Copy)]
 struct RestartRound {
     count: usize,
@@ -53,12 +55,12 @@ struct RestartRound {
 
 impl RestartRound {
     const NONE: Self = Self { count: 0, idle: 0, objective: f64::INFINITY };
-    /// Starts of a round.
+    /// Number of starting points per round.
     const STARTS: usize = 3;
 }
 
 impl Multistart {
-    /// Runs `local` from `starts` points.
+    /// Creates a multistart of `local` from `starts` points.
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
         Self {
             local,
@@ -77,35 +79,35 @@ impl Multistart {
         }
     }
 
-    /// Another solver begins at the study's own start.
+    /// Sets a different solver for the initial guess of the study.
     #[must_use]
     pub fn with_initial_solver(self, first: Box<dyn Solver>) -> Self {
         Self { initial_solver: Some(first), ..self }
     }
 
-    /// Another solver goes on from the best point of the first run, before the other starts.
+    /// Sets a solver that continues from the best point of the first run, before the other starting points.
     #[must_use]
     pub fn with_continuation(self, second: Box<dyn Solver>) -> Self {
         Self { continuation_solver: Some(second), ..self }
     }
 
-    /// Goes on around the best point until two rounds of restarts, a wide and a narrow one, improve it by less than a
-    /// thousandth.
+    /// Adds restarts around the best point until two successive rounds, one wide and one narrow, improve it by less
+    /// than a thousandth.
     #[must_use]
     pub fn with_local_restarts(self) -> Self {
         Self { local_restarts: true, ..self }
     }
 
-    /// Rounds from the best point on, within these distances of it in turn, until none of them improves it by as much as
-    /// `gain`, relative to its size.
+    /// Creates rounds of restarts around the best point only, within the given distances in turn, until none of them
+    /// improves the objective by `min_gain`, relative to its magnitude.
     pub fn restarts_around_best(local: Box<dyn Solver>, radii: &'static [f64], min_gain: f64) -> Self {
         Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
     }
 
-    /// Begins the first run.
+    /// Starts the first run.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.queue = None;
         self.best = None;
@@ -115,15 +117,15 @@ impl Multistart {
         self.start_run(oracle, start)
     }
 
-    /// Begins the first round around the best point; `false` where there is none.
+    /// Starts the first round around the best point; returns false if there is no such point.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin_local_restarts(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         self.start_restart_round(oracle)
     }
 
-    /// Whether two runs have ended within `accuracy` of the best, relative to its size.
+    /// Returns true if two runs have ended within `accuracy` of the best objective, relative to its magnitude.
     pub fn optimum_is_confirmed(&self, accuracy: f64) -> bool {
         let best = self
             .final_merits
@@ -142,10 +144,10 @@ impl Multistart {
         initial.unwrap_or(&mut self.local).begin(&mut LocalArchive { oracle, best: &mut self.run_best }, start)
     }
 
-    /// An iteration of the present run, or the beginning of the next.
+    /// Does one iteration of the present run, or starts the next run.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let mut archive = LocalArchive { oracle: &mut *oracle, best: &mut self.run_best };
         let solver = match self.phase {
@@ -184,7 +186,7 @@ impl Multistart {
         }
     }
 
-    /// Begins a round around the best point; `false` where the rounds before found nothing.
+    /// Starts a round around the best point; returns false if the previous rounds brought no gain.
     fn start_restart_round(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         let Some(best) = oracle.best().map(|best| (best.point.clone(), best.merit.objective)) else { return Ok(false) };
         let (centre, objective) = best;

@@ -1,54 +1,57 @@
-//! What the rows of a problem are like near a point, found out from a few values along lines.
+//! Detection of noise and kinks in the criteria near a point, from values along lines.
 
 use mops_core::math;
 use mops_core::{Halt, Oracle, Usage};
 use rand::Rng;
 
-/// What values along lines tell.
+/// Smoothness of the criteria along lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Smoothness {
-    /// Differences fade from order to order.
+    /// Smooth: higher-order differences decay.
     Smooth,
-    /// They do not, but slopes agree with them: there are kinks.
+    /// Kinks: differences do not decay, but finite-difference derivatives are consistent with the values.
     Nonsmooth,
-    /// Slopes say nothing of neighbouring values.
+    /// Noise: finite-difference derivatives do not predict neighbouring values.
     Noisy,
 }
 
-/// Values along a line.
+/// Number of values on a line.
 const VALUES: usize = 7;
 
-/// Distance of neighbouring ones, in the unit box: noise that is smooth at a smaller distance does nobody harm there.
+/// Spacing of the values, in the unit box. Noise that is smooth below this distance does no harm.
 const SPACING: f64 = 1e-3;
 
-/// The same where values so far apart may be those of smooth rows that bend more.
+/// Finer spacing, to distinguish strong curvature from kinks.
 const FINE_SPACING: f64 = 1e-4;
 
-/// Distance over which slopes are taken, in the unit box.
+/// Difference step of the derivatives, in the unit box.
 const DIFFERENCE_STEP: f64 = 1e-5;
 
-/// Relative noise below which there is none: differences of simulations are meant for that much.
+/// Relative noise level regarded as zero: finite differences of simulations tolerate it.
 const NEGLIGIBLE_NOISE: f64 = 1e-6;
 
-/// How much more slopes differ than chords do where values are noise. Where a kink lies halfway between two values, it is the
-/// root of 2.
+/// Ratio of the RMS differences of derivatives and of chords above which values are noisy. For a kink halfway between
+/// two values the ratio is sqrt(2).
 const NOISE_RATIO: f64 = 2.2;
 
-/// What the rows are like near a point: the roughest of them. Noise is what does not fade from difference to difference; it is
-/// one only where two lines agree, and where slopes differ more than the chords between the values do. Where they do not, a
-/// third line with smaller distances tells rows that bend from rows with kinks. Points that fail count as a kink.
+/// Classifies the criteria near a point; the least smooth criterion decides.
 ///
-/// With the `k`-th differences `T` of values at equal distances, the noise is the root of `(k!)^2 / (2 k)!` times the mean of
-/// `T^2`, for the first `k` that agrees with the next two within a factor of 4 and whose differences have both signs.
+/// Noise is the part of the values that does not decay from one order of differences to the next. A criterion is noisy
+/// only if two lines agree and its derivatives vary more than the chords between its values. Otherwise a third line
+/// with a finer spacing distinguishes strong curvature from kinks. A failed point counts as a kink.
+///
+/// With the `k`-th differences `T` of equidistant values, the noise level is the square root of `(k!)^2 / (2 k)!` times
+/// the mean of `T^2`. The first `k` is taken whose level agrees with the next two within a factor of 4 and whose
+/// differences have both signs.
 ///
 /// Source: J. J. More, S. M. Wild, Estimating computational noise, SIAM J. Scientific Computing 33 (2011) 1292-1314,
-/// section 6. N.B.: they do not tell kinks from noise; the slopes do.
+/// section 6. N.B.: the paper does not distinguish kinks from noise; the derivatives do.
 ///
 /// # Errors
-/// The run is over.
+/// When the run ends: budget exhausted, or interrupted by the user.
 pub fn detect_smoothness(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Smoothness, Halt> {
     let mut random = oracle.stream("texture");
-    // From a little beside the start, where kinks are made on purpose, towards the middle of the box.
+    // Start beside the initial guess, which may lie on a kink by design, and go towards the centre of the box.
     let mut line = |spacing: f64| -> Vec<[f64; 2]> {
         let coordinate = |u: &f64| {
             let direction = if *u < 0.5 { 1.0 } else { -1.0 };
@@ -79,16 +82,17 @@ pub fn detect_smoothness(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Smoot
             *ratio *= rms_difference(&derivatives) / rms_difference(&chords).max(f64::MIN_POSITIVE);
         }
     }
-    // The geometric mean of both lines.
+    // The geometric mean over both lines.
     if ratios.iter().any(|ratio| *ratio > NOISE_RATIO * NOISE_RATIO) {
         return Ok(Smoothness::Noisy);
     }
-    // What bends within a few distances looks like a kink, until one looks closer.
+    // Strong curvature resembles a kink at the coarse spacing.
     let Some(rows) = values_on_line(oracle, &line(FINE_SPACING), 0.0)? else { return Ok(Smoothness::Nonsmooth) };
     Ok(if rows.iter().all(|values| differences_decay(values)) { Smoothness::Smooth } else { Smoothness::Nonsmooth })
 }
 
-/// Values of every row that counts along a line, each a part of the distance further; `None` where a point fails.
+/// Returns the values of every objective and constraint on a line, shifted by a fraction of the spacing; `None` if a
+/// point fails.
 #[allow(clippy::cast_precision_loss)]
 fn values_on_line(oracle: &mut dyn Oracle, line: &[[f64; 2]], shift: f64) -> Result<Option<Vec<Vec<f64>>>, Halt> {
     let at = |i: usize| {
@@ -100,20 +104,20 @@ fn values_on_line(oracle: &mut dyn Oracle, line: &[[f64; 2]], shift: f64) -> Res
     Ok(Some(relevant.map(|(row, _)| scaled.iter().map(|values| values[row]).collect()).collect()))
 }
 
-/// Root mean square of the differences of neighbours.
+/// Returns the root mean square of the differences of neighbouring values.
 #[allow(clippy::cast_precision_loss)]
 fn rms_difference(values: &[f64]) -> f64 {
     let squares: f64 = values.windows(2).map(|pair| math::powi(pair[1] - pair[0], 2)).sum();
     (squares / (values.len() - 1) as f64).sqrt()
 }
 
-/// Whether differences of values at equal distances fade from order to order.
+/// Returns true if the differences of equidistant values decay from order to order.
 fn differences_decay(values: &[f64]) -> bool {
     let size = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
     estimate_noise(values).is_none_or(|noise| noise <= NEGLIGIBLE_NOISE * size)
 }
 
-/// The noise of values at equal distances; `None` where none is found.
+/// Estimates the noise level of equidistant values; `None` if no noise is found.
 #[allow(clippy::cast_precision_loss)]
 fn estimate_noise(values: &[f64]) -> Option<f64> {
     let mut differences = values.to_vec();
@@ -121,7 +125,7 @@ fn estimate_noise(values: &[f64]) -> Option<f64> {
     let mut levels: Vec<(f64, bool)> = Vec::with_capacity(values.len());
     for k in 1..values.len() {
         differences = differences.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        // (k!)^2 / (2 k)!, from the one before.
+        // (k!)^2 / (2 k)! by recursion.
         factor *= k as f64 / (2.0 * (2 * k - 1) as f64);
         let mean = differences.iter().map(|t| t * t).sum::<f64>() / differences.len() as f64;
         let has_both_signs = differences.iter().any(|t| *t < 0.0) && differences.iter().any(|t| *t > 0.0);
@@ -146,7 +150,7 @@ mod tests {
         for _ in 0..100 {
             let mut noisy = |i: u32| 3.0 + math::powi(f64::from(i) * 1e-3, 2) + 1e-4 * random.random_range(-1.0..1.0);
             let values: Vec<f64> = (0..7).map(&mut noisy).collect();
-            // The standard deviation of even noise between -1 and 1.
+            // The standard deviation of a uniform distribution between -1 and 1 is 1 / sqrt(3).
             ratios.extend(estimate_noise(&values).map(|noise| noise / (1e-4 / 3.0_f64.sqrt())));
         }
         ratios.sort_by(f64::total_cmp);

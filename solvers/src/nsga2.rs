@@ -1,4 +1,4 @@
-//! NSGA-II: a front by non-dominated sorting and crowding.
+//! NSGA-II: Pareto fronts by non-dominated sorting and crowding.
 
 mod pruning;
 
@@ -13,16 +13,18 @@ use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
 use crate::variation::Variation;
 use pruning::Pruning;
 
-/// Looks for the front of designs that no other is better than in every criterion (NSGA-II): members that few dominate
-/// survive, and of those the ones in sparse places. For two criteria, or three; needs `objective = "each"`. Feasible points
-/// win over infeasible ones. The last front that fits only in part loses its most crowded members one by one.
+/// Non-dominated sorting genetic algorithm (NSGA-II) for the Pareto front of two or three criteria. Needs `objective =
+/// "each"`.
+///
+/// Members of low rank, which few others dominate, survive; among equal ranks those in sparse regions. Feasible points
+/// rank before infeasible ones. If the last rank fits only in part, its most crowded members are removed one at a time.
 ///
 /// Source: K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197;
-/// one by one: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
+/// removal one at a time: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga2Options {
-    /// Number of members.
+    /// Population size.
     #[schemars(range(min = 4, max = 1_000_000))]
     pub population: usize,
     /// Number of generations.
@@ -37,7 +39,7 @@ impl Default for Nsga2Options {
 }
 
 impl Nsga2Options {
-    /// The solver, with its members to look at.
+    /// Builds the solver with access to its members.
     pub fn search(&self) -> Evolution<Crowding> {
         let survival = Crowding { population: self.population.max(4), ..Crowding::default() };
         Evolution::new(survival, Variation::usual, self.generations)
@@ -52,7 +54,7 @@ impl SolverOptions for Nsga2Options {
     }
 }
 
-/// Survival of the lower rank, then of the sparser place.
+/// Environmental selection by rank, then by crowding distance.
 #[derive(Default)]
 pub struct Crowding {
     population: usize,
@@ -60,13 +62,13 @@ pub struct Crowding {
     feasible: Vec<u32>,
     infeasible: Vec<u32>,
     objectives: Vec<f64>,
-    /// Rank and distance of every place of the pool.
+    /// Rank and crowding distance of every point of the pool.
     rank: Vec<u32>,
     distance: Vec<f64>,
     chosen: Vec<u32>,
-    /// Rank and distance of the chosen.
+    /// Rank and crowding distance of the survivors.
     fitness: Vec<(u32, f64)>,
-    /// Places of the feasible points by rank, and where each rank begins.
+    /// Indices of the feasible points in order of rank, and the offset of each rank.
     by_rank: Vec<u32>,
     offsets: Vec<usize>,
     pruning: Pruning,
@@ -107,7 +109,7 @@ impl Survival for Crowding {
 }
 
 impl Crowding {
-    /// Ranks of the feasible points by dominance; the others come after them, by violation.
+    /// Ranks the feasible points by dominance; the infeasible ones follow, ordered by violation.
     #[allow(clippy::cast_possible_truncation)]
     fn sort(&mut self, pool: &Pool) {
         self.objectives.clear();
@@ -120,7 +122,7 @@ impl Crowding {
         self.distance.resize(pool.len(), 0.0);
         let ranks = self.sorter.sort(&self.objectives, pool.m);
         let fronts = ranks.iter().max().map_or(0, |rank| *rank as usize + 1);
-        // A counting sort by rank.
+        // Counting sort by rank.
         self.offsets.clear();
         self.offsets.resize(fronts + 1, 0);
         ranks.iter().for_each(|rank| self.offsets[*rank as usize + 1] += 1);
@@ -142,8 +144,8 @@ impl Crowding {
         }
     }
 
-    /// The crowding distance of a front: the sum over the objectives of the gap between the neighbours, relative to the
-    /// front's range; infinite at the ends.
+    /// Computes the crowding distances of a front: the mean over the objectives of the gap between the neighbours,
+    /// relative to the range of the front; infinite at the ends.
     fn crowding_distances(&mut self, pool: &Pool, from: usize, to: usize) {
         let front = &mut self.by_rank[from..to];
         #[allow(clippy::cast_precision_loss)]

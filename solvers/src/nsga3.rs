@@ -1,4 +1,4 @@
-//! NSGA-III: a front spread along reference directions.
+//! NSGA-III: Pareto fronts spread along reference directions.
 
 mod normalisation;
 
@@ -15,16 +15,19 @@ use crate::simplex_lattice;
 use crate::variation::Variation;
 use normalisation::Normalisation;
 
-/// Looks for the front of designs that no other is better than in every criterion (NSGA-III): members that few dominate
-/// survive, and of those the ones nearest to reference directions that have few. For three criteria and more; needs
-/// `objective = "each"`. Feasible points win over infeasible ones.
+/// Reference-point based non-dominated sorting (NSGA-III) for the Pareto front of three or more criteria. Needs
+/// `objective = "each"`.
 ///
-/// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601; constraints: H. Jain, K. Deb,
-/// the same 602-622; reference directions: I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657.
+/// Members of low rank, which few others dominate, survive; among equal ranks those nearest to reference directions
+/// with few members. Feasible points rank before infeasible ones.
+///
+/// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601; constraints: H. Jain, K.
+/// Deb, ibid. 602-622; reference directions: I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga3Options {
-    /// Divisions of every objective between the reference directions; 0 for as many as give at most 100 directions.
+    /// Divisions per objective of the lattice of reference directions; 0 for the largest number that gives at most 100
+    /// directions.
     #[schemars(range(max = 200))]
     pub divisions: usize,
     /// Number of generations.
@@ -39,10 +42,10 @@ impl Default for Nsga3Options {
 }
 
 impl Nsga3Options {
-    /// The solver, with its members to look at.
+    /// Builds the solver with access to its members.
     pub fn search(&self) -> Evolution<Niching> {
         let survival = Niching { divisions: self.divisions, ..Niching::default() };
-        // A large index of the crossover, as in the paper: members of different niches are far apart.
+        // Large crossover index as in the paper: members of different niches are far apart.
         Evolution::new(
             survival,
             |n| Variation { crossover: 1.0, crossover_index: 30.0, ..Variation::usual(n) },
@@ -59,7 +62,7 @@ impl SolverOptions for Nsga3Options {
     }
 }
 
-/// Survival of the lower rank, then of the rarer niche.
+/// Environmental selection by rank, then by niche count.
 #[derive(Default)]
 pub struct Niching {
     divisions: usize,
@@ -73,7 +76,8 @@ pub struct Niching {
     violations: Vec<f64>,
 }
 
-/// A candidate of the last front: its place, its direction and how far it is from that.
+/// Candidate of the last front: index in the pool, nearest reference direction, and squared distance from that
+/// direction.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     member: u32,
@@ -86,7 +90,7 @@ impl Survival for Niching {
         let divisions = if self.divisions > 0 { self.divisions } else { simplex_lattice::max_divisions(m, 100) };
         self.directions = simplex_lattice::reference_directions(m, divisions);
         self.normalisation = Normalisation::new(m);
-        // A multiple of four.
+        // Round up to a multiple of four.
         self.directions.len().div_ceil(4).max(2) * 4
     }
 
@@ -123,14 +127,14 @@ impl Survival for Niching {
         &self.chosen
     }
 
-    /// Only constraints decide a tournament.
+    /// Compares violations only.
     fn prefers(&self, a: usize, b: usize) -> Ordering {
         self.violations[a].total_cmp(&self.violations[b])
     }
 }
 
 impl Niching {
-    /// The direction nearest to the `i`-th feasible point.
+    /// Finds the reference direction nearest to the `i`-th feasible point.
     fn associate(&self, pool: &Pool, i: usize) -> Candidate {
         let member = self.feasible[i];
         let row = pool.row(member as usize);
@@ -151,8 +155,8 @@ impl Niching {
     }
 }
 
-/// Takes candidates of the directions with the fewest members until there are `wanted`: the nearest where there is none yet,
-/// else any.
+/// Adds candidates until `target` points are chosen, always from a direction with the fewest members: the nearest
+/// candidate if that direction is empty, otherwise a random one.
 fn fill_niches(
     chosen: &mut Vec<u32>,
     target: usize,

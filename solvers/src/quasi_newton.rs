@@ -46,7 +46,7 @@ struct State {
     /// Whether the inverse has seen a step yet.
     has_curvature: bool,
     /// Distance within which slopes are to describe the row.
-    max_difference_step: f64,
+    gradient_radius: f64,
     /// Value at which the inverse was last thrown away.
     value_at_reset: f64,
     /// Iterations in a row that brought almost nothing.
@@ -72,7 +72,7 @@ const FIRST_STEP: f64 = 0.05;
 const MAX_TRIALS: usize = 40;
 
 /// Distances within which slopes are to describe the row, in turn: wide, then as near as kinks ask for.
-const MAX_DIFFERENCE_STEPS: [f64; 2] = [1.0, 1e-6];
+const GRADIENT_RADII: [f64; 2] = [1.0, 1e-6];
 
 /// Relative change of the value that is none; so many in a row are the end.
 const STALL_TOLERANCE: f64 = 1e-11;
@@ -101,7 +101,7 @@ impl Solver for QuasiNewton {
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.state = None;
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
-        let Some(at) = oracle.linearise(&start, MAX_DIFFERENCE_STEPS[0])? else { return Ok(()) };
+        let Some(at) = oracle.linearise(&start, GRADIENT_RADII[0])? else { return Ok(()) };
         let (value, gradient) = objective_and_gradient(oracle.shape(), &at);
         let n = start.len();
         let inverse = DMatrix::zeros(n, n);
@@ -111,7 +111,7 @@ impl Solver for QuasiNewton {
             gradient,
             inverse,
             has_curvature: false,
-            max_difference_step: MAX_DIFFERENCE_STEPS[0],
+            gradient_radius: GRADIENT_RADII[0],
             value_at_reset: f64::INFINITY,
             stalled_steps: 0,
             kink_steps: 0,
@@ -216,7 +216,7 @@ impl State {
                 t = if low > 0.0 { 0.5 * (low + high) } else { interpolated };
                 continue;
             }
-            let Some(at) = oracle.linearise(&point, self.max_difference_step)? else {
+            let Some(at) = oracle.linearise(&point, self.gradient_radius)? else {
                 high = t;
                 t = 0.5 * (low + high);
                 continue;
@@ -273,9 +273,9 @@ impl State {
             return Ok(if stationary { Progress::Converged } else { Progress::Stalled });
         }
         self.value_at_reset = self.value;
-        self.max_difference_step = MAX_DIFFERENCE_STEPS[1];
+        self.gradient_radius = GRADIENT_RADII[1];
         let point = self.iterate.at.point.clone();
-        let Some(at) = oracle.linearise(&point, self.max_difference_step)? else { return Ok(Progress::Stalled) };
+        let Some(at) = oracle.linearise(&point, self.gradient_radius)? else { return Ok(Progress::Stalled) };
         (self.value, self.gradient) = objective_and_gradient(oracle.shape(), &at);
         self.iterate = at;
         self.reset_curvature();

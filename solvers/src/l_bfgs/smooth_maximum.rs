@@ -1,4 +1,4 @@
-//! A smooth function of all rows, over the whole space.
+//! Smooth approximation of a min-max problem, over the whole space.
 
 use std::f64::consts::PI;
 use std::sync::Mutex;
@@ -9,24 +9,24 @@ use mops_core::{Halt, Oracle};
 
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
-/// The rows of a problem as one smooth number and its slope.
+/// Criteria combined into one smooth function and its gradient.
 ///
-/// `KS(f) = max f + ln(sum exp(p (f - max f))) / p` of the objective rows, and of no violation with the violations.
+/// The objectives are combined by `KS(f) = max f + ln(sum exp(p (f - max f))) / p`; the violations and zero likewise.
 pub struct SmoothProblem<'a> {
     state: Mutex<State<'a>>,
     sharpness: f64,
-    /// Factor of the objective.
+    /// Scale factor of the objective.
     objective_scale: f64,
 }
 
 struct State<'a> {
     oracle: &'a mut dyn Oracle,
     halt: Option<Halt>,
-    /// The last point with its value and slope.
+    /// Last point with its value and gradient.
     cache: Option<CacheEntry>,
-    /// The last point that did not fail.
+    /// Last point that did not fail.
     last_success: Vec<f64>,
-    /// What it was worth.
+    /// Function value at the last point that did not fail.
     last_success_value: f64,
 }
 
@@ -36,25 +36,25 @@ struct CacheEntry {
     gradient: Vec<f64>,
 }
 
-/// Weight of violations.
+/// Penalty weight of the violation.
 const PENALTY: f64 = 10.0;
 
-/// Distance from a face within which a start is moved away from it: on it the change of variables has no slope.
+/// Minimum distance of a starting point from a face: on a face the change of variables has zero derivative.
 const FACE_MARGIN: f64 = 1e-4;
 
-/// What a failed point costs for every unit that it is away from the last one that did not fail.
+/// Slope of the cost of a failed point, per unit of distance from the last point that did not fail.
 const FAILURE_SLOPE: f64 = 100.0;
 
-/// The point of the unit box that variables stand for.
+/// Returns the point of the unit box for the transformed variables.
 pub fn point_of(v: &[f64]) -> Vec<f64> {
     v.iter().map(|v| (0.5 * (1.0 - math::cos(PI * v))).clamp(0.0, 1.0)).collect()
 }
 
 impl<'a> SmoothProblem<'a> {
-    /// The problem near a point; `None` where that fails.
+    /// Creates the problem near a point; `None` if that point fails.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn new(oracle: &'a mut dyn Oracle, start: &[f64], sharpness: f64) -> Result<Option<Self>, Halt> {
         let at = oracle.evaluate(&[start.to_vec()])?.pop().expect("one point, one answer");
         let Some(scaled) = &at.scaled else { return Ok(None) };
@@ -63,29 +63,29 @@ impl<'a> SmoothProblem<'a> {
         Ok(Some(Self { state: Mutex::new(state), sharpness, objective_scale }))
     }
 
-    /// The variables of a point of the box.
+    /// Returns the transformed variables of a point of the box.
     pub fn variables_of(&self, point: &[f64]) -> Vec<f64> {
         point.iter().map(|u| math::acos(1.0 - 2.0 * u.clamp(FACE_MARGIN, 1.0 - FACE_MARGIN)) / PI).collect()
     }
 
-    /// Why the oracle stopped answering, if it did.
+    /// Returns the reason why the run ended, if it did.
     pub fn halt(&self) -> Option<Halt> {
-        self.state.lock().expect("nobody panics holding the lock").halt
+        self.state.lock().expect("no thread panics while holding the lock").halt
     }
 
-    /// Value and slope; an error once the run is over.
+    /// Evaluates function value and gradient, with a cache for the last point; an error once the run has ended.
     fn evaluate<T>(&self, v: &[f64], select: impl Fn(&CacheEntry) -> T) -> Result<T, Error> {
-        let mut state = self.state.lock().expect("nobody panics holding the lock");
+        let mut state = self.state.lock().expect("no thread panics while holding the lock");
         if let Some(entry) = state.cache.as_ref().filter(|entry| entry.v == v) {
             return Ok(select(entry));
         }
         if state.halt.is_some() || v.iter().any(|v| !v.is_finite()) {
-            return Err(Error::msg("no answer"));
+            return Err(Error::msg("no evaluation: the run has ended, or a variable is not finite"));
         }
         let point = point_of(v);
         let found = state.oracle.linearise(&point, 1.0).map_err(|halt| {
             state.halt = Some(halt);
-            Error::msg("the run is over")
+            Error::msg("the run has ended")
         })?;
         let (value, point_gradient) = match found {
             Some(at) => {
@@ -105,7 +105,7 @@ impl<'a> SmoothProblem<'a> {
         Ok(answer)
     }
 
-    /// A slope that leads back from a failed point.
+    /// Returns a value and gradient that lead back from a failed point.
     fn failure_barrier(&self, state: &State<'_>, point: &[f64]) -> (f64, Vec<f64>) {
         let away: Vec<f64> = point.iter().zip(&state.last_success).map(|(a, b)| a - b).collect();
         let distance = away.iter().map(|d| d * d).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
@@ -113,7 +113,7 @@ impl<'a> SmoothProblem<'a> {
         (state.last_success_value + FAILURE_SLOPE * distance, gradient)
     }
 
-    /// The penalised objective and its slope.
+    /// Computes the penalised objective and its gradient.
     fn penalised_objective(&self, criteria: &LinearisedCriteria) -> (f64, Vec<f64>) {
         let (mut value, mut gradient) = self.smooth_maximum(criteria.objectives.clone());
         if !(criteria.inequalities.is_empty() && criteria.equalities.is_empty()) {
@@ -135,7 +135,7 @@ impl<'a> SmoothProblem<'a> {
         (value, gradient)
     }
 
-    /// The smooth largest of rows.
+    /// Computes the Kreisselmeier-Steinhauser function of criteria and its gradient.
     fn smooth_maximum(&self, criteria: Vec<LinearModel>) -> (f64, Vec<f64>) {
         let largest = criteria.iter().map(|row| row.value).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = criteria.iter().map(|row| math::exp(self.sharpness * (row.value - largest))).collect();

@@ -1,19 +1,20 @@
-//! Takes the most crowded members from a front one by one.
+//! Removal of the most crowded members of a front, one at a time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::evolution::Pool;
 
-/// Memory of the thinning: neighbours of every member along every objective.
+/// Pruning of a front; stores the neighbours of every member along every objective.
 #[derive(Debug, Default)]
 pub struct Pruning {
-    /// `[member * m + k]`: the places in the front before and after it along objective `k`.
+    /// Previous and next member along objective `k`, at `[member * m + k]`.
     before: Vec<u32>,
     after: Vec<u32>,
     sorted: Vec<u32>,
     ranges: Vec<f64>,
-    /// Distances as bits, which order as the numbers do where they are not negative; old entries are passed over.
+    /// Crowding distances as bits, which have the order of the numbers for non-negative values. Outdated entries are
+    /// skipped.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     removed: Vec<bool>,
 }
@@ -21,8 +22,8 @@ pub struct Pruning {
 const NONE: u32 = u32::MAX;
 
 impl Pruning {
-    /// Moves the `keep` members of `front` that are left when the most crowded are taken away to its beginning. `distance` is
-    /// by place in the pool.
+    /// Removes the most crowded members of `front` one at a time and moves the remaining `keep` to its start.
+    /// `distance` is indexed by position in the pool.
     #[allow(clippy::cast_possible_truncation)]
     pub fn prune(&mut self, pool: &Pool, front: &mut [u32], keep: usize, distance: &mut [f64]) {
         let (m, count) = (pool.m, front.len());
@@ -72,7 +73,7 @@ impl Pruning {
         }
     }
 
-    /// Finds every member's neighbours.
+    /// Finds the neighbours of every member.
     #[allow(clippy::cast_possible_truncation)]
     fn link(&mut self, pool: &Pool, front: &[u32]) {
         let m = pool.m;
@@ -94,7 +95,7 @@ impl Pruning {
         }
     }
 
-    /// The gaps between the neighbours, relative to the front's range; infinite at an end.
+    /// Returns the sum of the gaps between the neighbours, relative to the range of the front; infinite at an end.
     fn crowding(&self, pool: &Pool, front: &[u32], member: usize) -> f64 {
         let m = pool.m;
         let value = |index: u32, k: usize| pool.objectives[front[index as usize] as usize * m + k];
@@ -115,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_most_crowded_go_first_and_the_ends_stay() {
-        // A line with a cluster: 0, 1, 2, 3, 3.1, 3.2, 4.
+        // Line with a cluster: 0, 1, 2, 3, 3.1, 3.2, 4.
         let at = [0.0, 1.0, 2.0, 3.0, 3.1, 3.2, 4.0];
         let objectives = at.iter().flat_map(|x| [*x, 4.0 - *x]).collect();
         let pool = Pool { m: 2, points: Vec::new(), objectives, violations: vec![0.0; 7] };
