@@ -1,4 +1,4 @@
-//! Members of a population, in one array, and when there is nothing left to expect of it.
+//! Population of points and its stagnation test.
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Stream};
 
@@ -8,17 +8,17 @@ use crate::start::latin_hypercube;
 /// Points of the unit box with their merits.
 #[derive(Debug, Clone)]
 pub struct Population {
-    /// The points.
+    /// Points.
     pub points: Vec<Vec<f64>>,
-    /// What they are worth.
+    /// Merits of the points.
     pub merits: Vec<Merit>,
 }
 
 impl Population {
-    /// A sample of the box whose first member is `start`, where there is one, evaluated.
+    /// Samples and evaluates a population; its first member is `start`, if given.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn sample(
         oracle: &mut dyn Oracle,
         size: usize,
@@ -33,19 +33,19 @@ impl Population {
         Ok(Self { points, merits })
     }
 
-    /// Number of members.
+    /// Returns the number of members.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Indices, the best first.
+    /// Returns the indices of the members, the best first.
     pub fn order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by(|&a, &b| compare(&self.merits[a], &self.merits[b]));
         order
     }
 
-    /// Keeps so many of the best, these in order, and gives the others' points, as memory for children.
+    /// Keeps the `size` best members, in order, and returns the points of the others as memory for children.
     pub fn truncate(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
         let order = self.order();
         let (mut points, merits) = (std::mem::take(&mut self.points), std::mem::take(&mut self.merits));
@@ -54,7 +54,7 @@ impl Population {
         points.into_iter().filter(|point| !point.is_empty())
     }
 
-    /// Whether the members no longer differ: in what they are worth, relative to `unit`, or in where they are.
+    /// Returns true if the members no longer differ, in merit relative to `unit`, or in position.
     fn has_converged(&self, tolerance: f64, unit: f64) -> bool {
         let order = self.order();
         let (best, worst) = (self.merits[order[0]], self.merits[order[self.len() - 1]]);
@@ -71,38 +71,38 @@ impl Population {
     }
 }
 
-/// The merits of evaluations.
+/// Returns the merits of evaluations.
 pub fn merits(evaluations: &[Evaluation]) -> Vec<Merit> {
     evaluations.iter().map(|evaluation| evaluation.merit).collect()
 }
 
-/// When the members of a population are drawn anew.
+/// Rule for resampling a population.
 #[derive(Debug, Clone, Copy)]
 pub struct RestartRule {
-    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    /// Difference of the members' values, relative to the objective, below which the population has converged.
     pub tolerance: f64,
-    /// Generations without a better point that are too many.
+    /// Number of generations without improvement before a restart.
     pub patience: usize,
-    /// Number of times that members may be drawn anew.
+    /// Maximum number of restarts.
     pub restarts: usize,
 }
 
-/// What comes after a generation.
+/// Continuation after a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Next {
-    /// Another one.
+    /// Next generation.
     Generation,
     /// New members.
     Restart,
-    /// Nothing.
+    /// End of the search.
     End,
 }
 
-/// Watches a population from generation to generation.
+/// Monitor of convergence and stagnation over the generations.
 #[derive(Debug, Clone)]
 pub struct StagnationMonitor {
     rule: RestartRule,
-    /// Size of an objective that counts as one.
+    /// Magnitude of the objective below which differences count absolutely.
     unit: f64,
     best: Merit,
     stalled: usize,
@@ -110,13 +110,13 @@ pub struct StagnationMonitor {
 }
 
 impl StagnationMonitor {
-    /// From the first members on, the start in front.
+    /// Creates the monitor from the first members, of which the first is the starting point.
     pub fn new(members: &Population, rule: RestartRule) -> Self {
         let unit = members.merits[0].objective.abs().min(1.0);
         Self { rule, unit, best: Merit::FAILED, stalled: 0, restarts: 0 }
     }
 
-    /// What comes after a generation with these members.
+    /// Returns the continuation after a generation with these members.
     pub fn next(&mut self, members: &Population) -> Next {
         let best = members.merits[members.order()[0]];
         self.stalled = if best.is_better_than(&self.best) { 0 } else { self.stalled + 1 };

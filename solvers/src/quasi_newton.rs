@@ -1,4 +1,4 @@
-//! The BFGS method with a line search, for one row that may have kinks.
+//! BFGS with a line search, for one function that may have kinks.
 
 use mops_core::{Halt, Linearisation, Objective, Oracle, Progress, Shape, Solver, Usage};
 use nalgebra::{DMatrix, DVector};
@@ -6,29 +6,32 @@ use nalgebra::{DMatrix, DVector};
 use crate::linearised_criteria::LinearisedCriteria;
 use crate::start::usable_start;
 
-/// BFGS for one number without constraints: `auto` takes it where that is all there is. Its line search meets the weak
-/// conditions of Wolfe, which have a solution at kinks too; curvature across a kink grows without bound, and that is what
-/// makes the steps follow it. Coordinates at a bound that the slope leads out of are held there.
+/// BFGS for one function without constraints; used by `auto` for such problems.
 ///
-/// Source: A. S. Lewis, M. L. Overton, Nonsmooth optimization via quasi-Newton methods, Mathematical Programming 141 (2013)
-/// 135-163, algorithms 2.1 and 2.6.
+/// The line search satisfies the weak Wolfe conditions, which have a solution at kinks, too. The curvature across a
+/// kink grows without bound, so that the steps follow the kink. Coordinates at a bound are fixed if the descent
+/// direction leaves the box.
 ///
-/// N.B.: a first step, of which no length is known, must keep more of the decrease that its slope promises, and a step of
-/// which next to nothing is promised need not meet the condition on slopes.
+/// Source: A. S. Lewis, M. L. Overton, Nonsmooth optimization via quasi-Newton methods, Mathematical Programming 141
+/// (2013) 135-163, algorithms 2.1 and 2.6.
+///
+/// N.B.: a first step, whose length is unknown, must satisfy a stricter decrease condition. The curvature condition is
+/// waived for steps with a negligible predicted decrease.
 #[derive(Default)]
 pub struct QuasiNewton {
     state: Option<State>,
-    /// Whether it ends where little more is to be had.
+    /// True if the iteration ends at the coarse tolerance.
     coarse: bool,
 }
 
 impl QuasiNewton {
-    /// One that ends where steps bring less than a millionth of the value; with [`QuasiNewton::refine`] it goes on.
+    /// Creates a solver that ends when steps decrease the value by less than a millionth; [`QuasiNewton::refine`]
+    /// continues it.
     pub fn coarse() -> Self {
         Self { coarse: true, ..Self::default() }
     }
 
-    /// Goes on to the end.
+    /// Continues to full accuracy.
     pub fn refine(&mut self) {
         self.coarse = false;
         if let Some(state) = &mut self.state {
@@ -41,49 +44,49 @@ struct State {
     iterate: Linearisation,
     value: f64,
     gradient: DVector<f64>,
-    /// The inverse of the Hessian.
+    /// Approximation of the inverse Hessian.
     inverse: DMatrix<f64>,
-    /// Whether the inverse has seen a step yet.
+    /// True once the inverse Hessian contains curvature information.
     has_curvature: bool,
-    /// Distance within which slopes are to describe the row.
+    /// Radius within which gradients have to describe the function.
     gradient_radius: f64,
-    /// Value at which the inverse was last thrown away.
+    /// Value at the last reset of the inverse Hessian.
     value_at_reset: f64,
-    /// Iterations in a row that brought almost nothing.
+    /// Number of successive iterations with negligible decrease.
     stalled_steps: usize,
-    /// Steps in a row that have met a kink, by the look of their ends.
+    /// Number of successive steps that have probably crossed a kink.
     kink_steps: usize,
 }
 
-/// Share of the promised decrease that a step must keep.
+/// Armijo constant: required share of the predicted decrease.
 const ARMIJO: f64 = 1e-4;
 
-/// The same of a step whose length nothing is known of: a longer one may lead over a valley to where all is flat, as on the
-/// problem Osborne 1. The step to the minimum of a parabola keeps one half.
+/// Armijo constant of a first step, whose length is unknown. A longer step may cross a valley into a flat region, as
+/// for the problem Osborne 1. The step to the minimum of a parabola achieves one half.
 const ARMIJO_FIRST: f64 = 0.3;
 
-/// Share of the slope that may be left after a step.
+/// Wolfe constant: permitted share of the initial directional derivative after a step.
 const WOLFE: f64 = 0.9;
 
 /// Length of the first step, in the unit box.
 const FIRST_STEP: f64 = 0.05;
 
-/// Values tried along a direction at most.
+/// Maximum number of function values per line search.
 const MAX_TRIALS: usize = 40;
 
-/// Distances within which slopes are to describe the row, in turn: wide, then as near as kinks ask for.
+/// Radii within which gradients have to describe the function: at first wide, then small, near kinks.
 const GRADIENT_RADII: [f64; 2] = [1.0, 1e-6];
 
-/// Relative change of the value that is none; so many in a row are the end.
+/// Relative decrease regarded as zero, and number of successive such steps that end the iteration.
 const STALL_TOLERANCE: f64 = 1e-11;
 const MAX_STALLED: usize = 4;
 
-/// The same of a rough end: most studies ask for three or four figures.
+/// Tolerances of the coarse end: most studies need three or four digits.
 const COARSE_STALL_TOLERANCE: f64 = 1e-6;
 const MAX_STALLED_COARSE: usize = 2;
 
-/// Share of the change of the slope along a step by which the trapezoid rule is off beyond a kink; for smooth rows it is far
-/// less. So many such steps in a row are left to those who look for kinks.
+/// Error of the trapezoidal rule along a step, relative to the change of the directional derivative, that indicates a
+/// kink; far smaller for smooth functions. After several such steps in succession, a solver for kinks has to continue.
 const KINK_RATIO: f64 = 0.12;
 const MAX_KINK_STEPS: usize = 3;
 
@@ -95,7 +98,7 @@ impl Solver for QuasiNewton {
         if is_scalar && is_continuous && !shape.has_constraints() {
             return Ok(());
         }
-        Err("it minimises one number without constraints over real tuners; take `sqp`".into())
+        Err("BFGS minimises one function of continuous tuners without constraints; use `sqp`".into())
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
@@ -147,14 +150,14 @@ impl Solver for QuasiNewton {
     }
 }
 
-/// The value and the slope of the one row.
+/// Returns value and gradient of the objective.
 fn objective_and_gradient(shape: &Shape, at: &Linearisation) -> (f64, DVector<f64>) {
     let objective = LinearisedCriteria::from_linearisation(shape, at).objectives.swap_remove(0);
     (objective.value, DVector::from_vec(objective.gradient))
 }
 
 impl State {
-    /// Curvature before anything is known: a first step of a given length.
+    /// Resets the inverse Hessian to a first step of given length.
     fn reset_curvature(&mut self) {
         let n = self.gradient.len();
         self.inverse = DMatrix::identity(n, n) * (FIRST_STEP / self.gradient.amax().max(f64::MIN_POSITIVE));
@@ -162,24 +165,24 @@ impl State {
         self.stalled_steps = 0;
     }
 
-    /// Whether a bound holds a coordinate.
+    /// Returns true if a coordinate is at a bound and descent would leave the box.
     fn is_fixed_at_bound(&self, j: usize) -> bool {
         let (u, s) = (self.iterate.at.point[j], self.gradient[j]);
         (u <= 0.0 && s > 0.0) || (u >= 1.0 && s < 0.0)
     }
 
-    /// The slope along the coordinates that no bound holds.
+    /// Returns the gradient with zeros for the coordinates fixed at a bound.
     fn projected_gradient(&self) -> DVector<f64> {
         DVector::from_fn(self.gradient.len(), |j, _| if self.is_fixed_at_bound(j) { 0.0 } else { self.gradient[j] })
     }
 
-    /// The quasi-Newton step along the same.
+    /// Returns the quasi-Newton step of the free coordinates.
     fn direction(&self) -> DVector<f64> {
         let step = -(&self.inverse * self.projected_gradient());
         DVector::from_fn(step.len(), |j, _| if self.is_fixed_at_bound(j) { 0.0 } else { step[j] })
     }
 
-    /// The largest part of a direction inside the box.
+    /// Returns the largest multiple of a direction that stays in the box.
     fn max_step_within_bounds(&self, direction: &DVector<f64>) -> f64 {
         let to_bound = |(u, d): (&f64, &f64)| match d {
             d if *d > 0.0 => (1.0 - u) / d,
@@ -189,8 +192,7 @@ impl State {
         self.iterate.at.point.iter().zip(direction.iter()).map(to_bound).fold(f64::INFINITY, f64::min)
     }
 
-    /// Moves along a direction to where the weak conditions of Wolfe hold, or as far as the box goes; `false` where nothing
-    /// along it is better.
+    /// Line search for the weak Wolfe conditions, limited by the box; returns false if no point is better.
     fn search(&mut self, oracle: &mut dyn Oracle, direction: &DVector<f64>, descent_rate: f64) -> Result<bool, Halt> {
         let max_step = self.max_step_within_bounds(direction);
         let (mut low, mut high) = (0.0, f64::INFINITY);
@@ -210,7 +212,7 @@ impl State {
             let armijo = if self.has_curvature { ARMIJO } else { ARMIJO_FIRST };
             if !(value <= self.value - armijo * t * descent_rate && value < self.value) {
                 high = t;
-                // Where the parabola through both values has its minimum; halfway where a step before was good.
+                // Minimiser of the interpolating parabola, or bisection if an earlier step was acceptable.
                 let minimiser = 0.5 * t * t * descent_rate / (value - self.value + t * descent_rate);
                 let interpolated = if minimiser.is_finite() { minimiser.clamp(0.1 * t, 0.5 * t) } else { 0.1 * t };
                 t = if low > 0.0 { 0.5 * (low + high) } else { interpolated };
@@ -224,7 +226,7 @@ impl State {
             let (value, gradient) = objective_and_gradient(oracle.shape(), &at);
             let remaining = -gradient.dot(direction);
             accepted = Some((at, value, gradient));
-            // Of what is promised next to nothing, slopes by differences tell nothing either.
+            // For a negligible predicted decrease, finite-difference gradients are unreliable too.
             if remaining <= WOLFE * descent_rate || t >= max_step || t * descent_rate <= STALL_TOLERANCE * value.abs() {
                 break;
             }
@@ -241,7 +243,7 @@ impl State {
         Ok(true)
     }
 
-    /// Takes in a step and the change of the slope along it.
+    /// Updates the inverse Hessian with a step and the change of the gradient along it.
     fn update(&mut self, s: &DVector<f64>, y: &DVector<f64>) {
         let sy = s.dot(y);
         if sy <= 1e-14 * s.norm() * y.norm() {
@@ -262,13 +264,13 @@ impl State {
         }
     }
 
-    /// Nothing along the direction is better: once more from here with slopes of the neighbourhood and no memory, as long as
-    /// that has brought something since the last time.
+    /// Restarts after a failed line search, with gradients of a smaller radius and without curvature information, as
+    /// long as the value has decreased since the last restart.
     fn restart(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let has_improved =
             self.value_at_reset.is_infinite() || self.value_at_reset - self.value > 1e-8 * self.value.abs();
         if !has_improved {
-            // The memory of a kink makes short steps: only the slope tells.
+            // Curvature from a kink shortens the steps: test the gradient instead.
             let stationary = self.projected_gradient().amax() <= 1e-4 * self.value.abs();
             return Ok(if stationary { Progress::Converged } else { Progress::Stalled });
         }

@@ -1,7 +1,9 @@
-//! Reference directions, spread evenly over the simplex.
+//! Reference directions, spread evenly over the simplex (Das and Dennis).
 
-/// Unit vectors through the points of the simplex whose coordinates are multiples of `1 / divisions`. Where there are fewer
-/// divisions than objectives, so that all lie on the edge, a second layer of one division less lies halfway to the centre.
+/// Returns unit vectors through the simplex points whose coordinates are multiples of `1 / divisions`.
+///
+/// If there are fewer divisions than objectives, all points lie on the boundary. A second layer with one division less
+/// then lies halfway to the centre.
 #[allow(clippy::cast_precision_loss)]
 pub fn reference_directions(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     let mut points = simplex_lattice(m, divisions);
@@ -16,7 +18,7 @@ pub fn reference_directions(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     points
 }
 
-/// The largest number of divisions that gives at most `most` directions.
+/// Returns the largest number of divisions with at most `max_points` lattice points.
 pub fn max_divisions(m: usize, max_points: usize) -> usize {
     if m <= 1 {
         return 1;
@@ -24,12 +26,12 @@ pub fn max_divisions(m: usize, max_points: usize) -> usize {
     (1..max_points).rev().find(|&divisions| lattice_size(m, divisions) <= max_points).unwrap_or(1)
 }
 
-/// `(divisions + m - 1)` over `(m - 1)`.
+/// Returns the binomial coefficient `(divisions + m - 1)` over `(m - 1)`.
 fn lattice_size(m: usize, divisions: usize) -> usize {
     (1..m).fold(1_usize, |count, k| count.saturating_mul(divisions + k) / k)
 }
 
-/// All points of the simplex whose coordinates are multiples of `1 / divisions`.
+/// Returns all points of the simplex whose coordinates are multiples of `1 / divisions`.
 #[allow(clippy::cast_precision_loss)]
 pub fn simplex_lattice(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     let mut points = Vec::new();
@@ -38,7 +40,7 @@ pub fn simplex_lattice(m: usize, divisions: usize) -> Vec<Vec<f64>> {
     points.into_iter().map(|p| p.into_iter().map(|x| x as f64 / divisions as f64).collect()).collect()
 }
 
-/// All ways to share `left` among the coordinates from `k` on.
+/// Enumerates all distributions of `remaining` over the coordinates from `k` on.
 fn compositions(points: &mut Vec<Vec<usize>>, point: &mut Vec<usize>, k: usize, remaining: usize) {
     if k + 1 == point.len() {
         point[k] = remaining;

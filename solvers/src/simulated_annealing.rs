@@ -9,20 +9,22 @@ use serde::Deserialize;
 use crate::penalty::penalised;
 use crate::start::usable_start;
 
-/// Simulated annealing: a walk that takes every better point, and a worse one the more seldom the cooler it is, with
-/// probability `1/(1 + exp(rise/temperature))`. It sees one number per point, the penalised maximum. The temperature falls
-/// from 1, in units of the objective at the start, to a millionth; steps are normally distributed, shrink with the root of
-/// the temperature, and end on the face of the box they would cross. Ends after a number of iterations.
+/// Simulated annealing: a random walk that accepts every better point, and a worse one with probability `1/(1 +
+/// exp(rise/temperature))`. It minimises one number per point, the penalised objective.
 ///
-/// Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Science 220 (1983) 671-680; the probability by R. J. Glauber, Journal
-/// of Mathematical Physics 4 (1963) 294-307.
+/// The temperature falls from 1, in units of the objective at the start, to a millionth. Steps are normally distributed
+/// and shrink with the square root of the temperature. A step beyond the box ends on its face. The walk ends after a
+/// number of iterations.
+///
+/// Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Science 220 (1983) 671-680; acceptance probability: R. J.
+/// Glauber, Journal of Mathematical Physics 4 (1963) 294-307.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SimulatedAnnealingOptions {
-    /// Standard deviation of the first steps along every coordinate, in the unit box.
+    /// Initial standard deviation of the steps along every coordinate, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
-    /// Number of iterations, each of which evaluates a point.
+    /// Number of iterations, each of which evaluates one point.
     #[schemars(range(min = 1))]
     pub max_iterations: u64,
 }
@@ -41,7 +43,7 @@ impl SolverOptions for SimulatedAnnealingOptions {
     }
 }
 
-/// The solver of the kind `simulated-annealing`.
+/// Solver of the kind `simulated-annealing`.
 struct Annealing {
     options: SimulatedAnnealingOptions,
     walk: Option<Walk>,
@@ -57,7 +59,7 @@ struct Walk {
     step_stream: Stream,
 }
 
-/// The last temperature.
+/// Final temperature.
 const FINAL_TEMPERATURE: f64 = 1e-6;
 
 impl Solver for Annealing {
@@ -78,7 +80,7 @@ impl Solver for Annealing {
 
     #[allow(clippy::cast_precision_loss)]
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        // A walk has no test of an optimum.
+        // A random walk has no optimality test.
         let Some(walk) = &mut self.walk else { return Ok(Progress::Stalled) };
         if walk.point.is_empty() {
             return Ok(Progress::Converged);
@@ -99,7 +101,7 @@ impl Solver for Annealing {
 }
 
 impl Walk {
-    /// The point after a step; on a grid it is not shorter than to the next value.
+    /// Returns the proposed point; on a grid, the standard deviation is at least the spacing.
     fn proposal(&mut self, size: f64, spacing: &[f64]) -> Vec<f64> {
         let random = &mut self.step_stream;
         let along = |(u, spacing): (&f64, &f64)| (u + size.max(*spacing) * math::normal(random)).clamp(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! Pattern search: polls a pattern of points around the best one, and shrinks it where nothing is better.
+//! Pattern search: polls a pattern of points around the best one and shrinks it after an unsuccessful poll.
 
 mod barrier;
 mod pattern;
@@ -25,36 +25,39 @@ use quadratic_models::QuadraticModels;
 use sample_set::SampleSet;
 use trust_region_subproblem::{PenalisedObjective, TrustRegionSubproblem};
 
-/// Mesh-adaptive direct search on the unit box: points of a pattern are polled around the best one, those first that look
-/// best; a better one is taken, else the pattern shrinks and turns. Ends at a mesh size. Needs no slopes: for criteria that
-/// jump, for noise, and for tuners with whole numbers or lists.
+/// Mesh-adaptive direct search (MADS) with quadratic models. Needs no gradients: for discontinuous or noisy criteria
+/// and for tuners with whole numbers or lists.
 ///
-/// Before it polls, it searches: every row has a quadratic model of its own through the points around the best one, and the
-/// point where the largest of the models is least is tried, inside a trust region. So the kink where two criteria meet is
-/// seen. Constraints are kept by a progressive barrier: objective and violation are judged apart, and what may be violated
-/// falls as the search goes on.
+/// Poll: the points of a pattern around the best point are evaluated, the most promising first. A better point is
+/// accepted; otherwise the pattern shrinks and changes its orientation. The search ends at a given pattern size.
 ///
-/// Where neither models nor pattern lead on although the models promise much, a row has kinks of its own: unless its values
-/// are noise, slopes by differences are followed from there (as `sqp` does), as long as they lead on.
+/// Search: before each poll, every criterion has a quadratic model of its own through the points around the best one.
+/// The point that minimises the largest model in a trust region is evaluated. So the search resolves the kinks
+/// (non-differentiable points) where two criteria intersect. A progressive barrier handles constraints: objective and
+/// violation are compared separately, and the permitted violation decreases.
 ///
-/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); turned patterns: M. A. Abramson, C. Audet,
-/// J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N. Vicente,
-/// Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one for every row: J. Larson, M. Menickelly,
-/// S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563; barrier: C. Audet, J. E. Dennis, SIAM J. Optimization 20 (2009)
-/// 445-472.
+/// Kinks inside a criterion: neither models nor polls succeed although the models predict a large decrease. Unless the
+/// values are noisy, the search then follows finite-difference gradients (as `sqp` does) as long as they give progress.
+///
+/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); rotated patterns: M. A. Abramson, C.
+/// Audet, J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N.
+/// Vicente, Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one model per criterion: J.
+/// Larson, M. Menickelly, S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563; barrier: C. Audet, J. E. Dennis, SIAM
+/// J. Optimization 20 (2009) 445-472.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
-    /// First distance of the pattern's points, in the unit box.
+    /// Initial size of the pattern, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
-    /// Distance at which the search ends.
+    /// Pattern size at which the search ends, in the unit box.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Factor of the pattern's size where nothing in it is better. Less leads to the end sooner; more polls more often.
+    /// Factor of the pattern size after an unsuccessful poll. Smaller values end the search sooner; larger values poll
+    /// more often.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
-    /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
+    /// Number of points evaluated at once, in a poll and together with a model step; 0 for the whole pattern.
     #[schemars(range(max = 10_000))]
     pub batch: usize,
 }
@@ -73,31 +76,31 @@ impl SolverOptions for PatternSearchOptions {
     }
 }
 
-/// The solver of the kind `pattern-search`.
+/// Solver of the kind `pattern-search`.
 struct PatternSearch {
     options: PatternSearchOptions,
     state: Option<State>,
     workspace: Workspace,
 }
 
-/// Models of the rows, and memory that is used again from step to step.
+/// Models of the criteria and buffers that are reused between steps.
 #[derive(Default)]
 struct Workspace {
     models: QuadraticModels,
     subproblem: TrustRegionSubproblem,
-    /// The known points around the best one, with their distances.
+    /// Known points around the best one, with their distances.
     neighbours: Vec<(f64, usize)>,
-    /// The trust region inside the box, in steps of the models.
+    /// Trust region intersected with the box, in steps of the models.
     low: Vec<f64>,
     high: Vec<f64>,
-    /// Unknown points of the pattern, and their order: what looks best first.
+    /// Points of the pattern, and their order by model value, without the points already known.
     pattern: PointBuffer,
     order: Vec<(f64, usize)>,
-    /// Points to ask for.
+    /// Points to be evaluated next.
     trial_points: PointBuffer,
     step: Vec<f64>,
     values: Vec<f64>,
-    /// Where the search stood.
+    /// Previous position of the search.
     previous: Vec<f64>,
     spread: Vec<f64>,
 }
@@ -105,40 +108,40 @@ struct Workspace {
 struct State {
     best: Evaluation,
     samples: SampleSet,
-    /// Size of the pattern and of the trust region.
+    /// Size of the pattern and radius of the trust region.
     radius: f64,
-    /// What the models promised at last.
+    /// Last predicted reduction of the penalised objective.
     predicted: f64,
-    /// Times that the search began again because of a kink.
+    /// Number of restarts because of a kink.
     kink_restarts: i32,
-    /// Times that the search went back from an infeasible end.
+    /// Number of restarts after an infeasible end.
     feasibility_restarts: usize,
-    /// Steps of the models in a row that led nowhere.
+    /// Number of successive model steps without success.
     model_failures: usize,
-    /// The best point at the last turn of the pattern.
-    point_at_last_rotation: Option<Vec<f64>>,
-    /// Weight of the violation in the models' objective.
+    /// Best point at the last reorientation of the pattern.
+    point_at_last_reorientation: Option<Vec<f64>>,
+    /// Weight of the violation in the penalised objective of the models.
     penalty: f64,
-    /// What may be moved to.
+    /// Acceptance of points under constraints.
     barrier: Barrier,
     objective_scale: f64,
     pattern: Pattern,
-    /// Points that are evaluated at once; 0 for whole patterns.
+    /// Number of points evaluated at once; 0 for the whole pattern.
     batch: usize,
     random: Stream,
     spacing: Vec<f64>,
-    /// Whether the first pattern has been polled.
+    /// True after the first poll.
     has_polled: bool,
-    /// What follows a kink inside a row, while it does.
+    /// Gradient-based solver, while it follows a kink inside a criterion.
     gradient_solver: Option<Box<dyn Solver>>,
-    /// What the best point was worth when slopes were last followed; infinite while they were not.
+    /// Penalised objective at the last start of the gradient-based solver; infinite before the first.
     gradient_start_value: f64,
-    /// What the rows are like; `None` while nobody wanted to know.
+    /// Smoothness of the criteria; `None` before it is needed.
     smoothness: Option<Smoothness>,
 }
 
 impl Workspace {
-    /// Adds up to `count` points of the pattern to what is asked, in their order, from the one at `first` on.
+    /// Adds up to `count` points of the ranked pattern to the trial points, starting at rank `first`.
     fn push_pattern_points(&mut self, first: usize, count: usize) {
         for &(_, i) in self.order.iter().skip(first).take(count) {
             self.trial_points.push(self.pattern.as_slice()[i].iter().copied());
@@ -163,7 +166,7 @@ impl Solver for PatternSearch {
         self.state = Some(State {
             objective_scale: LinearisedCriteria::from_values(oracle.shape(), scaled).objective_scale(),
             samples,
-            point_at_last_rotation: None,
+            point_at_last_reorientation: None,
             radius: self.options.size,
             model_failures: 0,
             predicted: 0.0,
@@ -207,14 +210,15 @@ impl Solver for PatternSearch {
             state.shrink(options.shrink);
             return Ok(Progress::Continue);
         }
-        // The models still promise what the problem does not keep: a kink inside a row. Again, with more turns on the way.
+        // The predicted reduction is not achieved: a kink inside a criterion. Restart with a slower shrinkage and more
+        // orientations.
         let penalised_value = state.penalised_value(oracle.shape(), &state.best);
         if state.predicted > FINAL_KINK_THRESHOLD * penalised_value.abs() && state.kink_restarts < MAX_KINK_RESTARTS {
             state.kink_restarts += 1;
             state.radius = options.shrink * options.size;
             return Ok(Progress::Continue);
         }
-        // An infeasible end: on from the best feasible point, or with a wide pattern from here.
+        // Infeasible end: continue from the best feasible point, or with a wide pattern from here.
         if !state.best.merit.is_feasible() && state.feasibility_restarts < MAX_FEASIBILITY_RESTARTS {
             state.feasibility_restarts += 1;
             if let Some(best) = oracle.best().filter(|best| best.merit.is_feasible()) {
@@ -228,22 +232,22 @@ impl Solver for PatternSearch {
     }
 }
 
-/// A promise at the end, relative to what the best point is worth, that tells of a kink.
+/// Predicted reduction at the end of the search, relative to the penalised objective, that indicates a kink.
 const FINAL_KINK_THRESHOLD: f64 = 1e-10;
 
-/// The same while the search goes on.
+/// Predicted reduction during the search, relative to the penalised objective, that indicates a kink.
 const KINK_THRESHOLD: f64 = 1e-4;
 
-/// First radius of the steps along slopes, in those of the pattern.
+/// Initial trust-region radius of the gradient-based solver, in pattern sizes.
 const GRADIENT_RADIUS_FACTOR: f64 = 3.0;
 
-/// Times that the search begins again because of a kink.
+/// Maximum number of restarts because of a kink.
 const MAX_KINK_RESTARTS: i32 = 4;
 
-/// Times that the search goes back from an infeasible end.
+/// Maximum number of restarts after an infeasible end.
 const MAX_FEASIBILITY_RESTARTS: usize = 3;
 
-/// Steps of the models in a row that lead nowhere before the pattern is polled.
+/// Number of successive model steps without success before a poll.
 const MAX_MODEL_FAILURES: usize = 2;
 
 impl State {
@@ -255,8 +259,8 @@ impl State {
         evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.penalised_objective(shape).value(scaled))
     }
 
-    /// Evaluates points, keeps their values, and moves to the best if the barrier admits it; `true` when it moved. What is
-    /// promised is promised of the first point.
+    /// Evaluates and stores points, and moves to the best one that the barrier accepts; returns true after a move. The
+    /// predicted reduction applies to the first point.
     fn evaluate_and_move(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -285,14 +289,14 @@ impl State {
         }
     }
 
-    /// Goes on from a point that others have found.
+    /// Continues from a point found by another solver.
     fn move_to(&mut self, best: &Evaluation) {
         self.best = best.clone();
         self.barrier.record(&best.merit);
         self.record(best);
     }
 
-    /// Forgets the oldest points where there are many.
+    /// Drops the oldest points if there are many.
     fn drop_oldest(&mut self) {
         if self.samples.drop_oldest()
             && let Some(scaled) = &self.best.scaled
@@ -301,8 +305,8 @@ impl State {
         }
     }
 
-    /// Tries where the models are least, and beside it as much of the pattern as fills a batch; `true` while that is worth
-    /// going on with, `false` when it is time to poll.
+    /// Evaluates the minimiser of the models, and points of the pattern to fill a batch. Returns false when a poll is
+    /// due.
     fn search(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
         if self.spacing.iter().all(|&spacing| spacing > 0.0) || !self.fit(workspace) {
             return Ok(false);
@@ -312,7 +316,7 @@ impl State {
         let found = self.solve_subproblem(&mut objective, workspace);
         if objective.penalty > self.penalty {
             self.penalty = objective.penalty;
-            // Nothing is worth what it was.
+            // A new penalty makes earlier values incomparable.
             self.gradient_start_value = f64::INFINITY;
         }
         if !found {
@@ -337,7 +341,7 @@ impl State {
         if moved {
             self.model_failures = 0;
         } else if self.improve_geometry(oracle, workspace)? {
-            // The models were wrong for want of points.
+            // The models were inaccurate because of too few points.
             return Ok(true);
         } else {
             self.model_failures += 1;
@@ -350,13 +354,13 @@ impl State {
         Ok(self.model_failures < MAX_MODEL_FAILURES)
     }
 
-    /// Lays models through the known points around the best one; `false` where these do not determine them.
+    /// Fits the models to the known points around the best one; returns false if these do not determine them.
     fn fit(&self, workspace: &mut Workspace) -> bool {
         self.samples.neighbours(&self.best.point, self.radius, &mut workspace.neighbours);
         workspace.models.fit(&self.samples, &workspace.neighbours, &self.best.point, self.radius)
     }
 
-    /// Finds where the models are least, in the trust region and inside the box.
+    /// Minimises the models in the trust region, inside the box.
     fn solve_subproblem(&self, objective: &mut PenalisedObjective, workspace: &mut Workspace) -> bool {
         workspace.low.clear();
         workspace.low.extend(self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)));
@@ -365,7 +369,8 @@ impl State {
         workspace.subproblem.solve(objective, &workspace.models, &workspace.low, &workspace.high)
     }
 
-    /// Adds a point in the direction in which those that the models go through tell least; `false` where they tell enough.
+    /// Evaluates a point in the direction that the interpolation points cover least; returns false if their geometry is
+    /// adequate.
     fn improve_geometry(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
         let Workspace { models, step, values, spread, .. } = &mut *workspace;
         if !least_sampled_direction(models, self.best.point.len(), spread, step) {
@@ -392,13 +397,13 @@ impl State {
         Ok(self.samples.len() > count)
     }
 
-    /// Polls the pattern, what looks best first; `true` when a point was better.
+    /// Polls the pattern, the most promising points first; returns true if a point was accepted.
     fn poll(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
         self.model_failures = 0;
         self.fit(workspace);
         self.rank_pattern(oracle.shape(), workspace);
         let count = workspace.order.len();
-        // The first pattern is what the first models go through.
+        // The first models interpolate the whole first pattern.
         let batch = if self.has_polled && self.batch > 0 { self.batch } else { count.max(1) };
         for first in (0..count).step_by(batch) {
             workspace.trial_points.clear();
@@ -412,7 +417,7 @@ impl State {
         Ok(false)
     }
 
-    /// Adds as much of the pattern to what is asked as fills a batch, what looks best first.
+    /// Fills the batch with the most promising points of the pattern.
     fn fill_batch(&self, shape: &Shape, workspace: &mut Workspace) {
         if workspace.trial_points.len() < self.batch {
             self.rank_pattern(shape, workspace);
@@ -420,8 +425,7 @@ impl State {
         }
     }
 
-    /// Collects the unknown points of the pattern around the best one, in the order in which they look best to the models, if
-    /// these were fitted.
+    /// Collects the unknown points of the pattern around the best one, ranked by the models if these are fitted.
     fn rank_pattern(&self, shape: &Shape, workspace: &mut Workspace) {
         let Workspace { models, pattern, order, step, values, .. } = workspace;
         self.pattern.points(&self.best.point, self.radius, &self.spacing, pattern);
@@ -443,7 +447,7 @@ impl State {
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
-    /// Goes on in the direction of a success, twice as far each time, while that is better.
+    /// Continues in the direction of a successful poll, doubling the step as long as points are accepted.
     fn extrapolate(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<(), Halt> {
         loop {
             let here = &self.best.point;
@@ -463,7 +467,7 @@ impl State {
                 return Ok(());
             }
             workspace.previous.clone_from(here);
-            // At the edge of the box few are left.
+            // Near the boundary of the box few points remain.
             if workspace.trial_points.len() < self.batch {
                 self.fit(workspace);
                 self.fill_batch(oracle.shape(), workspace);
@@ -474,8 +478,8 @@ impl State {
         }
     }
 
-    /// Begins to follow slopes where the models promise what the problem does not keep; `false` where that is not so, where
-    /// slopes led nowhere the last time, and where they would tell of noise.
+    /// Starts the gradient-based solver if the predicted reduction is not achieved. Returns false otherwise, if the
+    /// last start gave no progress, or if the criteria are noisy.
     fn start_gradient_phase(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         let penalised_value = self.penalised_value(oracle.shape(), &self.best);
         let promising = self.predicted > KINK_THRESHOLD * penalised_value.abs();
@@ -497,7 +501,7 @@ impl State {
         Ok(true)
     }
 
-    /// A step along slopes.
+    /// Does one step of the gradient-based solver.
     fn gradient_step(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
         let Some(gradient_solver) = &mut self.gradient_solver else { return Ok(()) };
         if gradient_solver.step(oracle)? != Progress::Continue {
@@ -512,16 +516,16 @@ impl State {
         Ok(())
     }
 
-    /// Shrinks and turns the pattern; by less after every restart.
+    /// Shrinks and reorients the pattern; the shrinkage is weaker after every restart.
     fn shrink(&mut self, factor: f64) {
         self.radius *= math::powf(factor, math::powi(0.5, self.kink_restarts));
-        // Where the search went tells where it may go on.
-        match self.point_at_last_rotation.replace(self.best.point.clone()) {
+        // Align the pattern with the last displacement.
+        match self.point_at_last_reorientation.replace(self.best.point.clone()) {
             Some(previous) if previous != self.best.point => {
                 let displacement = DVector::from_fn(previous.len(), |j, _| self.best.point[j] - previous[j]);
                 self.pattern.align(&displacement);
             }
-            _ => self.pattern.rotate_randomly(&mut self.random),
+            _ => self.pattern.reorient_randomly(&mut self.random),
         }
     }
 
@@ -529,7 +533,7 @@ impl State {
         self.spacing.iter().all(|&spacing| spacing > 0.0 && self.radius < 0.5 * spacing)
     }
 
-    /// The point after a step of the models, inside the box and on the grids.
+    /// Returns the point after a step of the models, inside the box and on the grids.
     fn point_at(&self, y: &[f64]) -> impl Iterator<Item = f64> {
         let coordinate = |j: usize| {
             let u = (self.best.point[j] + self.radius * y[j]).clamp(0.0, 1.0);
@@ -540,8 +544,10 @@ impl State {
     }
 }
 
-/// Finds the direction in which the points that the models go through are least spread, by inverse iteration; `false` where
-/// they are spread in all. It begins along no coordinate, and where two directions are spread about as little finds one between
+/// Computes, by inverse iteration, the direction in which the interpolation points are least spread. Returns false if
+/// they are spread in all directions.
+///
+/// The iteration does not start along a coordinate. For two directions with almost equal spread the result lies between
 /// them.
 ///
 /// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 7.6.1.
@@ -574,13 +580,13 @@ fn least_sampled_direction(
     smallest.is_some_and(|smallest| smallest < MIN_SPREAD)
 }
 
-/// Inverse iterations for an unknown direction: enough where the next spread is twice as large, for six figures.
+/// Number of inverse iterations: gives six digits if the next larger spread is at least twice the smallest.
 const INVERSE_ITERATIONS: usize = 20;
 
-/// What is added to all sums of squared steps, so that their matrix has an inverse.
+/// Regularisation added to the sums of squared steps, so that their matrix is invertible.
 const REGULARISATION: f64 = 1e-9;
 
-/// A sum of squared steps along a direction below which that direction is unknown.
+/// Sum of squared steps along a direction below which that direction is not covered.
 const MIN_SPREAD: f64 = 0.3;
 
 #[cfg(test)]
@@ -589,7 +595,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_direction_across_points_near_a_line_is_unknown() {
+    fn the_direction_across_points_near_a_line_is_not_covered() {
         let flat = |_: &[f64; 2]| vec![1.0];
         let along = through(&[[0.0, 0.0], [1.0, 0.5], [-1.0, -0.5], [0.5, 0.3]], flat);
         let (mut memory, mut direction) = (Vec::new(), Vec::new());

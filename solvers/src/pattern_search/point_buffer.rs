@@ -1,6 +1,6 @@
-//! Lists of points.
+//! Buffer of points.
 
-/// Points, in memory that is used again.
+/// List of points that reuses its memory.
 #[derive(Debug, Default)]
 pub struct PointBuffer {
     points: Vec<Vec<f64>>,
@@ -8,12 +8,12 @@ pub struct PointBuffer {
 }
 
 impl PointBuffer {
-    /// Forgets all.
+    /// Removes all points.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Adds a point with given coordinates.
+    /// Adds a point with the given coordinates.
     pub fn push(&mut self, coordinates: impl Iterator<Item = f64>) {
         if self.count == self.points.len() {
             self.points.push(Vec::new());
@@ -24,7 +24,7 @@ impl PointBuffer {
         self.count += 1;
     }
 
-    /// Adds a point with given coordinates if it is wanted; `is_wanted` gets it and the points before it.
+    /// Adds a point with the given coordinates if `is_accepted` returns true for it and the points before it.
     pub fn push_if(
         &mut self,
         coordinates: impl Iterator<Item = f64>,
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_forgets_what_was_in_it() {
+    fn a_cleared_buffer_is_empty() {
         let mut points = PointBuffer::default();
         points.push([1.0, 2.0].into_iter());
         points.push_if([1.0, 2.0].into_iter(), |point, previous| point != previous[0]);

@@ -1,4 +1,4 @@
-//! A quadratic model of every row through the points around the best one.
+//! Quadratic models of the criteria through the points around the best one.
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
@@ -7,45 +7,45 @@ use crate::active_set::dot;
 use crate::cholesky::with_cholesky;
 use mops_core::math;
 
-/// What a unit of squared misfit costs, in units of squared curvature over the trust region.
+/// Cost of squared misfit, relative to squared curvature over the trust region.
 const RIDGE: f64 = 1e-4;
 
-/// Models `c + g'y + y'H y / 2` of all rows in the steps `y = (x - centre) / radius`. They are fitted again and again; memory
-/// once asked for is kept.
+/// Models `c + g'y + y'H y / 2` of all criteria in the steps `y = (x - centre) / radius`. Memory is reused between
+/// fits.
 #[derive(Debug, Default)]
 pub struct QuadraticModels {
     n: usize,
     criteria: usize,
-    /// Whether the last points determined them.
+    /// True if the last points determined the models.
     is_fitted: bool,
-    /// The unit of steps.
+    /// Unit of the steps.
     radius: f64,
-    /// `c` of every row.
+    /// `c` of every criterion.
     constants: Vec<f64>,
-    /// `g` of every row, one after the other.
+    /// `g` of every criterion, concatenated.
     gradients: Vec<f64>,
-    /// `H` of every row, one after the other.
+    /// `H` of every criterion, concatenated.
     hessians: Vec<f64>,
     workspace: Workspace,
 }
 
-/// What is needed while models are fitted.
+/// Buffers of the fit.
 #[derive(Debug, Default)]
 struct Workspace {
-    /// The steps to the points, one after the other.
+    /// Steps to the points, concatenated.
     steps: Vec<f64>,
-    /// `X = [1 y]`, by columns.
+    /// `X = [1 y]`, column-major.
     linear: Vec<f64>,
-    /// `[X F]`, then `K^-1 [X F]`, by columns.
+    /// `[X F]`, then `K^-1 [X F]`, column-major.
     solved: Vec<f64>,
-    /// `[c; g]` of every row.
+    /// `[c; g]` of every criterion.
     planes: Vec<f64>,
     system: Vec<f64>,
     schur: Vec<f64>,
 }
 
 impl QuadraticModels {
-    /// Models of so many rows without any curvature.
+    /// Creates models without curvature for a number of criteria.
     pub fn new(n: usize, criteria: usize) -> Self {
         Self {
             n,
@@ -59,16 +59,16 @@ impl QuadraticModels {
         }
     }
 
-    /// Lays models through points around a centre, whose curvatures differ least (in the Frobenius norm) from the ones before;
-    /// `false` where the points do not determine them.
+    /// Fits models to points around a centre, with the smallest change (in the Frobenius norm) of the Hessians. Returns
+    /// false if the points do not determine the models.
     ///
-    /// With `K_ij = (y_i'y_j)^2 / 2 + mu [i = j]` and `X = [1 y]`: `[K, X; X', 0] [l; c, g] = [f - y'H_0 y / 2; 0]`, and
-    /// `H = H_0 + sum l_i y_i y_i'`. The small `mu` lets the models miss values by as little as the curvature would have to
-    /// change much for: points that nearly coincide would bend them beyond reason. `K` is positive definite, so that the
-    /// system is solved by its factor and that of `X'K^-1 X`, with values measured from those at the first point.
+    /// With `K_ij = (y_i'y_j)^2 / 2 + mu [i = j]` and `X = [1 y]`: `[K, X; X', 0] [l; c, g] = [f - y'H_0 y / 2; 0]`,
+    /// and `H = H_0 + sum l_i y_i y_i'`. The small `mu` permits small misfits that would otherwise require large
+    /// changes of the Hessian, as nearly coincident points do. `K` is positive definite: the system is solved with its
+    /// Cholesky factor and that of `X'K^-1 X`, with values relative to those at the first point.
     ///
-    /// Source: A. R. Conn, K. Scheinberg, L. N. Vicente, Introduction to Derivative-Free Optimization (SIAM 2009), section
-    /// 5.3; least change: M. J. D. Powell, Mathematical Programming 100 (2004) 183-215.
+    /// Source: A. R. Conn, K. Scheinberg, L. N. Vicente, Introduction to Derivative-Free Optimization (SIAM 2009),
+    /// section 5.3; least change: M. J. D. Powell, Mathematical Programming 100 (2004) 183-215.
     pub fn fit(&mut self, samples: &SampleSet, neighbours: &[(f64, usize)], centre: &[f64], radius: f64) -> bool {
         let (n, criteria, count) = (self.n, self.criteria, neighbours.len());
         let rescaling = math::powi(radius / self.radius, 2);
@@ -157,22 +157,22 @@ impl QuadraticModels {
         true
     }
 
-    /// Whether the last points determined them.
+    /// Returns true if the last points determined the models.
     pub fn is_fitted(&self) -> bool {
         self.is_fitted
     }
 
-    /// The steps to the points that the models go through.
+    /// Returns the steps to the interpolation points.
     pub fn steps(&self) -> impl Iterator<Item = &[f64]> {
         self.workspace.steps.chunks_exact(self.n)
     }
 
-    /// Values of all rows without a step.
+    /// Returns the values of all criteria at the centre.
     pub fn constants(&self) -> &[f64] {
         &self.constants
     }
 
-    /// Values of all rows after a step.
+    /// Computes the values of all criteria after a step.
     pub fn values(&self, y: &[f64], values: &mut Vec<f64>) {
         let value =
             |row: usize| self.constants[row] + dot(self.gradient(row), y) + 0.5 * quadratic_form(self.hessian(row), y);
@@ -180,16 +180,16 @@ impl QuadraticModels {
         values.extend((0..self.criteria).map(value));
     }
 
-    /// Adds the slope of a row after a step, times a weight.
+    /// Adds the gradient of a criterion after a step, times a weight.
     pub fn add_gradient(&self, row: usize, y: &[f64], weight: f64, sum: &mut [f64]) {
-        // Curvatures are symmetric.
+        // Hessians are symmetric.
         let columns = self.hessian(row).chunks_exact(self.n);
         for ((sum, gradient), column) in sum.iter_mut().zip(self.gradient(row)).zip(columns) {
             *sum += weight * (gradient + dot(column, y));
         }
     }
 
-    /// Adds the curvature of a row, times a weight.
+    /// Adds the Hessian of a criterion, times a weight.
     pub fn add_hessian(&self, row: usize, weight: f64, sum: &mut DMatrix<f64>) {
         if weight != 0.0 {
             sum.iter_mut().zip(self.hessian(row)).for_each(|(sum, h)| *sum += weight * h);
@@ -206,7 +206,7 @@ impl QuadraticModels {
     }
 }
 
-/// `y'H y`.
+/// Returns `y'H y`.
 fn quadratic_form(h: &[f64], y: &[f64]) -> f64 {
     h.chunks_exact(y.len()).zip(y).map(|(column, y_j)| y_j * dot(column, y)).sum()
 }
@@ -215,7 +215,7 @@ fn quadratic_form(h: &[f64], y: &[f64]) -> f64 {
 pub(super) mod tests {
     use super::*;
 
-    /// Models in steps from 0, of radius 1, through values of rows at given steps.
+    /// Fits models with centre 0 and radius 1 to values of the criteria at given steps.
     pub fn through<const N: usize>(steps: &[[f64; N]], f: impl Fn(&[f64; N]) -> Vec<f64>) -> QuadraticModels {
         let criteria = f(&steps[0]).len();
         let mut samples = SampleSet::new(N, criteria);
@@ -233,7 +233,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn enough_points_give_a_quadratic_back() {
+    fn enough_points_reproduce_a_quadratic() {
         let f = |y: &[f64; 2]| vec![1.0 + 2.0 * y[0] - y[1] + 3.0 * y[0] * y[0] + y[0] * y[1] - 0.5 * y[1] * y[1]];
         let models = through(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.7, 0.6]], f);
         let y = [0.3, -0.8];
@@ -260,7 +260,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn curvature_is_kept_where_few_points_tell_of_it_whatever_the_radius() {
+    fn curvature_is_kept_for_few_points_at_any_radius() {
         let f = |y: &[f64; 1]| vec![3.0 * y[0] * y[0]];
         let mut models = through(&[[0.0], [1.0], [-1.0]], f);
         let mut samples = SampleSet::new(1, 1);

@@ -1,6 +1,6 @@
-//! Points with values: what the models go through.
+//! Evaluated points, which the models interpolate.
 
-/// Points and the values of all rows there, the oldest first.
+/// Points and the values of all criteria there, the oldest first.
 #[derive(Debug)]
 pub struct SampleSet {
     dimension: usize,
@@ -10,14 +10,14 @@ pub struct SampleSet {
     values: Vec<f64>,
 }
 
-/// Points that are forgotten at a time.
+/// Number of points dropped at a time.
 const DROP_COUNT: usize = 200;
 
-/// Points within this many radii take part in the models.
+/// Radius of the neighbourhood whose points enter the models, in trust-region radii.
 const REACH: f64 = 2.5;
 
 impl SampleSet {
-    /// None yet, of points with so many coordinates and values.
+    /// Creates an empty set for points with `dimension` coordinates and `criteria` values.
     pub fn new(dimension: usize, criteria: usize) -> Self {
         Self { dimension, criteria, count: 0, points: Vec::new(), values: Vec::new() }
     }
@@ -38,7 +38,7 @@ impl SampleSet {
         (0..self.count).any(|i| self.point(i) == point)
     }
 
-    /// Adds a point that is not there yet.
+    /// Adds a point unless it is already in the set.
     pub fn insert(&mut self, point: &[f64], values: &[f64]) {
         if !self.contains(point) {
             self.points.extend_from_slice(point);
@@ -47,7 +47,7 @@ impl SampleSet {
         }
     }
 
-    /// Forgets the oldest points where there are many: few of them are near. `true` when it did.
+    /// Drops the oldest points of a large set, few of which are near; returns true if it did.
     pub fn drop_oldest(&mut self) -> bool {
         let n = self.dimension;
         let is_full = self.count > DROP_COUNT + 2 * (n + 1) * (n + 2);
@@ -59,8 +59,8 @@ impl SampleSet {
         is_full
     }
 
-    /// Finds the points around a centre, with their distances in radii, the nearest first: at most as many as determine a
-    /// quadratic.
+    /// Finds the points around a centre with their distances in radii, the nearest first. Their number is limited to
+    /// that of the coefficients of a quadratic.
     pub fn neighbours(&self, centre: &[f64], radius: f64, neighbours: &mut Vec<(f64, usize)>) {
         let n = self.dimension;
         let distance =
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_oldest_are_forgotten_and_the_nearest_found() {
+    fn the_oldest_points_are_dropped_and_the_nearest_found() {
         let mut samples = SampleSet::new(1, 1);
         let count = DROP_COUNT + 13;
         for i in (0..count).chain(0..3) {

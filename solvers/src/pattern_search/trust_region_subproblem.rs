@@ -1,4 +1,4 @@
-//! The step that makes the models' objective least.
+//! Trust-region subproblem: minimisation of the penalised objective of the models.
 
 use mops_core::math;
 use mops_core::{Shape, Usage};
@@ -10,30 +10,30 @@ use crate::cholesky::factorise;
 use crate::epigraph::{Direction, Subproblem};
 use crate::linearised_criteria::{LinearisedCriteria, Multipliers};
 
-/// What is minimised: the rows of the models as the problem uses them, with an exact penalty.
+/// Objective of the models with an exact penalty for the constraints.
 pub struct PenalisedObjective<'a> {
-    /// Sizes and kinds.
+    /// Problem dimensions, usages and weights.
     pub shape: &'a Shape,
-    /// Factor of the objective.
+    /// Scale factor of the objective.
     pub objective_scale: f64,
     /// Weight of the largest violation.
     pub penalty: f64,
 }
 
 impl PenalisedObjective<'_> {
-    /// The penalised objective of scaled values.
+    /// Returns the penalised objective of scaled values.
     pub fn value(&self, scaled: &[f64]) -> f64 {
         let merit = self.shape.merit(scaled);
         self.objective_scale * merit.objective + self.penalty * merit.violation
     }
 
-    /// The rows of the models, with given values, after a step.
+    /// Linearises the models after a step with given values.
     fn linearise(&self, models: &QuadraticModels, y: &[f64], values: &[f64], criteria: &mut LinearisedCriteria) {
         criteria.fill(self.shape, values, y.len(), |row, weight, sum| models.add_gradient(row, y, weight, sum));
         criteria.scale_objective(self.objective_scale);
     }
 
-    /// The curvature of the Lagrangian.
+    /// Computes the Hessian of the Lagrangian.
     fn lagrangian_hessian(&self, models: &QuadraticModels, multipliers: &Multipliers, hessian: &mut DMatrix<f64>) {
         let sum = multipliers.objectives.len() == 1;
         let (mut objective, mut inequality, mut equality) = (0, 0, 0);
@@ -59,12 +59,12 @@ impl PenalisedObjective<'_> {
         }
     }
 
-    /// How much more a unit of violation counts than one of the objective.
+    /// Returns the weight of the violation relative to that of the objective.
     pub fn relative_penalty(&self) -> f64 {
         self.penalty / self.objective_scale
     }
 
-    /// What a step promises that leads from some scaled values to others.
+    /// Returns the predicted reduction of a step from some scaled values to others.
     pub fn predicted_reduction(&self, from: &[f64], to: &[f64]) -> PredictedReduction {
         let [before, after] = [from, to].map(|scaled| self.shape.merit(scaled));
         PredictedReduction {
@@ -73,23 +73,23 @@ impl PenalisedObjective<'_> {
         }
     }
 
-    /// By how much the penalised objective falls if a promise is kept.
+    /// Returns the reduction of the penalised objective that corresponds to a predicted reduction.
     pub fn penalised_reduction(&self, predicted: &PredictedReduction) -> f64 {
         (self.objective_scale * predicted.objective + self.penalty * predicted.violation).max(0.0)
     }
 }
 
-/// The search for the least of the models' penalised objective, with its memory, which is used again from step to step.
+/// Solver for the trust-region subproblem; reuses its memory from one step to the next.
 #[derive(Default)]
 pub struct TrustRegionSubproblem {
-    /// The step that was found.
+    /// Resulting step.
     y: Vec<f64>,
-    /// The values of all rows after it.
+    /// Values of all criteria after the step.
     values: Vec<f64>,
-    /// Another step, and the values after it.
+    /// Trial step, and the values after it.
     trial: Vec<f64>,
     trial_values: Vec<f64>,
-    /// The first step and its values, while others are looked at.
+    /// First step and its values, while others are computed.
     first: [Vec<f64>; 2],
     criteria: LinearisedCriteria,
     trial_criteria: LinearisedCriteria,
@@ -97,7 +97,7 @@ pub struct TrustRegionSubproblem {
     hessian: DMatrix<f64>,
     factor: Vec<f64>,
     multipliers: Multipliers,
-    /// The box around the step.
+    /// Bounds of the inner step.
     low: Vec<f64>,
     high: Vec<f64>,
     directions: [Direction; 2],
@@ -105,18 +105,20 @@ pub struct TrustRegionSubproblem {
 }
 
 impl TrustRegionSubproblem {
-    /// The step that was found.
+    /// Returns the resulting step.
     pub fn step(&self) -> &[f64] {
         &self.y
     }
 
-    /// The models' values after it.
+    /// Returns the model values after the step.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Finds the step to the least of the models' penalised objective over `low <= y <= high`, with a weight of the violation
-    /// that grows until the violation falls by most of what the models let it fall. `false` where no step lessens it.
+    /// Minimises the penalised objective of the models over `low <= y <= high`.
+    ///
+    /// The penalty grows until the violation decreases by most of the decrease that the models permit. Returns false if
+    /// no step reduces the objective.
     ///
     /// Source: R. H. Byrd, J. Nocedal, R. A. Waltz, Optimization Methods and Software 23 (2008) 197-213 (steering).
     pub fn solve(
@@ -153,13 +155,13 @@ impl TrustRegionSubproblem {
         std::mem::swap(&mut self.values, &mut self.first[1]);
     }
 
-    /// What the models leave violated after the step.
+    /// Returns the violation of the models after the step.
     fn violation(&self, shape: &Shape) -> f64 {
         violation(&shape.merit(&self.values))
     }
 
-    /// As [`TrustRegionSubproblem::solve`], from `y = 0`, by sequential quadratic programming on the models, in a trust region of its own and
-    /// with second-order corrections.
+    /// Minimises for a fixed penalty, from `y = 0`, by sequential quadratic programming on the models with an inner
+    /// trust region and second-order corrections.
     fn minimise(
         &mut self,
         objective: &PenalisedObjective,
@@ -215,7 +217,7 @@ impl TrustRegionSubproblem {
                     found = try_step(y, &correction.step, trial_values);
                 }
             }
-            // Even where the step failed, its multipliers tell more of the curvature.
+            // The multipliers of a rejected step still improve the Hessian.
             std::mem::swap(multipliers, &mut direction.multipliers);
             if found >= value {
                 failures += 1;
@@ -239,16 +241,16 @@ impl TrustRegionSubproblem {
     }
 }
 
-/// The largest weight of a violation.
+/// Maximum penalty of the violation.
 const LARGEST_PENALTY: f64 = 1e7;
 
-/// Quadratic programmes on the models for one step.
+/// Maximum number of inner quadratic programs per subproblem.
 const INNER_ITERATIONS: usize = 30;
 
-/// Steps of these that may fail.
+/// Maximum number of rejected inner steps.
 const INNER_FAILURES: usize = 8;
 
-/// At first the largest row has all the weight.
+/// Distributes the initial multipliers over the largest objectives.
 fn initial_multipliers(criteria: &LinearisedCriteria, multipliers: &mut Multipliers) {
     let maximum = criteria.objective();
     let count = criteria.objectives.iter().filter(|row| row.value >= maximum).count();
@@ -262,19 +264,19 @@ fn initial_multipliers(criteria: &LinearisedCriteria, multipliers: &mut Multipli
     multipliers.equalities.resize(criteria.equalities.len(), 0.0);
 }
 
-/// The first multiple of the identity that is added to a matrix that is not positive definite, relative to its norm.
+/// First multiple of the identity added to a matrix that is not positive definite, relative to its norm.
 const FIRST_SHIFT: f64 = 1e-3;
 
-/// What the smallest eigenvalue is to exceed, relative to the largest entry.
+/// Lower bound of the smallest eigenvalue, relative to the largest entry.
 const MIN_EIGENVALUE: f64 = 1e-8;
 
-/// Makes a symmetric matrix positive definite, where it is not, by a multiple of the identity; one that is 0 or not finite
-/// becomes a small multiple itself.
+/// Makes a symmetric matrix positive definite by adding a multiple of the identity, if necessary. A zero or non-finite
+/// matrix is replaced by a small multiple of the identity.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition (2006), algorithm 3.3.
 ///
-/// N.B.: their first multiple is an absolute number, and they ask for no margin. A matrix with flat directions alone gets just
-/// the margin: flat directions are the rule where few points tell of the curvature.
+/// N.B.: in the book, the first multiple is an absolute number, and the smallest eigenvalue has no lower bound. Here a
+/// positive semidefinite matrix receives just that bound: with few points, directions without curvature are common.
 fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
     let n = matrix.nrows();
     let size = matrix.iter().fold(0.0_f64, |most, h| if h.is_finite() { most.max(h.abs()) } else { f64::INFINITY });
@@ -283,7 +285,7 @@ fn make_convex(matrix: &mut DMatrix<f64>, factor: &mut Vec<f64>) {
         *matrix *= 1e-9;
         return;
     }
-    // In units of the largest entry, so that nothing overflows: no eigenvalue is below -n.
+    // In units of the largest entry to avoid overflow: no eigenvalue is below -n.
     let smallest = (0..n).map(|i| matrix[(i, i)]).fold(f64::INFINITY, f64::min) / size;
     let first = FIRST_SHIFT * matrix.iter().map(|h| math::powi(h / size, 2)).sum::<f64>().sqrt();
     let mut shift = if smallest > -MIN_EIGENVALUE { 0.0 } else { first - smallest };
@@ -306,7 +308,7 @@ mod tests {
 
     #[test]
     fn the_kink_of_two_parabolas_is_found() {
-        // y^2 and (y - 1)^2 meet at 1/2.
+        // y^2 and (y - 1)^2 intersect at 1/2.
         let models = through(&[[0.0], [1.0], [-1.0]], |y| vec![y[0] * y[0], math::powi(y[0] - 1.0, 2)]);
         let shape = Shape { spacing: vec![0.0], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
         let mut objective = PenalisedObjective { shape: &shape, objective_scale: 1.0, penalty: 10.0 };
@@ -323,7 +325,7 @@ mod tests {
 
     #[test]
     fn a_step_goes_along_a_curved_constraint() {
-        // -y_1 inside the circle y'y <= 1, from its edge at (0, 1): the slopes alone lead straight off the circle.
+        // -y_1 inside the circle y'y <= 1, from its boundary at (0, 1): the tangent leaves the circle at once.
         let f = |y: &[f64]| vec![-y[0], y[0] * y[0] + y[1] * y[1]];
         let steps = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [0.7, 0.6]];
         let models = through(&steps, |y| f(&[y[0], y[1] + 1.0]));
@@ -343,7 +345,7 @@ mod tests {
         let mut matrix = convex.clone();
         make_convex(&mut matrix, &mut factor);
         assert_eq!(matrix, convex);
-        // Eigenvalues 3 and -1: at least 1 has to be added, and no more than twice as much is.
+        // Eigenvalues 3 and -1: the shift must be at least 1 and is at most twice as large.
         let indefinite = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
         for size in [1.0, 1e-300, 1e300] {
             let mut matrix = &indefinite * size;
