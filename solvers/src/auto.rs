@@ -75,7 +75,7 @@ enum Stage {
 struct Status {
     /// True if a previous stage has converged.
     converged: bool,
-    /// True if two starting points have led to the same optimum.
+    /// True if two runs have reached the same optimum.
     confirmed: bool,
     /// Objective at the start of the last multistart around the best point.
     previous_objective: f64,

@@ -107,8 +107,8 @@ fn positions(spacing: f64) -> Vec<f64> {
 /// Returns brackets around the positions that are no worse than both neighbours.
 fn brackets(positions: &[f64], merits: &[Merit]) -> Vec<Bracket> {
     let all = positions.windows(3).zip(merits.windows(3));
-    let is_least = |merits: &[Merit]| !merits[0].is_better_than(&merits[1]) && merits[1].is_better_than(&merits[2]);
-    all.filter(|(_, merits)| is_least(merits))
+    let is_minimum = |merits: &[Merit]| !merits[0].is_better_than(&merits[1]) && merits[1].is_better_than(&merits[2]);
+    all.filter(|(_, merits)| is_minimum(merits))
         .map(|(p, m)| Bracket::new([p[0], p[1], p[2]], [m[0], m[1], m[2]]))
         .collect()
 }

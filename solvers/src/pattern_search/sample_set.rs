@@ -14,7 +14,7 @@ pub struct SampleSet {
 const DROP_COUNT: usize = 200;
 
 /// Radius of the neighbourhood whose points enter the models, in trust-region radii.
-const REACH: f64 = 2.5;
+const NEIGHBOURHOOD_RADIUS: f64 = 2.5;
 
 impl SampleSet {
     /// Creates an empty set for points with `dimension` coordinates and `criteria` values.
@@ -66,7 +66,9 @@ impl SampleSet {
         let distance =
             |i: usize| self.point(i).iter().zip(centre).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / radius;
         neighbours.clear();
-        neighbours.extend((0..self.count).map(|i| (distance(i), i)).filter(|(distance, _)| *distance <= REACH));
+        neighbours.extend(
+            (0..self.count).map(|i| (distance(i), i)).filter(|(distance, _)| *distance <= NEIGHBOURHOOD_RADIUS),
+        );
         neighbours.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         neighbours.truncate((n + 1) * (n + 2) / 2);
     }

@@ -14,31 +14,34 @@ use crate::linearised_criteria::LinearisedCriteria;
 use crate::start::usable_start;
 use state::{FEASIBILITY_TOLERANCE, State};
 
-/// Sequential quadratic programming for `min max_i f_i` with constraints: every row is linearised on its own, so that
-/// the kink where two criteria meet is an ordinary solution, and a step solves the epigraph subproblem inside a trust
-/// region. The Hessian of the Lagrangian is a damped BFGS matrix; a rejected step gets one second-order correction;
-/// constraints that contradict each other are violated as little as can be (elastic mode, exact l-infinity penalty, which
-/// may rise for a step or two).
+/// Sequential quadratic programming for `min max_i f_i` with constraints.
 ///
-/// A criterion may have kinks of its own: an overshoot is the largest of several peaks. Where a step fails in spite of
-/// its correction, the rows are linearised beyond the kink too, and both pieces count from then on (a bundle).
+/// Every criterion is linearised on its own, and each step solves the epigraph subproblem in a trust region. So the
+/// kink (non-differentiable point) where two criteria intersect is an ordinary solution. The Hessian of the Lagrangian
+/// is a damped BFGS matrix; a rejected step receives one second-order correction. Inconsistent constraints are violated
+/// as little as possible (elastic mode with exact l-infinity penalty). The penalty function may increase for one or two
+/// steps.
 ///
-/// For up to about 50 tuners; converges fast. It finds the optimum of the basin it starts in.
+/// A criterion may have kinks of its own: an overshoot is the largest of several peaks. If a step fails in spite of its
+/// correction, the criteria are also linearised beyond the kink, and both linear models (cuts) count (bundle method).
+///
+/// For up to about 50 tuners. Converges fast, to the optimum of the basin of its initial guess.
 ///
 /// Source: R. Fletcher, Practical Methods of Optimization, 2nd edition (1987), section 14.4 (Sl1QP, second-order
-/// correction), 14.6 (nonsmooth pieces); M. J. D. Powell, in Numerical Analysis Dundee 1977, Lecture Notes in Mathematics
-/// 630 (damped BFGS); R. M. Chamberlain, M. J. D. Powell, C. Lemarechal, H. C. Pedersen, Mathematical Programming Study 16
-/// (1982) 1-17 (merit that may rise); K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization (1985) (bundles).
+/// correction), 14.6 (nonsmooth functions); M. J. D. Powell, in Numerical Analysis Dundee 1977, Lecture Notes in
+/// Mathematics 630 (damped BFGS); R. M. Chamberlain, M. J. D. Powell, C. Lemarechal, H. C. Pedersen, Mathematical
+/// Programming Study 16 (1982) 1-17 (watchdog technique); K. C. Kiwiel, Methods of Descent for Nondifferentiable
+/// Optimization (1985) (bundles).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SqpOptions {
-    /// Stop when the subproblem promises less than this, relative to 1 + |objective|.
+    /// Predicted decrease below which the iteration stops, relative to 1 + |objective|.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// First radius of the trust region, in the unit box.
+    /// Initial radius of the trust region, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub radius: f64,
-    /// Largest number of iterations.
+    /// Maximum number of iterations.
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
@@ -57,45 +60,44 @@ impl SolverOptions for SqpOptions {
     }
 }
 
-/// The solver of the kind `sqp`.
+/// Solver of the kind `sqp`.
 struct Sqp {
     options: SqpOptions,
     state: Option<State>,
     workspace: Workspace,
 }
 
-/// Memory that is used again from step to step.
+/// Buffers that are reused between steps.
 #[derive(Default)]
 struct Workspace {
     direction: Direction,
-    /// The second-order correction of the step.
+    /// Second-order correction of the step.
     correction: Direction,
-    /// The rows after them, without slopes.
+    /// Criteria after step and corrected step, without gradients.
     trial: [LinearisedCriteria; 2],
-    /// The rows of a linearisation.
+    /// Criteria of a linearisation.
     linear: LinearisedCriteria,
 }
 
-/// The radius below which the trust region has collapsed: a kink or a jump that no model describes.
+/// Radius below which the trust region has collapsed: at a kink or discontinuity that no model describes.
 const MIN_RADIUS: f64 = 1e-9;
 
-/// Slope of the Lagrangian that counts as none, where the steepest row has one of about 1 at the start.
+/// Gradient of the Lagrangian regarded as zero; initially the largest derivative of the objectives is about 1.
 const STATIONARY: f64 = 1e-9;
 
-/// Change of objective and violation that is none, relative to 1 + |objective|; and so many steps of that kind in a row are
-/// enough: what is left is the noise of simulations.
+/// Change of objective and violation regarded as zero, relative to 1 + |objective|, and number of successive such steps
+/// that end the iteration. The rest is simulation noise.
 const STALL_TOLERANCE: f64 = 1e-10;
 const MAX_STALLED: usize = 8;
 
-/// Share of the promise that a step must keep.
+/// Smallest ratio of actual to predicted reduction.
 const MIN_RATIO: f64 = 1e-4;
 
 impl Solver for Sqp {
     fn accepts(&self, shape: &Shape) -> Result<(), String> {
         if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
             return Err(
-                "`sqp` follows slopes and cannot treat tuners with whole numbers or lists; take `pattern-search`"
-                    .into(),
+                "`sqp` needs gradients, but a tuner has whole numbers or a list of values; use `pattern-search`".into(),
             );
         }
         Ok(())
@@ -111,7 +113,7 @@ impl Solver for Sqp {
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        // Every point tried has failed, or there is nothing to change.
+        // Without a state, every evaluated point has failed.
         let Self { options, state, workspace } = self;
         let Some(state) = state else { return Ok(Progress::Stalled) };
         if state.iterate.at.point.is_empty() {
@@ -123,7 +125,7 @@ impl Solver for Sqp {
         }
         state.update_scaling();
         if state.direction(&mut workspace.direction).is_none() {
-            // The Hessian may be at fault: forget it, once.
+            // Reset the Hessian once: it may be the cause.
             if !state.hessian.has_curvature() {
                 return Ok(Progress::Stalled);
             }
@@ -157,8 +159,8 @@ impl Solver for Sqp {
 }
 
 impl State {
-    /// Nothing is promised any more, or the trust region has collapsed: the end, unless old pieces or a curvature that is
-    /// too large hide a descent.
+    /// Ends the iteration if no decrease is predicted or the trust region has collapsed. First resets bundle and
+    /// Hessian once, because old cuts or excessive curvature may hide a descent direction.
     fn terminate_or_reset(
         &mut self,
         direction: &Direction,
@@ -183,7 +185,7 @@ impl State {
         }
     }
 
-    /// Tries the step, and its second-order correction where the step fails; the rows of what is better come first.
+    /// Evaluates the step and, if it fails, its second-order correction. The criteria of the better one come first.
     fn try_corrected(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -210,7 +212,7 @@ impl State {
         Ok(corrected)
     }
 
-    /// Accepts or rejects what was tried, and changes the trust region.
+    /// Accepts or rejects the trial point and updates the trust region.
     fn accept_or_reject(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -222,8 +224,8 @@ impl State {
         let Workspace { direction, trial: [criteria, _], linear, .. } = workspace;
         let length = direction.step.iter().fold(0.0_f64, |a, d| a.max(d.abs()));
         let actual = trial.map_or(f64::NEG_INFINITY, |_| merit - self.merit(criteria));
-        // A step that is better in objective or violation may also be measured from the worst of the two iterates before:
-        // the path along a curved constraint is not held up by a merit that rises a little.
+        // A step that improves objective or violation may also be compared with the worst of the last two iterates.
+        // Otherwise a slightly increasing penalty function would delay the path along a curved constraint.
         let allowance = self.reference_merit() - merit;
         let is_better_in_one = trial.is_some_and(|_| {
             criteria.objective() < self.criteria.objective() || criteria.violation() < self.criteria.violation()
@@ -231,7 +233,7 @@ impl State {
         let relaxed = if is_better_in_one { (actual + allowance) / (predicted + allowance) } else { f64::NEG_INFINITY };
         let ratio = (actual / predicted).max(relaxed);
         if ratio < 0.25 {
-            // Where the parabola through both values, with the slope here, has its minimum.
+            // Minimiser of the parabola through both values and the derivative at the iterate.
             let descent = predicted + self.hessian.half_quadratic_form(&direction.step);
             let best = if actual.is_finite() { 0.5 * descent / (descent - actual) } else { 0.25 };
             self.radius = (length * best.clamp(0.1, 0.5)).min(0.5 * self.radius);
@@ -242,7 +244,7 @@ impl State {
         let Some(evaluation) = trial else { return Ok(()) };
         let is_improvement = ratio > MIN_RATIO;
         self.rejected_steps = if is_improvement { 0 } else { self.rejected_steps + 1 };
-        // Slopes are worth their price where the point is better, or where it lies beyond a kink.
+        // Gradients are worth their cost only at a better point or beyond a kink.
         if !is_improvement && length > KINK_STEP && self.rejected_steps < 2 {
             return Ok(());
         }
@@ -262,10 +264,11 @@ impl State {
     }
 }
 
-/// A step shorter than this that fails has met a kink, if the slopes say so: smooth rows are well described by them there.
+/// Step length below which a failed step indicates a kink, if the gradients differ: linear models of smooth criteria
+/// are accurate there.
 const KINK_STEP: f64 = 0.02;
 
-/// Whether a slope changes by as much as a tenth of the steepest.
+/// Returns true if a derivative changes by more than a tenth of the largest one.
 fn gradients_differ(previous: &LinearisedCriteria, after: &LinearisedCriteria) -> bool {
     let pairs = |criteria: fn(&LinearisedCriteria) -> &Vec<crate::linearised_criteria::LinearModel>| {
         criteria(previous).iter().zip(criteria(after))

@@ -1,8 +1,8 @@
-//! Factors that bring the slopes of all rows to the order of 1.
+//! Scaling of the gradients of all criteria to the order of 1.
 
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
-/// One factor for the objective, one for every constraint; those of constraints shrink only.
+/// One scale factor for the objective and one for every constraint; the latter are at most 1.
 ///
 /// Source: A. Waechter, L. T. Biegler, Mathematical Programming 106 (2006) 25-57, section 3.8.
 #[derive(Debug)]
@@ -23,12 +23,12 @@ impl Scaling {
         }
     }
 
-    /// The factor of the objective.
+    /// Returns the scale factor of the objective.
     pub fn objective(&self) -> f64 {
         self.objective
     }
 
-    /// Renews the factors of constraints whose slopes have changed by much.
+    /// Updates the scale factors of constraints whose gradients have changed substantially.
     pub fn update(&mut self, criteria: &mut LinearisedCriteria) {
         let update = |(row, factor): (&mut LinearModel, &mut f64)| {
             let change = shrinking_factor(gradient_norm(row) / *factor) / *factor;

@@ -1,4 +1,4 @@
-//! Where the iteration stands: the rows at the best point, their curvature, the trust region and the penalty.
+//! State of the iteration: linearised criteria, Hessian, trust region and penalty.
 
 use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape};
 
@@ -9,45 +9,45 @@ use crate::epigraph::{Direction, Subproblem};
 use crate::linearised_criteria::LinearisedCriteria;
 
 pub(super) struct State {
-    /// Values and slopes at the iterate.
+    /// Values and gradients at the iterate.
     pub iterate: Linearisation,
-    /// Its rows.
+    /// Scaled criteria at the iterate.
     pub criteria: LinearisedCriteria,
     pub scaling: Scaling,
-    /// Pieces beyond kinks.
+    /// Cuts beyond kinks.
     pub bundle: Bundle,
     pub hessian: Hessian,
     /// Radius of the trust region, in the unit box.
     pub radius: f64,
-    /// Factor of the violation in the exact penalty function.
+    /// Weight of the violation in the exact penalty function.
     pub penalty: f64,
     pub iterations: usize,
-    /// Steps in a row that brought nothing.
+    /// Number of successive rejected steps.
     pub rejected_steps: usize,
-    /// Steps in a row that changed almost nothing.
+    /// Number of successive steps with negligible change.
     pub stalled_steps: usize,
-    /// Objective and violation of the two iterates before.
+    /// Objective and violation of the two previous iterates.
     previous: [Option<[f64; 2]>; 2],
-    /// Merit at which the memory was last thrown away.
+    /// Penalty function at the last reset of bundle and Hessian.
     pub merit_at_reset: Option<f64>,
     subproblem: Subproblem,
     workspace: Workspace,
 }
 
-/// Memory that is used again from step to step.
+/// Buffers that are reused between steps.
 #[derive(Default)]
 struct Workspace {
     low: Vec<f64>,
     high: Vec<f64>,
-    /// The rows here with the pieces of the bundle.
+    /// Criteria at the iterate with the cuts of the bundle.
     all_criteria: LinearisedCriteria,
     corrected: LinearisedCriteria,
-    /// The point that is tried.
+    /// Trial point.
     point: Vec<f64>,
     step: Vec<f64>,
-    /// Slopes of the Lagrangian before and after a step.
+    /// Gradients of the Lagrangian before and after a step.
     gradients: [Vec<f64>; 2],
-    /// The step where nothing but the constraints counts.
+    /// Step that minimises the violation alone.
     feasibility_direction: Direction,
 }
 
@@ -76,30 +76,31 @@ impl State {
         }
     }
 
-    /// Brings constraints whose slopes have changed by much back to the order of 1.
+    /// Rescales constraints whose gradients have changed substantially to the order of 1.
     pub fn update_scaling(&mut self) {
         self.scaling.update(&mut self.criteria);
     }
 
-    /// The exact penalty function.
+    /// Returns the exact penalty function.
     pub fn merit(&self, criteria: &LinearisedCriteria) -> f64 {
         criteria.objective() + self.penalty * criteria.violation()
     }
 
-    /// The largest merit of this iterate and the two before.
+    /// Returns the largest penalty function of this iterate and the two before.
     pub fn reference_merit(&self) -> f64 {
         let previous =
             self.previous.iter().flatten().map(|[objective, violation]| objective + self.penalty * violation);
         previous.fold(self.merit(&self.criteria), f64::max)
     }
 
-    /// Finds the step of the subproblem; the penalty grows until the violation falls as far as the trust region allows.
+    /// Computes the step of the subproblem; the penalty grows until the violation falls as far as the trust region
+    /// permits.
     #[must_use]
     pub fn direction(&mut self, into: &mut Direction) -> Option<()> {
         let violation = self.criteria.violation();
         self.solve(self.penalty, into)?;
         if into.violation > FEASIBILITY_TOLERANCE {
-            // What can be reached if nothing but the constraints counts.
+            // The smallest violation in the trust region.
             let mut feasibility_direction = std::mem::take(&mut self.workspace.feasibility_direction);
             let found = self.solve(LARGEST_PENALTY, &mut feasibility_direction);
             let least = feasibility_direction.violation;
@@ -119,7 +120,7 @@ impl State {
         Some(())
     }
 
-    /// Finds the step to where the same slopes lead from the values at a point that was tried.
+    /// Computes the second-order correction: the gradients at the iterate with the values at the trial point.
     #[must_use]
     pub fn correction(&mut self, trial: &LinearisedCriteria, step: &[f64], into: &mut Direction) -> Option<()> {
         let mut corrected = std::mem::take(&mut self.workspace.corrected);
@@ -131,7 +132,7 @@ impl State {
         found
     }
 
-    /// Finds the step for the rows.
+    /// Solves the subproblem for the criteria and the bundle.
     fn solve(&mut self, penalty: f64, into: &mut Direction) -> Option<()> {
         let Self { iterate, criteria, bundle, hessian, subproblem, radius, workspace, .. } = self;
         let here = &iterate.at.point;
@@ -146,13 +147,13 @@ impl State {
         subproblem.solve(&workspace.all_criteria, hessian.matrix(), [&workspace.low, &workspace.high], penalty, into)
     }
 
-    /// Reads the rows of a linearisation.
+    /// Sets scaled criteria from a linearisation.
     pub fn linearise(&self, shape: &Shape, at: &Linearisation, criteria: &mut LinearisedCriteria) {
         criteria.linearise(shape, at);
         self.scaling.apply(criteria);
     }
 
-    /// Evaluates the point after a step, and reads its rows, which have no slopes; `None` where the point fails.
+    /// Evaluates the point after a step and sets its scaled criteria, without gradients; `None` if the point fails.
     pub fn try_step(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -169,7 +170,7 @@ impl State {
         Ok(Some(evaluation))
     }
 
-    /// Takes in what the slopes at another point say of the curvature.
+    /// Updates the Hessian with the gradients at another point.
     pub fn update_hessian(&mut self, point: &[f64], criteria: &LinearisedCriteria, direction: &Direction) {
         let Workspace { step, gradients: [previous, after], .. } = &mut self.workspace;
         step.clear();
@@ -180,11 +181,11 @@ impl State {
         self.hessian.update(step, after);
     }
 
-    /// Moves to another point; its rows change places with those here.
+    /// Moves to another point and swaps its criteria with those of the iterate.
     pub fn move_to(&mut self, at: Linearisation, criteria: &mut LinearisedCriteria, direction: &Direction) {
         self.update_hessian(&at.at.point, criteria, direction);
         self.previous = [Some([self.criteria.objective(), self.criteria.violation()]), self.previous[0]];
-        // What was here is a piece too as long as kinks are near.
+        // While kinks are near, the old iterate becomes a cut, too.
         if !self.bundle.is_empty() {
             self.bundle.insert(&self.iterate.at.point, &self.criteria);
         }
@@ -193,7 +194,7 @@ impl State {
         std::mem::swap(&mut self.criteria, criteria);
     }
 
-    /// How far the slope of the Lagrangian is from 0 where no bound is in the way.
+    /// Returns the largest entry of the Lagrangian's gradient among the coordinates not fixed at a bound.
     pub fn stationarity_residual(&mut self, direction: &Direction) -> f64 {
         let gradient = &mut self.workspace.gradients[0];
         self.criteria.lagrangian_gradient(&direction.multipliers, gradient);
@@ -208,8 +209,8 @@ impl State {
     }
 }
 
-/// Violation in scaled rows that counts as none.
+/// Violation of scaled constraints regarded as zero.
 pub(super) const FEASIBILITY_TOLERANCE: f64 = 1e-10;
 
-/// Beyond it the objective counts nothing.
+/// Maximum penalty; above it the objective would have no influence.
 const LARGEST_PENALTY: f64 = 1e8;

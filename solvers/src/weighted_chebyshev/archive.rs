@@ -1,4 +1,4 @@
-//! What is known of the problem: every point that a subproblem has evaluated, to start others from.
+//! Archive of all feasible points evaluated by subproblems, which provides their starting points.
 
 use std::collections::HashSet;
 
@@ -6,29 +6,29 @@ use mops_core::{Evaluation, FEASIBLE, Shape};
 
 use super::scalarisation::Scalarisation;
 
-/// A point that meets all constraints, with its criteria.
+/// Feasible point with its criteria.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// The point of the unit box.
+    /// Point of the unit box.
     pub point: Vec<f64>,
-    /// Weighted scaled values of the rows to be minimised.
+    /// Weighted scaled values of the criteria to be minimised.
     pub criteria: Vec<f64>,
 }
 
 impl Candidate {
-    /// Whether it is worse in no criterion and better in one by more than `margin`, in units of `range`.
+    /// Returns true if no criterion is worse and one is better by more than `margin`, in units of `range`.
     pub fn dominates(&self, other: &Self, range: &[f64], margin: f64) -> bool {
         let gains = || self.criteria.iter().zip(&other.criteria).zip(range).map(|((a, b), range)| (b - a) / range);
         gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > margin)
     }
 
-    /// The largest distance along a coordinate.
+    /// Returns the maximum-norm distance of two points.
     pub fn distance(&self, other: &Self) -> f64 {
         self.point.iter().zip(&other.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 }
 
-/// Every feasible point that was evaluated, in that order.
+/// Feasible points in the order of their evaluation.
 #[derive(Debug, Default)]
 pub struct Archive {
     candidates: Vec<Candidate>,
@@ -36,7 +36,7 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// Takes in answers of the problem itself.
+    /// Records the feasible points among evaluations of the original problem.
     pub fn record(&mut self, shape: &Shape, answers: &[Evaluation]) {
         for answer in answers {
             let Some(scaled) = answer.scaled.as_ref().filter(|_| answer.merit.violation <= FEASIBLE) else { continue };
@@ -46,12 +46,12 @@ impl Archive {
         }
     }
 
-    /// All of them.
+    /// Returns all recorded points.
     pub fn candidates(&self) -> &[Candidate] {
         &self.candidates
     }
 
-    /// The `count` best for a subproblem, the best first, each at least `apart` from those before.
+    /// Returns the `count` best points for a subproblem, the best first, at a mutual distance of at least `distance`.
     pub fn best(&self, scalarisation: &Scalarisation, count: usize, distance: f64) -> Vec<Candidate> {
         let key = |candidate: &Candidate| {
             let merit = scalarisation.merit(&candidate.criteria);

@@ -1,4 +1,4 @@
-//! Weighted Chebyshev: a front, point by point, each the solution of a min-max problem of its own.
+//! Weighted Chebyshev method: computes a Pareto front point by point, each as the solution of a min-max problem.
 
 mod archive;
 mod rectangles;
@@ -15,41 +15,45 @@ use rectangles::Rectangles;
 use reference_directions::ReferenceDirections;
 use subproblem::Subproblems;
 
-/// Points of the front of designs that no other is better than in every criterion, spread evenly, each the solution of a
-/// weighted min-max problem; needs `objective = "each"`. First every criterion is minimised alone (from several starts; then
-/// the others as far as they go without loss), which gives the ends of the front and the range of every criterion.
+/// Weighted Chebyshev method for evenly spread points of the Pareto front (non-dominated designs). Each point solves a
+/// weighted min-max problem. Needs `objective = "each"`.
 ///
-/// Two criteria: between the two neighbours `p`, `q` that are farthest apart, the point is found that lies deepest in the
-/// rectangle of the two,
+/// First every criterion is minimised alone (multistart), and then the others as far as possible without loss. The
+/// results are the ends of the front and define the range of every criterion.
+///
+/// Two criteria: the two neighbours `p`, `q` with the largest distance define a rectangle. The next point is the
+/// deepest one in it,
 ///
 /// ```text
 /// min over x of max((f1(x) - p1) / (q1 - p1), (f2(x) - q2) / (p2 - q2))
 /// ```
-/// by `sqp` from between the two, from both of them, and from what is known in the rectangle. Where nothing lies in it, the
-/// front has a gap, and the rectangle is closed. More criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w`
-/// spread evenly over the simplex, each from the nearest point known.
+/// computed by `sqp` from the midpoint, from both neighbours and from known points in the rectangle. An empty rectangle
+/// is a gap in the front and is closed.
 ///
-/// One more point meets the demands best: its largest scaled value is least, as in a design.
+/// Three and more criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w` spread evenly over the simplex,
+/// each from the nearest known point.
 ///
-/// A point where some criterion has slack is pushed on until none can be lowered alone. Everything that was evaluated on the
-/// way is compared with the points found, and it is looked a step beyond each of them; what is better than one of them is a
-/// new start. Subproblems that fail are left out.
+/// One more point minimises the largest scaled value, as in a single design; it meets the demands best.
 ///
-/// For criteria with slopes almost everywhere and few tuners: far fewer points than `nsga2` needs, and those of the front are
-/// exact. Fronts of many basins that lie apart from each other are `nsga2`'s.
+/// If a criterion has slack, it is lowered further while the others stay. All evaluated points are compared with the
+/// front, and an optimality test is made at each of its points; a dominating point is a new starting point. Subproblems
+/// that fail are omitted.
 ///
-/// Source: V. J. Bowman, in Multiple Criteria Decision Making, Lecture Notes in Economics and Mathematical Systems 130 (1976)
-/// 76-86 (weighted Chebyshev); H. W. Hamacher, C. R. Pedersen, S. Ruzika, Operations Research Letters 35 (2007) 336-344
-/// (rectangles); I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657 (weights); H. P. Benson, Journal of Optimization
-/// Theory and Applications 26 (1978) 569-580 (slack).
+/// For few tuners and criteria that are differentiable almost everywhere: needs far fewer evaluations than `nsga2`, and
+/// its points are exact. For fronts with many separate basins use `nsga2`.
+///
+/// Source: V. J. Bowman, in Multiple Criteria Decision Making, Lecture Notes in Economics and Mathematical Systems 130
+/// (1976) 76-86 (weighted Chebyshev); H. W. Hamacher, C. R. Pedersen, S. Ruzika, Operations Research Letters 35 (2007)
+/// 336-344 (rectangles); I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657 (weights); H. P. Benson, Journal
+/// of Optimization Theory and Applications 26 (1978) 569-580 (slack).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct WeightedChebyshevOptions {
-    /// Number of points; 0 for as many as the study asks for, else 30. Three criteria and more take the largest number of
-    /// evenly spread weights that is not above it.
+    /// Number of points; 0 for the number requested by the study, or 30. For three and more criteria, the largest
+    /// number of evenly spread weights that does not exceed it.
     #[schemars(range(max = 10_000))]
     pub points: usize,
-    /// Starts of the search for the least of each criterion, the study's own included.
+    /// Number of starting points for the minimum of each criterion, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
@@ -68,7 +72,7 @@ impl SolverOptions for WeightedChebyshevOptions {
     }
 }
 
-/// The solver of the kind `weighted-chebyshev`.
+/// Solver of the kind `weighted-chebyshev`.
 struct WeightedChebyshev {
     options: WeightedChebyshevOptions,
     state: Option<State>,
@@ -80,20 +84,20 @@ struct State {
     /// Points of the front.
     front: Vec<Candidate>,
     stage: Stage,
-    /// Whether it was looked beyond every point.
+    /// True after the optimality test of every point.
     optimality_checked: bool,
 }
 
 enum Stage {
-    /// The least of this criterion alone.
+    /// Minimisation of one criterion alone, by index.
     SingleCriterion(usize),
-    /// Between neighbours of two criteria.
+    /// Rectangles between neighbouring points, for two criteria.
     Rectangles(Rectangles),
-    /// Along the rays of more criteria.
+    /// Reference directions, for three and more criteria.
     ReferenceDirections(ReferenceDirections),
-    /// The point that meets the demands best.
+    /// Point that meets the demands best.
     MeetDemands,
-    /// What is known to be better than a point of the front.
+    /// Replacement of dominated points of the front, with the number of the round.
     ReplaceDominated(usize),
 }
 
@@ -101,12 +105,13 @@ impl Solver for WeightedChebyshev {
     fn accepts(&self, shape: &Shape) -> Result<(), String> {
         if shape.objective != Objective::Each {
             return Err(
-                "`weighted-chebyshev` looks for a front; set objective = \"each\" in [study], or take `sqp`".into()
+                "`weighted-chebyshev` computes a Pareto front: set objective = \"each\" in [study], or use `sqp`"
+                    .into(),
             );
         }
         if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
             return Err(
-                "`weighted-chebyshev` follows slopes and cannot treat tuners with whole numbers or lists; take `nsga2`"
+                "`weighted-chebyshev` needs gradients, but a tuner has whole numbers or a list of values; use `nsga2`"
                     .into(),
             );
         }
@@ -198,7 +203,7 @@ impl Solver for WeightedChebyshev {
 
     fn front(&self) -> Vec<Vec<f64>> {
         let Some(state) = &self.state else { return Vec::new() };
-        // Cut short before the ends were known: all that was evaluated is worth more.
+        // Without the ends of the front, all evaluated points are a better result.
         if matches!(state.stage, Stage::SingleCriterion(_)) {
             return Vec::new();
         }
@@ -206,10 +211,10 @@ impl Solver for WeightedChebyshev {
     }
 }
 
-/// Rounds in which points known to be better replace those of the front.
+/// Maximum number of rounds that replace dominated points.
 const MAX_ROUNDS: usize = 5;
 
-/// Keeps a point of the front, and no point that it is better than; whether it is one.
+/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself.
 fn insert(front: &mut Vec<Candidate>, candidate: Candidate) -> bool {
     let range = vec![1.0; candidate.criteria.len()];
     let is_dominated =

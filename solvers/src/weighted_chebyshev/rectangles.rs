@@ -1,4 +1,4 @@
-//! Two criteria: the rectangle between two neighbours, from the largest down.
+//! Search for two criteria: rectangles between neighbouring points of the front, the largest first.
 
 use mops_core::math;
 use mops_core::{FEASIBLE, Halt, Oracle};
@@ -8,27 +8,28 @@ use super::insert;
 use super::scalarisation::Scalarisation;
 use super::subproblem::Subproblems;
 
-/// Which rectangles hold nothing.
+/// Rectangles that contain no point of the front.
 #[derive(Debug, Default)]
 pub struct Rectangles {
-    /// Their corners, as criteria, with the number of searches that brought next to nothing.
+    /// Corners of rectangles, as criteria, with the number of successive unsuccessful searches.
     failures: Vec<(Vec<f64>, Vec<f64>, usize)>,
-    /// Subproblems solved.
+    /// Number of solved subproblems.
     solved: usize,
 }
 
-/// A gap that keeps this much of its length was hardly divided; so many times in a row, and it is one of the front itself.
+/// Relative length above which a part of a divided rectangle counts as undivided, and number of successive such
+/// divisions after which the rectangle is a gap of the front.
 const MIN_DIVISION: f64 = 0.85;
 const MAX_FAILURES: usize = 2;
 
-/// Depth of a point in the rectangle, from 0 to 1, below which it is one of the corners.
+/// Depth in the rectangle, from 0 to 1, below which a point coincides with a corner.
 const MIN_DEPTH: f64 = 1e-3;
 
-/// Depth that a point between two neighbours of one smooth piece has at least, about.
+/// Approximate minimum depth of a point between two neighbours on the same smooth part of the front.
 const EXPECTED_DEPTH: f64 = 0.4;
 
 impl Rectangles {
-    /// Looks for a point in the largest rectangle; `false` where all are small or empty.
+    /// Searches the largest rectangle for a point; returns false if all rectangles are small or empty.
     pub fn bisect(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -79,12 +80,12 @@ impl Rectangles {
     }
 }
 
-/// Whether a rectangle has sides to speak of.
+/// Returns true if both sides of a rectangle are longer than the resolution.
 fn is_wide(p: &Candidate, q: &Candidate, range: &[f64]) -> bool {
     (0..2).all(|k| (p.criteria[k] - q.criteria[k]).abs() > 1e-5 * range[k])
 }
 
-/// The deepest point of the rectangle; `None` where nothing is found in it.
+/// Returns the deepest point of the rectangle; `None` if it is empty.
 fn search_rectangle(
     oracle: &mut dyn Oracle,
     subproblems: &mut Subproblems,
@@ -99,14 +100,14 @@ fn search_rectangle(
     let between: Vec<f64> = p.point.iter().zip(&q.point).map(|(a, b)| 0.5 * (a + b)).collect();
     let answers = oracle.evaluate(&[between])?;
     subproblems.archive.record(oracle.shape(), &answers);
-    // The first rectangles are large, and may hold other basins than those of their corners.
+    // The first rectangles are large and may contain basins other than those of their corners.
     let count = if solved < 6 { 4 } else { 1 };
     let starts = subproblems.archive.best(&scalarisation, count, (0.3 * distance).max(1e-3));
     let mut found = subproblems.solve(oracle, &scalarisation, &starts, radius)?;
     if scalarisation.merit(&found.criteria).objective > 1.0 - EXPECTED_DEPTH {
         found = subproblems.solve(oracle, &scalarisation, &[p.clone(), q.clone()], radius)?;
     }
-    // An end of the front may be stationary for both criteria: no slope leads away from it.
+    // At an end of the front both gradients may vanish: start elsewhere.
     if scalarisation.merit(&found.criteria).objective > 1.0 - MIN_DEPTH
         && let Some(start) = balanced_point(oracle, subproblems, &scalarisation, p, q)?
     {
@@ -118,11 +119,11 @@ fn search_rectangle(
     subproblems.remove_slack(oracle, &scalarisation, found).map(Some)
 }
 
-/// Halvings of the way between two neighbours.
+/// Number of bisections between two neighbours.
 const BISECTIONS: usize = 10;
 
-/// The point on the straight way from `p` to `q` where both criteria stand equally high in the rectangle: criteria that are
-/// continuous have one. `None` where a simulation fails, or where a constraint is violated there.
+/// Returns the point on the segment from `p` to `q` at which both scalarised criteria are equal; it exists for
+/// continuous criteria. `None` if a simulation fails or a constraint is violated there.
 fn balanced_point(
     oracle: &mut dyn Oracle,
     subproblems: &mut Subproblems,

@@ -1,4 +1,4 @@
-//! Three criteria and more: rays from the ideal point, spread evenly.
+//! Search for three and more criteria: evenly spread reference directions from the ideal point.
 
 use mops_core::math;
 use mops_core::{Halt, Oracle};
@@ -9,15 +9,15 @@ use super::scalarisation::Scalarisation;
 use super::subproblem::Subproblems;
 use crate::simplex_lattice::{max_divisions, simplex_lattice};
 
-/// The rays that are left.
+/// Reference directions still to be solved.
 #[derive(Debug)]
 pub struct ReferenceDirections {
     pending: Vec<Vec<f64>>,
-    /// Those that were followed, with the point found.
+    /// Solved directions with the points found.
     solved: Vec<(Vec<f64>, Candidate)>,
 }
 
-/// The least weight: a ray along a side of the simplex is turned inwards by this much.
+/// Offset of every weight, which turns directions on the boundary of the simplex inwards.
 const MIN_WEIGHT: f64 = 0.01;
 
 impl ReferenceDirections {
@@ -29,7 +29,7 @@ impl ReferenceDirections {
         Self { pending: shifted.collect(), solved: Vec::new() }
     }
 
-    /// Follows the ray that is nearest to one followed before; `false` where none is left.
+    /// Solves the direction that is nearest to one solved before; returns false if none is left.
     pub fn solve_next(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -41,7 +41,7 @@ impl ReferenceDirections {
             let of = |(other, candidate): &(Vec<f64>, Candidate)| (distance(direction, other), candidate.clone());
             self.solved.iter().map(of).min_by(|a, b| a.0.total_cmp(&b.0))
         };
-        // The first ray leads into the middle.
+        // The first direction is the one nearest to the centre.
         let middle = |direction: &[f64]| distance(direction, &vec![1.0 / direction.len() as f64; direction.len()]);
         let key = |direction: &[f64]| nearest(direction).map_or_else(|| middle(direction), |(distance, _)| distance);
         let next = (0..self.pending.len()).min_by(|&a, &b| key(&self.pending[a]).total_cmp(&key(&self.pending[b])));

@@ -1,22 +1,22 @@
-//! What a subproblem makes of the criteria, and the oracle that a local solver sees it through.
+//! Scalarisation of the criteria in a subproblem, and the oracle through which a local solver evaluates it.
 
 use mops_core::{Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Shape, Stream, Usage};
 
 use super::archive::Archive;
 
-/// What a subproblem does with a criterion `f`, the weighted scaled value of a row to be minimised.
+/// Role of a criterion `f` (weighted scaled value) in a subproblem.
 #[derive(Debug, Clone, Copy)]
 pub enum Role {
-    /// `(f - from) / per` is minimised.
+    /// `(f - reference) / scale` is minimised.
     Minimised { reference: f64, scale: f64 },
-    /// `(f - limit) / per` is at most 0.
+    /// `(f - limit) / scale` is at most 0.
     Limited { limit: f64, scale: f64 },
-    /// It has no say.
+    /// The criterion has no influence.
     Ignored,
 }
 
 impl Role {
-    /// The scaled value that stands for it: factor and offset.
+    /// Returns factor and offset that map the criterion to its scaled value in the subproblem.
     fn coefficients(self) -> (f64, f64) {
         match self {
             Self::Minimised { reference, scale } => (1.0 / scale, -reference / scale),
@@ -34,23 +34,23 @@ impl Role {
     }
 }
 
-/// A subproblem: a role for every criterion, in the order of the rows; the constraints stay what they are.
+/// Scalarisation of a subproblem: a role for every criterion, in their order. Constraints remain unchanged.
 #[derive(Debug, Clone)]
 pub struct Scalarisation {
-    /// The roles.
+    /// Roles of the criteria.
     pub roles: Vec<Role>,
-    /// How what is minimised becomes one number.
+    /// Combination of the minimised criteria into one number.
     pub objective: Objective,
 }
 
 impl Scalarisation {
-    /// The largest of the criteria, measured from `low` in units of `range`: the weighted Chebyshev distance.
+    /// Creates the weighted Chebyshev distance: the largest criterion, relative to `low` and in units of `range`.
     pub fn chebyshev(low: &[f64], range: &[f64]) -> Self {
         let role = |(&reference, &scale): (&f64, &f64)| Role::Minimised { reference, scale };
         Self { roles: low.iter().zip(range).map(role).collect(), objective: Objective::Max }
     }
 
-    /// What each criterion counts as, in units of the subproblem.
+    /// Returns the scaled value of every criterion in the subproblem.
     pub fn scalarised_values(&self, criteria: &[f64]) -> Vec<f64> {
         let scalarised_value = |(role, f): (&Role, &f64)| {
             let (factor, offset) = role.coefficients();
@@ -59,7 +59,7 @@ impl Scalarisation {
         self.roles.iter().zip(criteria).map(scalarised_value).collect()
     }
 
-    /// What the criteria are worth; the violation is that of the criteria alone.
+    /// Returns the merit of the criteria; its violation is that of the limited criteria alone.
     pub fn merit(&self, criteria: &[f64]) -> Merit {
         let (mut violation, mut worst, mut sum) = (0.0_f64, f64::NEG_INFINITY, 0.0);
         for (role, f) in self.roles.iter().zip(criteria) {
@@ -83,7 +83,7 @@ impl Scalarisation {
         Shape { rows: of.rows.iter().map(&mut row).collect(), objective: self.objective, residuals: 0, ..of.clone() }
     }
 
-    /// Factor and offset of every row.
+    /// Returns factor and offset of every criterion and constraint.
     fn coefficients(&self, of: &Shape) -> Vec<(f64, f64)> {
         let mut roles = self.roles.iter();
         let mut coefficients = |(usage, weight): &(Usage, f64)| match usage {
@@ -97,10 +97,10 @@ impl Scalarisation {
     }
 }
 
-/// What the sum of a coordinate and a step may be beside the bound it leads to, and more.
+/// Tolerance for the rounding error of a step that leads to a bound.
 const ROUNDING: f64 = 1e-14;
 
-/// The problem as a subproblem has it; what is evaluated is remembered.
+/// Scalarised problem of a subproblem; every evaluation is recorded in the archive.
 pub struct ScalarisedProblem<'a> {
     oracle: &'a mut dyn Oracle,
     archive: &'a mut Archive,
@@ -124,8 +124,8 @@ impl<'a> ScalarisedProblem<'a> {
         evaluation
     }
 
-    /// The points with coordinates on the bounds that they are meant to lie on: a step to a bound leaves over what rounding
-    /// leaves over, and a criterion that is steepest there (a root, say) has slopes a little beside it that describe nothing.
+    /// Moves coordinates within rounding error of a bound to the bound. A criterion with infinite derivative at the
+    /// bound (a root, for example) has meaningless gradients next to it.
     fn on_bounds(point: &[f64]) -> Vec<f64> {
         let snap = |&u: &f64| {
             if u < ROUNDING {

@@ -1,4 +1,4 @@
-//! The subproblems, each solved by a local solver from points known.
+//! Subproblems, each solved by a local solver from known points.
 
 use mops_core::{Halt, Merit, Objective, Oracle, Progress, Solver, SolverOptions};
 
@@ -9,27 +9,27 @@ use crate::pareto::certify;
 use crate::pattern_search::PatternSearchOptions;
 use crate::sqp::SqpOptions;
 
-/// Solves subproblems, and remembers all points.
+/// Solver for subproblems; archives all evaluated points.
 pub struct Subproblems {
     pub archive: Archive,
     starts: usize,
-    /// The least value of every criterion, and how far the front reaches above it.
+    /// Smallest value of every criterion on the front, and the range of the front above it.
     pub ideal: Vec<f64>,
     pub range: Vec<f64>,
-    /// Subproblems without a solution.
+    /// Number of subproblems without a solution.
     pub failed: usize,
 }
 
-/// Share of a criterion's size that it may lose while the others are lowered.
+/// Permitted relative loss of a criterion while the others are minimised.
 const ALLOWED_LOSS: f64 = 1e-7;
 
-/// Slack of a criterion, as a share of its range in the subproblem, that is worth another search.
+/// Slack of a criterion, relative to its range in the subproblem, above which another search follows.
 const SLACK: f64 = 1e-4;
 
-/// Where `sqp` stops, in units of the subproblem.
+/// Tolerance of `sqp`, in units of the subproblem.
 const TOLERANCE: f64 = 1e-9;
 
-/// More tuners than this are too many for a pattern search.
+/// Maximum number of tuners for a pattern search.
 const MAX_POLLED_DIMENSION: usize = 10;
 
 impl Subproblems {
@@ -37,14 +37,14 @@ impl Subproblems {
         Self { archive: Archive::default(), starts, ideal: Vec::new(), range: Vec::new(), failed: 0 }
     }
 
-    /// A study of constraints alone: any point that meets them.
+    /// Searches for a feasible point of a study that has constraints only.
     pub fn find_feasible(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<Progress, Halt> {
         let scalarisation = Scalarisation { roles: Vec::new(), objective: Objective::Max };
         self.multistart(oracle, &scalarisation, start)
     }
 
-    /// Solves a subproblem from several starts; where no search ends at an optimum of slopes there may be a jump, and a
-    /// pattern search follows.
+    /// Solves a subproblem by multistart. If no run converges, the optimum may lie at a discontinuity, and a pattern
+    /// search follows.
     fn multistart(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -71,7 +71,7 @@ impl Subproblems {
         run(&mut problem, pattern.as_mut(), &best)
     }
 
-    /// The least of one criterion, and there the least of the others.
+    /// Minimises one criterion, then the others without loss in it.
     pub fn minimise_single(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -97,7 +97,7 @@ impl Subproblems {
         Ok(Some(self.solve(oracle, &scalarisation, &[optimum], 0.1)?))
     }
 
-    /// Takes the ranges of the criteria from the ends of the front.
+    /// Sets ideal point and ranges of the criteria from the ends of the front.
     pub fn set_ranges(&mut self, front: &[Candidate]) {
         let criteria = front[0].criteria.len();
         let column = |k: usize| front.iter().map(move |candidate| candidate.criteria[k]);
@@ -106,12 +106,12 @@ impl Subproblems {
         self.range = (0..criteria).map(|k| if reach(k) > 0.0 { reach(k) } else { 1.0 }).collect();
     }
 
-    /// The best point known for a subproblem.
+    /// Returns the best known point of a subproblem.
     fn best_archived(&self, scalarisation: &Scalarisation) -> Option<Candidate> {
         self.archive.best(scalarisation, 1, 0.0).pop()
     }
 
-    /// Solves a subproblem by `sqp` from each of the starts; the best point known for it in the end.
+    /// Solves a subproblem by `sqp` from each starting point and returns its best known point.
     pub fn solve(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -127,7 +127,7 @@ impl Subproblems {
         Ok(self.best_archived(scalarisation).unwrap_or_else(|| starts[0].clone()))
     }
 
-    /// The point whose largest weighted scaled value is least.
+    /// Returns the point with the smallest maximum of the weighted scaled values.
     pub fn solve_for_demands(&mut self, oracle: &mut dyn Oracle, criteria: usize) -> Result<Candidate, Halt> {
         let scalarisation = Scalarisation::chebyshev(&vec![0.0; criteria], &vec![1.0; criteria]);
         let starts = self.archive.best(&scalarisation, 2, 0.02);
@@ -135,7 +135,7 @@ impl Subproblems {
         self.remove_slack(oracle, &scalarisation, found)
     }
 
-    /// Lowers the criteria that have slack in a min-max problem, while the others stay.
+    /// Minimises the criteria that have slack in a min-max problem, while the others stay.
     pub fn remove_slack(
         &mut self,
         oracle: &mut dyn Oracle,
@@ -162,7 +162,7 @@ impl Subproblems {
         self.solve(oracle, &scalarisation, &[candidate], 0.05)
     }
 
-    /// Looks beyond every point of the front for a better one, which is known from then on.
+    /// Tests every point of the front for optimality; trial points that dominate it enter the archive.
     pub fn check_optimality(&mut self, oracle: &mut dyn Oracle, front: &[Candidate]) {
         for candidate in front {
             let nothing = vec![0.0; candidate.criteria.len()];
@@ -171,7 +171,8 @@ impl Subproblems {
         }
     }
 
-    /// Replaces points of the front by points known to be better, searched on from there; whether there was one.
+    /// Replaces points of the front by dominating points of the archive, after a local search. Returns true if there
+    /// were any.
     pub fn replace_dominated(&mut self, oracle: &mut dyn Oracle, front: &mut Vec<Candidate>) -> Result<bool, Halt> {
         let mut changed = false;
         for i in 0..front.len() {
@@ -184,7 +185,7 @@ impl Subproblems {
                 self.archive.candidates().iter().filter(dominates).max_by(|a, b| gain(a).total_cmp(&gain(b))).cloned();
             let Some(better) = better else { continue };
             changed = true;
-            // As far as it goes along the way from the one to the other.
+            // Improve all criteria together, starting from the dominating point.
             let scalarisation = Scalarisation::chebyshev(&better.criteria, &self.range);
             let found =
                 if gain(&better) > 1e-5 { self.solve(oracle, &scalarisation, &[better], 0.05)? } else { better };
@@ -200,11 +201,11 @@ impl Subproblems {
     }
 }
 
-/// Steps of a local solver that must bring at least so much, in units of the subproblem.
+/// Number of solver steps within which the subproblem must improve by at least [`MIN_GAIN`], in its units.
 const STEPS_PER_CHECK: usize = 15;
 const MIN_GAIN: f64 = 1e-4;
 
-/// Runs a solver as long as it brings something: at a kink of a criterion the last digits are many steps away.
+/// Runs a solver while it makes progress: at a kink of a criterion, the last digits need many steps.
 fn run_while_improving(
     problem: &mut ScalarisedProblem<'_>,
     solver: &mut dyn Solver,
