@@ -102,8 +102,8 @@ impl Subproblems {
         let criteria = front[0].criteria.len();
         let column = |k: usize| front.iter().map(move |candidate| candidate.criteria[k]);
         self.ideal = (0..criteria).map(|k| column(k).fold(f64::INFINITY, f64::min)).collect();
-        let reach = |k: usize| column(k).fold(f64::NEG_INFINITY, f64::max) - self.ideal[k];
-        self.range = (0..criteria).map(|k| if reach(k) > 0.0 { reach(k) } else { 1.0 }).collect();
+        let extent = |k: usize| column(k).fold(f64::NEG_INFINITY, f64::max) - self.ideal[k];
+        self.range = (0..criteria).map(|k| if extent(k) > 0.0 { extent(k) } else { 1.0 }).collect();
     }
 
     /// Returns the best known point of a subproblem.
