@@ -1,7 +1,7 @@
 //! Multistart of a local solver.
 //!
-//! The runs follow one another: from the initial guess of the study, from the best points of a sample of the box and,
-//! if enabled, from points around the best one until nothing changes.
+//! The first run starts from the initial guess of the study, the next ones from the best points of a sample of the box.
+//! If enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Solver};
 
@@ -98,8 +98,8 @@ impl Multistart {
         Self { local_restarts: true, ..self }
     }
 
-    /// Creates rounds of restarts around the best point only, within the given distances in turn, until none of them
-    /// improves the objective by `min_gain`, relative to its magnitude.
+    /// Creates rounds of restarts around the best point only, within the given distances in turn. The rounds end when
+    /// none of them improves the objective by `min_gain`, relative to its magnitude.
     pub fn restarts_around_best(local: Box<dyn Solver>, radii: &'static [f64], min_gain: f64) -> Self {
         Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
     }

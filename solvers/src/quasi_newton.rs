@@ -264,8 +264,8 @@ impl State {
         }
     }
 
-    /// Restarts after a failed line search, with gradients of a smaller radius and without curvature information, as
-    /// long as the value has decreased since the last restart.
+    /// Restarts after a failed line search, with gradients of a smaller radius and without curvature information. Ends
+    /// if the value has not decreased since the last restart.
     fn restart(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let has_improved =
             self.value_at_reset.is_infinite() || self.value_at_reset - self.value > 1e-8 * self.value.abs();

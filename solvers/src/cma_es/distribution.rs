@@ -151,8 +151,8 @@ impl Distribution {
         self.sigma * spread.max(self.path_c.amax())
     }
 
-    /// Returns true if a tenth of a standard deviation along a principal axis, or a fifth along a coordinate, leaves
-    /// the mean unchanged in floating-point arithmetic.
+    /// Returns true if steps are below rounding: a tenth of a standard deviation along a principal axis, or a fifth
+    /// along a coordinate, leaves the mean unchanged.
     pub fn is_below_rounding(&self) -> bool {
         let axis = self.generation % self.mean.len();
         let step = self.eigenvectors.column(axis) * (0.1 * self.sigma * self.deviations[axis]);

@@ -17,8 +17,8 @@ pub struct Rectangles {
     solved: usize,
 }
 
-/// Relative length above which a part of a divided rectangle counts as undivided, and number of successive such
-/// divisions after which the rectangle is a gap of the front.
+/// Relative length above which a part of a divided rectangle counts as undivided. After [`MAX_FAILURES`] such divisions
+/// in succession, the rectangle is a gap of the front.
 const MIN_DIVISION: f64 = 0.85;
 const MAX_FAILURES: usize = 2;
 

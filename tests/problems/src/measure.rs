@@ -36,8 +36,8 @@ pub struct FrontFound {
 }
 
 impl Measured {
-    /// Returns the number of points until one satisfied every constraint and was at most `accuracy` above the target,
-    /// relative to the larger of 1 and the magnitude of the target.
+    /// Returns the number of points until one satisfied every constraint and was at most `accuracy` above the target.
+    /// `accuracy` is relative to the larger of 1 and the magnitude of the target.
     pub fn evaluations_to(&self, accuracy: f64) -> Option<usize> {
         let target = self.target?;
         let limit = target + accuracy * target.abs().max(1.0);

@@ -55,8 +55,8 @@ fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// Front along the boundary of the second constraint from the minimum of the first objective, `x_1 = -5/2`, then along
-/// the circle to the minimum of the second objective.
+/// Front in two parts. The first follows the boundary of the second constraint from the minimum of the first objective,
+/// `x_1 = -5/2`; the second follows the circle to the minimum of the second objective.
 fn srn_front(count: usize) -> Vec<Vec<f64>> {
     let top = (225.0_f64 - 6.25).sqrt();
     let pieces =

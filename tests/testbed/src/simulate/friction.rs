@@ -6,7 +6,7 @@
 //! level, and slides on otherwise.
 //!
 //! At rest, the force that keeps the acceleration at 0 is computed. The joint breaks away when a command drives that
-//! force beyond the level, or at the end of the step in which it exceeds the level.
+//! force beyond the level, or at the end of a step that exceeds it.
 
 use super::world::World;
 use super::{FEW, SIZE, State, runge_kutta};
